@@ -9,7 +9,6 @@ the secret in the run folder. Only that file holds the secret: no message, argum
 from __future__ import annotations
 
 import os
-import secrets
 from pathlib import Path
 
 from backbone.errors import Refusal
@@ -60,7 +59,7 @@ def tcp_endpoint(address: str, port: int) -> str:
 
 def new_secret() -> str:
     """Return a new random secret."""
-    return secrets.token_hex(SECRET_BYTES)
+    return os.urandom(SECRET_BYTES).hex()
 
 
 def keep_secret(directory: Path, secret: str) -> Path:

@@ -65,10 +65,6 @@ def address(subsystem: Subsystem, component: str) -> str:
     return f"{subsystem}/{legal(component)}"
 
 
-LAUNCHER = address(Subsystem.BACKBONE, "launcher")
-"""Where the launcher is asked."""
-
-
 def is_component(component_address: str) -> bool:
     """Return whether a component can have this address.
 

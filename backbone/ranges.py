@@ -119,7 +119,7 @@ Values = Annotated[dict[Mention, Any], MANY]
 DEEPEST = 24  # chosen: the description of a world is six deep
 
 
-def wildness(value: Any, depth: int = 0) -> str:
+def wildness(value: object, depth: int = 0) -> str:
     """Return why a value of any kind is illegal, empty if it is legal: plain, finite and bounded.
 
     The reader calls this for messages with fields of any kind; types check all other messages.

@@ -16,7 +16,7 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def value_text(value: Any) -> str:
+def value_text(value: object) -> str:
     """Return a value of a parameter as a person types it, rounded to a readable number of digits.
 
     Example:
@@ -26,7 +26,7 @@ def value_text(value: Any) -> str:
     return json.dumps(_rounded(value), ensure_ascii=False, default=str)
 
 
-def _rounded(value: Any) -> Any:
+def _rounded(value: object) -> Any:
     match value:
         case float():
             return float(f"{value:.6g}")

@@ -31,8 +31,6 @@ from backbone.ranges import LONGEST_TEXT, MOST_FEW, Count, Facts, Instant, Menti
 WIRE_VERSION = 1
 MAX_MESSAGE_BYTES = 8 * 1024 * 1024  # chosen: a 1080p colour frame (6.2 MB) fits, a runaway list does not
 
-Body = TypeVar("Body")
-
 
 class Message(
     msgspec.Struct,
@@ -45,7 +43,13 @@ class Message(
     """Base class of all messages. Derived classes repeat ``frozen=True`` for the type checker."""
 
 
-class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True, forbid_unknown_fields=True):
+Accepts = type[Message] | types.UnionType
+"""The messages of one conversation: one class, or a union of classes."""
+Body = TypeVar("Body", bound=Message)
+Body_co = TypeVar("Body_co", bound=Message, covariant=True)
+
+
+class Envelope(msgspec.Struct, Generic[Body_co], frozen=True, array_like=True, forbid_unknown_fields=True):
     """A message with its origin.
 
     Attributes:
@@ -61,7 +65,7 @@ class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True, forb
     sequence: Count
     stamp_s: Instant
     cause: Mention
-    body: Body
+    body: Body_co
 
     @property
     def id(self) -> str:
@@ -127,7 +131,7 @@ _encoder = msgspec.msgpack.Encoder()
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # all that msgspec raises on bad bytes
 
 
-def write(envelope: Envelope[Any]) -> bytes:
+def write(envelope: Envelope[Message]) -> bytes:
     """Return the envelope as bytes.
 
     Raises:
@@ -139,12 +143,12 @@ def write(envelope: Envelope[Any]) -> bytes:
     return raw
 
 
-def schema_of(kind: type[Any]) -> str:
+def schema_of(kind: type[Message]) -> str:
     """Return ``<Name>/<version>`` of a message class."""
     return cast(str, kind.__struct_config__.tag)
 
 
-def kinds_of(accepts: type[Any] | types.UnionType) -> tuple[type[Any], ...]:
+def kinds_of(accepts: Accepts) -> tuple[type[Message], ...]:
     """Return the message classes of a union, or the one class."""
     return typing.get_args(accepts) or (accepts,)
 
@@ -159,7 +163,7 @@ def refuse_oversized(length: int) -> None:
         raise OversizedMessage(f"message of {length} bytes", bytes=length)
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Return messages, which travel as arrays, and dataclasses as dictionaries of their fields, all the way down.
 
     Example:

@@ -40,7 +40,7 @@ def seconds(command: Sequence[str], environment: Mapping[str, str]) -> float:
 
 
 def measure(name: str, command: Sequence[str], aim_s: float, rounds: int, environment: Mapping[str, str]) -> bool:
-    """Print one JSON line about the command, and say whether it is within its aim."""
+    """Print one JSON line about the command, and return whether it is within its aim."""
     took, floors = [], []
     for _ in range(rounds):
         floors.append(seconds(FLOOR, environment))

@@ -21,6 +21,7 @@ import msgspec
 import uvloop
 from measuring import bare_interpreters_s, free_endpoint, report
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
@@ -29,7 +30,6 @@ from backbone.creator.messages import EndProcess, ProcessEnded, RestartPolicy, S
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.naming import Subsystem
-from backbone.placer.messages import ADDRESS as PLACER
 
 COMPONENTS = 20
 CREATOR = "backbone/creator-bench"

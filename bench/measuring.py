@@ -55,7 +55,7 @@ def report(claim: str, **measured: Any) -> None:
 
 
 def free_endpoint() -> str:
-    """Return an endpoint on the loopback interface that nobody uses."""
+    """Return a free endpoint on the loopback interface."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"

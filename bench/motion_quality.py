@@ -1,7 +1,7 @@
 """How well motion is told from noise: precision, recall and false alarms per hour, from seeded noisy clips.
 
 A Scout watches the published path for slices of five seconds; in the crossings a Pioneer or a person
-passes, in the still clips nobody does.  Every detector sees the same received pictures: the one used,
+passes, in the still clips nothing moves.  Every detector sees the same received pictures: the one used,
 the same without its filter of whole rows, and the earlier frame averaging.  Prints a table and one JSON
 line.
 

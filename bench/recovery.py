@@ -7,7 +7,8 @@ of its own. Printed for each, as one JSON line:
 * ``healthy_s``: until health is ``ok``, everything runs again and pictures flow, to stay; 0: it never was otherwise.
 * ``unsaid_s``: the longest time for which the mission was less than it should be and its health said ``ok``.
 * ``gap_s``: the longest time without a picture; ``usual_gap_s``: before the fault, at a switch.
-* ``violations`` of the trace of scheduling decisions, ``more``: processes beyond those before the fault,
+* ``violations`` of the trace of scheduling decisions, ``late_by_pause``: starts that were late because the RC manager
+  itself was stopped, ``more``: processes beyond those before the fault,
   ``left``: processes left after ``down``.
 
 ``--pairs``, ``--again``, ``--during`` and ``--soak`` do other things to it. ``--table`` adds a table for people.

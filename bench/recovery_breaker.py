@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import psutil
 from recovery_mission import MARK, POLL_S, BenchMission, NotSeen, marked, mission_coming_up
+from recovery_trace import violations
 from recovery_verdict import Expected, Fault, Judgement, longest_gap_s
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from trace_checker import check
 
 from backbone.creator.process_table import is_stopped
 
@@ -60,6 +55,7 @@ class Breaker:
 
     def __init__(self, mission: BenchMission, patience_s: float = MENDED_WITHIN_S) -> None:
         self.mission, self.watch, self.patience_s = mission, mission.watch, patience_s
+        self.struck: list[Fault] = []
 
     def calm(self) -> Expected:
         """Return how the mission is when nothing is done to it."""
@@ -90,6 +86,7 @@ class Breaker:
         for fault in faults:
             number = SIGNALS.get(fault.name, signal.SIGSTOP)
             fault.at_s = time.monotonic()
+            self.struck.append(fault)
             with contextlib.suppress(ProcessLookupError):
                 os.kill(fault.pid, number)
             if fault.kills:
@@ -143,7 +140,7 @@ class Breaker:
         return found
 
     def end(self) -> dict[str, Any]:
-        """Take the mission down and return what the trace says and what is left."""
+        """Take the mission down; return the findings of the trace and the remains of the mission."""
         self.mission.detach_console()
         done = self.mission.down()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -151,15 +148,23 @@ class Breaker:
         return {"down": done.returncode, **self.aftermath()}
 
     def aftermath(self) -> dict[str, Any]:
-        """Return how ``up`` ended, what is left, and what the trace says."""
+        """Return the exit of ``up``, the remains of the mission, and the findings of the trace."""
         left = self.mission.left()
+        broken, late = violations(self.mission.trace, self._pauses())
         return {
             "up_exit": self.mission.launcher.poll(),
             "left": len(left),
             "folder_left": self.mission.directory.exists(),
-            "violations": len(broken := violations(self.mission.trace)),
-            **({"violated": broken[:SHOWN]} if broken else {}),
+            "violations": len(broken),
+            "late_by_pause": len(late),
+            **({"violated": [str(each) for each in broken[:SHOWN]]} if broken else {}),
         }
+
+    def _pauses(self) -> list[tuple[float, float]]:
+        """Return when the RC manager was stopped and when it went on, on the mission's clock."""
+        origin_s = self.watch.origin_s
+        stopped = [fault for fault in self.struck if fault.victim == "rc_manager" and not fault.kills]
+        return [(fault.at_s - origin_s, fault.lifted_s - origin_s) for fault in stopped]
 
 
 def marked_of(mission: BenchMission) -> list[psutil.Process]:
@@ -171,23 +176,6 @@ def marked_of(mission: BenchMission) -> list[psutil.Process]:
 def rounded(seconds: float | None) -> float | None:
     """Return seconds as people read them."""
     return None if seconds is None else round(seconds, 2)
-
-
-def violations(trace: Path) -> list[str]:
-    """Return the rules the trace breaks, for people.
-
-    Each life of the RC manager is judged by itself: it begins with a ``meta`` line, and with what it adopts.
-    """
-    if not trace.exists():
-        return ["no trace"]
-    lives: list[list[dict[str, Any]]] = []
-    for line in trace.read_text().splitlines():
-        if line.endswith("}"):  # one that was killed may not have finished its last line
-            event = json.loads(line)
-            if event["ev"] == "meta":
-                lives.append([])
-            lives[-1].append(event)
-    return [str(found) for life in lives for found in check(life)]
 
 
 @contextlib.contextmanager

@@ -77,7 +77,7 @@ def first_seen(breaking: Breaker, victim: str, name: str) -> Fault:
 
 
 def is_up(mission: BenchMission) -> bool:
-    """Say whether ``up`` says so, everybody runs and health is ``ok``."""
+    """Return whether ``up`` reported ready, all components run and health is ``ok``."""
     look = mission.watch.looks[-1]
     said = any(line.startswith("all ready") for line in list(mission.lines))
     return said and look.word == "ok" and frozenset(look.sight["asks"]) >= WATCHERS and bool(mission.watch.pictures_s)
@@ -106,7 +106,7 @@ def struck_going_down(victim: str, name: str) -> dict[str, Any]:
 
 
 def says_so(mission: BenchMission) -> bool:
-    """Say whether the launcher has heard the order to go down."""
+    """Return whether the launcher has received the order to go down."""
     return any("ends it: by command" in line for line in list(mission.lines))
 
 

@@ -65,9 +65,17 @@ class Look:
 
 @dataclass
 class Watch:
-    """What an observer of its own process saw, growing while it watches."""
+    """What an observer of its own process saw, growing while it watches.
+
+    Attributes:
+        process: The observer.
+        origin_s: When the mission's clock was 0, monotonic clock of the machine.
+        looks: Its looks.
+        pictures_s: When pictures came.
+    """
 
     process: subprocess.Popen[str]
+    origin_s: float = 0.0
     looks: list[Look] = field(default_factory=list)
     pictures_s: list[float] = field(default_factory=list)
 
@@ -79,6 +87,8 @@ class Watch:
             said = json.loads(line)
             if "frame" in said:
                 self.pictures_s.append(said["frame"])
+            elif "origin" in said:
+                self.origin_s = said["origin"]
             else:
                 sight = said.get("sight", sight)
                 self.looks.append(Look(said["began"], said["t"], sight))
@@ -168,7 +178,7 @@ class BenchMission:
         return self.command("scout-backbone", "down")
 
     def left(self, within_s: float = GONE_WITHIN_S) -> list[psutil.Process]:
-        """Return what is left of its processes after at most this time."""
+        """Return its remaining processes after at most this time."""
         ends_s = time.monotonic() + within_s
         while (left := marked(self.environment[MARK])) and time.monotonic() < ends_s:
             time.sleep(POLL_S)
@@ -212,7 +222,7 @@ def marked(mark: str) -> list[psutil.Process]:
 
 @contextlib.contextmanager
 def mission_coming_up() -> Iterator[BenchMission]:
-    """Start a mission and an observer; whatever is left at the end of the block is killed."""
+    """Start a mission and an observer; at the end of the block kill the remaining processes."""
     with tempfile.TemporaryDirectory(prefix="scout-bench-") as folder:
         mark = uuid.uuid4().hex
         name = f"bench-{mark[:8]}"

@@ -72,7 +72,7 @@ async def open_bus(run_file: run_files.RunFile, clock: MissionClock) -> ZenohBus
 
 
 async def watch(bus: Bus, clock: MissionClock) -> None:
-    """Look again and again."""
+    """Look repeatedly."""
     last: dict[str, Any] = {}
     while True:
         began = time.monotonic()
@@ -88,6 +88,7 @@ async def watch(bus: Bus, clock: MissionClock) -> None:
 async def attend(mission: str) -> None:
     """Find the mission and watch it."""
     run_file = await found(mission)
+    say(origin=run_file.clock_origin_monotonic_s)
     clock = MissionClock(run_file.clock_origin_monotonic_s, run_file.clock_rate)
     bus = await open_bus(run_file, clock)
     try:

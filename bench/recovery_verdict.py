@@ -44,7 +44,7 @@ class Fault:
         return not self.name.startswith("SIGSTOP")
 
     def is_mended(self, look: Look) -> bool:
-        """Say whether, at this look, the work of the victim could be done again."""
+        """Return whether, at this look, the work of the victim was possible again."""
         if look.at_s < self.at_s:
             return True
         if not self.kills and look.began_s >= self.lifted_s:
@@ -58,7 +58,7 @@ class Fault:
         return all(look.pid(row) not in (0, self.pid) for row in self.rows)
 
     def is_noticed(self, look: Look, before: Look) -> bool:
-        """Say whether somebody who looks there learns of it."""
+        """Return whether a person who looks there learns of it."""
         if look.word != "ok" or set(self.rows) & set(look.sight.get("absent", [])):
             return True
         restarts, restarts_before = look.sight.get("restarts", {}), before.sight.get("restarts", {})

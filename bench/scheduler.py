@@ -122,7 +122,7 @@ class Measured:
         return max((ms for kind in self.times_s if (ms := self.ms(kind, share)) is not None), default=None)
 
     def meets_aims(self) -> bool | None:
-        """Say whether every kind of event meets the aims of this size; None: it has none."""
+        """Return whether every kind of event meets the aims of this size; None: it has none."""
         aims = AIMS_MS.get(self.arcs)
         if aims is None:
             return None

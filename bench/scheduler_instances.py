@@ -1,7 +1,7 @@
 """Fleets for ``scheduler.py``: many ARCs that want two to four RCs each, in several shapes, from a seed.
 
 * ``uniform``: any RCs; with many ARCs nearly all of them hang together as one group.
-* ``cells``: robots in cells of eight RCs; nobody needs an RC of another cell: many small groups.
+* ``cells``: robots in cells of eight RCs; no robot needs an RC of another cell: many small groups.
 * ``hub``: everybody needs one of a few RCs (a video frequency) beside its own: one big group with a bottleneck.
 * ``tree``: as uniform, and the owners stand in a behavior tree of three levels with priorities.
 * ``radio``: as uniform, and one of the RCs is a radio shared by streams.

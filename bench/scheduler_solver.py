@@ -4,7 +4,7 @@ All ARCs always want their RCs, all slices are equally long and switches take no
 is a row of slots and each slot a choice of ARCs that fit together. Three ways to choose:
 
 * ``ours``: the schedule manager, on virtual time.
-* ``bound``: in each slot the largest choice the rules allow. Nobody is left out except because of one
+* ``bound``: in each slot the largest choice the rules allow. No ARC is left out except because of one
   who is higher, or equal and not served later; only the order among those last served in the same slot is
   free, as it is in the rules. With a tree it is a little freer than the rules. It looks at one slot at a
   time: the largest choice now may leave a worse one for later, so ``ours`` can come out ahead, and does with radios.
@@ -218,7 +218,7 @@ def largest_choice(of: Fleet, wishes: Sequence[Wish], *, solve_s: float, rules: 
         of: The RCs.
         wishes: Of all ARCs.
         solve_s: Seconds the solver has.
-        rules: By which nobody may be left out without an excuse; None: none binds.
+        rules: Rules by which no ARC may be left out without an excuse; None: none binds.
 
     Raises:
         OutOfTime: The solver found none.
@@ -247,7 +247,7 @@ def largest_choice(of: Fleet, wishes: Sequence[Wish], *, solve_s: float, rules: 
 
 
 def _turns(above: Sequence[frozenset[int]], served_last: Sequence[int]) -> list[int]:
-    """Return whose turn it is, smaller is earlier: nobody's before that of all who are higher."""
+    """Return the order of the turns, smaller is earlier: no ARC comes before a higher one."""
     turns = list(served_last)
     for number in sorted(range(len(turns)), key=lambda number: len(above[number])):
         turns[number] = max([turns[number], *(turns[one] for one in above[number])])

@@ -39,7 +39,7 @@ from backbone.errors import LinkError, Refusal
 MISSION = "stops"
 STANDS_WITHIN_S = 0.5  # the bound of an emergency stop
 SETTLED_S = 0.25  # chosen: a robot that stood so long stands
-WATCHED_S = 2.0  # chosen: a stop that took longer is a fault whatever it took
+WATCHED_S = 2.0  # chosen: a stop that takes longer is a fault at any length
 SAYS_WITHIN_S = 3.0  # chosen: a page that sleeps needs a moment to wake
 AWAKE_S = 1.0  # chosen: a page that slept needs a moment
 TURNS_WITHIN_S = 1.0

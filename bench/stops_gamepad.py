@@ -38,7 +38,7 @@ class PlayedGamepad:
     async def async_read_loop(self) -> AsyncIterator[PlayedEvent]:
         """Yield what the hands do."""
         reader = asyncio.StreamReader()
-        # opened to read and write, so that no end is seen while nobody writes
+        # opened to read and write, so that the file has no end while no program writes
         pipe = self._path.open("r+b", buffering=0)
         loop = asyncio.get_running_loop()
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), pipe)

@@ -31,7 +31,7 @@ class Relay:
         self._tasks: set[asyncio.Task[None]] = set()
 
     def cut(self) -> None:
-        """Let nothing pass any more; nobody is told."""
+        """Drop all messages from now on, without notice to either end."""
         self._passes.clear()
 
     def heal(self) -> None:

@@ -129,7 +129,7 @@ class Page(TriedConsole):
         await self._page.keyboard.up("d")
 
     async def _touch(self, box: dict[str, float] | None) -> None:
-        """Put a finger, or the mouse, where a button is, whatever covers it."""
+        """Put a finger, or the mouse, at a button's place, also if it is covered."""
         if box is not None:
             press = self._page.mouse.click if self.name == "page desktop" else self._page.touchscreen.tap
             await press(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)

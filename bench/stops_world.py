@@ -12,26 +12,26 @@ from typing import Any
 from stops_places import OTHERS, ROBOT
 
 from backbone import run_files
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.errors import LinkError
 from backbone.keys import Conversation
-from backbone.mission_connection import connected
+from backbone.launcher.mission_connection import connected
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem, address
-from backbone.operators import OperatorActed, OperatorAction
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import OtherStop, StopState, ask_stop, lift_stop, stop_robot, watch_stops
-from resource_pool.messages import AskPose, Pose
-from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, Drive
+from resource_pool.drivers.world_messages import AskPose, Pose
+from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DriveWish
 from ui_console.session.teleoperation import Teleoperation
 
 ROBOTS = (*OTHERS, ROBOT)
-TURN = Drive(3.0, -3.0)  # on the spot, so that no wall is in the way
+TURN = DriveWish(3.0, -3.0)  # on the spot, so that no wall is in the way
 LOOK_EVERY_S = 0.015  # chosen: twice in each frame of the world
 KEPT_S = 8.0  # chosen: longer than a cell is watched
 STILL_RAD, STILL_M = 0.004, 0.001  # chosen: a thirtieth of what a robot turns or drives in a tenth of a second
@@ -71,7 +71,7 @@ class Poses:
         self._seen: dict[str, deque[Pose]] = {name: deque(maxlen=int(KEPT_S / LOOK_EVERY_S)) for name in ROBOTS}
 
     async def watch(self) -> None:
-        """Look again and again; until cancelled."""
+        """Look repeatedly; until cancelled."""
         while True:
             with suppress(LinkError):
                 await asyncio.gather(*map(self._look, ROBOTS))
@@ -155,7 +155,7 @@ class Operator:
         await self.console.give_back()
 
     async def ask_for_it(self) -> None:
-        """Ask whoever holds the robot for it."""
+        """Ask the operator who holds the robot for it."""
         self.console.take()
         await asyncio.sleep(KEYS_LET_GO_S)
         self.console.begin_ask_consent("the table of stops")
@@ -204,7 +204,7 @@ class World:
 
     async def stop(self, robot: str) -> None:
         """Stop it as another operator does."""
-        await stop_robot(self.bus, robot, "somebody stands there", "olga")
+        await stop_robot(self.bus, robot, "a person stands there", "olga")
 
     async def all_may_move(self) -> None:
         """Lift every stop, also one that was given while a link was cut and arrives only now."""

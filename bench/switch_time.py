@@ -26,9 +26,9 @@ from time import perf_counter
 
 from measuring import BIN, MISSION_XML, report
 
+from backbone.addresses import RC_MANAGER
 from backbone.component.messages import AskState, AskStatistics, ComponentState, Statistics
-from backbone.mission_connection import connected
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.launcher.mission_connection import connected
 
 HALTING_WATCHER = '<type name="watch_for_motion" class="halting_watcher:HaltingWatcher" subsystem="mission_control"/>'
 SLICE_S = 0.3

@@ -1,8 +1,8 @@
 """Behavior: base class of every decision process that is no console.
 
 A behavior claims at most one ARC, is notified of the begin and end of grants, starts its children through the placer
-and reports its progress to its parent. Derive and override the hooks you need; each hook documents when it is called,
-its purpose, and what it must not do. Begin with a copy of ``behaviors/skeleton.py``.
+and reports its progress to its parent. Derive and override the hooks you need (``behavior_hooks``). Begin with a copy
+of ``behaviors/skeleton.py``.
 
 State on ``self`` survives every suspension, because only the RCs are taken and the process continues.
 
@@ -13,27 +13,21 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from collections.abc import Coroutine, Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar, assert_never
 
 import msgspec
 
-from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.asking import ask_until_answered
+from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
 from backbone.component.peer_monitor import PeerMonitor
-from backbone.creator.messages import ProcessFell, creator_name
-from backbone.errors import LinkError, Refusal, code_of
-from backbone.keys import Conversation
+from backbone.errors import LinkError, Refusal
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
-from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, StopComponent
-from backbone.placer.wishes import Wish, keep_placed
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
+from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.behavior_tree import (
     ArcNeed,
     BehaviorNode,
@@ -45,6 +39,7 @@ from mission_control.behavior_tree import (
     StopChild,
     draw,
 )
+from mission_control.child_keeper import AGAIN_AFTER_S, REPLY_TIME_S, START_PATIENCE_S, ChildKeeper, end_task, why
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
 from resource_pool.arc_client import (
     ArcClient,
@@ -64,12 +59,7 @@ from resource_pool.arc_client import (
 
 log = logging.getLogger(__name__)
 
-REPLY_TIME_S = 1.0  # chosen: parents and placer answer in milliseconds
-START_TIME_S = 30.0  # chosen: as for ARCs, a child's host may be busy
-ADOPT_WITHIN_S = 10.0  # chosen: a child that is being restarted answers within this
 DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before SIGTERM
-START_PATIENCE_S = 60.0  # chosen: a link cut of 30 s, and the tries that began in it; health names it meanwhile
-AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
 
 
 class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -96,20 +86,21 @@ class NotAChild(Refusal):
 B = TypeVar("B", bound=BehaviorParameters)
 
 
-class Behavior(Component[B], Generic[B]):
+class Behavior(Component[B], BehaviorHooks, Generic[B]):
     """A running node of the behavior tree.
 
-    Class variables to set: ``parameters_type``, and ``children_together`` (False: one after the other).
+    Derive and override the hooks of ``BehaviorHooks`` that you need. Class variables to set: ``parameters_type``, and
+    ``children_together`` (False: one after the other).
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | ChildReport | AskBehavior
+    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior
     children_together: ClassVar[bool] = True
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self.status, self.payload = BehaviorStatus.RUNNING, dict[str, Any]()
+        self.status, self.payload = BehaviorStatus.RUNNING, dict[str, object]()
         self.rcs: Mapping[str, str] = {}
         """Kind → name of the granted RCs; empty while suspended."""
         self.arc: ArcClient | None = None
@@ -117,111 +108,31 @@ class Behavior(Component[B], Generic[B]):
         self.times_resumed = self.times_suspended = self.frames_seen = 0
         self._nodes = {node.name: node for node in self.parameters.children}
         self._children = Children(list(self._nodes), together=self.children_together)
-        self._kept: dict[str, asyncio.Task[None]] = {}
-        self._wishes: dict[str, Wish] = {}
+        self._keeper = ChildKeeper(
+            bus,
+            clock,
+            self._nodes,
+            lambda: self.path,
+            reported=self._child_reported,
+            left=self._child_left,
+            begin=self._begin,
+            note=self.story.note,
+            publish_event=self.publish_event,
+            changed=self.changed,
+        )
         self._abandoned: dict[str, Absence] = {}
-        self._heard_creators: dict[str, Subscription] = {}
         self._suspended_because = ""
         self._parent: PeerMonitor | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._acting: asyncio.Task[None] | None = None
 
-    # ------------------------------------------------------------------ hooks
-    async def start(self) -> None:
-        """Prepare.
-
-        When: once, after readiness, before the claim of the ARC and the start of children.
-        What: subscribe to events of other components, set up state. Not: wait for the ARC or for children.
-        """
-
+    # ------------------------------------------------------------------ hooks with a default of their own
     def need(self) -> ArcNeed | None:
-        """Return the ARC to claim.
-
-        When: once, after ``start``. What: by default the ARC of the tree; a behavior that computes better run times
-        returns the same need with these. Not: ask for another kind of ARC.
-        """
+        """Return the ARC of the tree; see ``BehaviorHooks``."""
         return self.parameters.arc
 
-    async def resumed(self, rcs: Mapping[str, str]) -> None:
-        """Continue with the granted RCs.
-
-        When: at the begin of each grant; commands pass and pictures arrive from now on.
-        What: inform algorithms of the elapsed time. Not: drive in a loop; that is ``act``.
-
-        Args:
-            rcs: Kind → name of the granted RCs.
-        """
-
-    async def act(self) -> None:
-        """Command the robot.
-
-        When: runs as a task from each ``resumed`` on; it is cancelled before ``suspending`` and ``suspended``.
-        What: await ``self.arc`` commands and the clock, keep progress on ``self``. If a command is too late for the
-        grant, the task ends without an error. After a ``LinkError`` it begins again; after an operator's stop it begins
-        again when that stop is lifted.
-        Not: catch the cancellation and continue.
-        """
-
-    async def suspending(self, deadline_s: float) -> None:
-        """Stop cleanly.
-
-        When: shortly before the end of a slice, except before an override by a human. A behavior that overrides neither
-        this hook nor ``act`` is not called. Commands still pass.
-        What: stop the robot, then return. Not: exceed the deadline.
-
-        Args:
-            deadline_s: Seconds left.
-        """
-
-    def not_now(self) -> float:
-        """Return the time that is needed beyond the end of the slice.
-
-        When: shortly before the end of the minimum run time and of each extension, if the maximum run time is longer
-        and the behavior overrides this hook.
-        What: return an estimate of the needed time, from known data. Not: wait; ask for spare time, because other ARCs
-        wait for it; rely on it, because a higher behavior or a person still preempts.
-
-        Returns:
-            Seconds still needed beyond the end of the slice; 0: it may end.
-        """
-        return 0.0
-
-    async def suspended(self, reason: str, by: str) -> None:
-        """Handle the end of a grant.
-
-        When: after every loss of the RCs, also without an announcement. What: keep the state, report it.
-        Not: send commands; no picture arrives until ``resumed``.
-
-        Args:
-            reason: ``slice``, ``higher``, ``rc``, ``lost`` …
-            by: The ARC or RC that caused it.
-        """
-
-    def see(self, frame: Frame) -> None:
-        """Process a picture.
-
-        When: for the newest picture of the present grant; older pictures are skipped.
-        What: detect, publish, ``report``. Not: take longer than a picture's period, because it blocks the event loop.
-        """
-
-    async def child_finished(
-        self,
-        child: str,  # noqa: ARG002  for those who override
-        status: BehaviorStatus,
-        payload: Mapping[str, Any],  # noqa: ARG002
-    ) -> Decision:
-        """Decide what follows the end of a child.
-
-        When: a child reported success or failure, was refused at its start, or fell too often.
-        What: return the decision; by default a failure aborts, a success continues. Not: start or stop children here.
-        """
-        return Decision.NEXT if status is BehaviorStatus.SUCCESS else Decision.ABORT
-
-    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
-        """Conclude after the end of all children.
-
-        When: the last child finished, or one aborted the others. What: by default, finish with the same status.
-        """
+    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
+        """Finish with the same status; see ``BehaviorHooks``."""
         self.finish(status, payload)
 
     # ------------------------------------------------------------------ for derived classes
@@ -235,7 +146,7 @@ class Behavior(Component[B], Generic[B]):
         """Status of each child that was started."""
         return self._children.status
 
-    def finish(self, status: BehaviorStatus, payload: Mapping[str, Any] | None = None) -> None:
+    def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
         if self.status.is_final or not status.is_final:
             return
@@ -246,7 +157,7 @@ class Behavior(Component[B], Generic[B]):
         self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self._begin(self._wind_up(), "wind-up")
 
-    def tell_parent(self, payload: Mapping[str, Any]) -> None:
+    def tell_parent(self, payload: Mapping[str, object]) -> None:
         """Send a report of progress to the parent; it is lost if the parent cannot be reached."""
         self.payload = dict(payload)
         if self._parent is not None and not self.status.is_final:
@@ -269,9 +180,12 @@ class Behavior(Component[B], Generic[B]):
             self._keeping = self._begin(self._keep(self.arc, need), "arc")
         self._carry_out(self._children.begin())
         if self._nodes:
-            self._begin(self._stop_children_of_an_earlier_life(), "children of an earlier life")
+            self._begin(
+                self._keeper.stop_those_of_an_earlier_life(lambda name: name in self._children.status),
+                "children of an earlier life",
+            )
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC, the children, and ``AskBehavior``."""
         match asked.body:
             case ChildReport(child=child, status=status, payload=payload):
@@ -304,12 +218,8 @@ class Behavior(Component[B], Generic[B]):
         """Return the missing children and ARC, and the children that it has given up."""
         if self.status.is_final:
             return list(self._abandoned.values())
-        wishes = [
-            *self._wishes.values(),
-            *([self.arc.wish] if self.arc is not None and self._keeping is not None else []),
-        ]
-        absent = [absence for wish in wishes if (absence := wish.absence()) is not None]
-        return [*absent, *self._abandoned.values()]
+        arc = self.arc.wish.absence() if self.arc is not None and self._keeping is not None else None
+        return [*self._keeper.absences(), *([arc] if arc is not None else []), *self._abandoned.values()]
 
     def statistics(self) -> dict[str, float]:
         """Return counts of grants and pictures."""
@@ -358,7 +268,7 @@ class Behavior(Component[B], Generic[B]):
     @property
     def _commands_nothing(self) -> bool:
         """True if it sends no commands, because it overrides neither ``act`` nor ``suspending``."""
-        return type(self).act is Behavior.act and type(self).suspending is Behavior.suspending
+        return type(self).act is BehaviorHooks.act and type(self).suspending is BehaviorHooks.suspending
 
     async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
         parameters = claim_parameters(
@@ -370,13 +280,13 @@ class Behavior(Component[B], Generic[B]):
             features=need.features,
             usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
             stops_at_once=self._commands_nothing,
-            may_say_not_now=type(self).not_now is not Behavior.not_now,
+            may_say_not_now=type(self).not_now is not BehaviorHooks.not_now,
         )
         try:
             await arc.keep(self.clock, need.kind, parameters, patience_s=START_PATIENCE_S, on_changed=self.changed)
         except Refusal as refusal:
             self.report(f"no ARC: {refusal}")
-            self.finish(BehaviorStatus.FAILURE, _why(refusal))
+            self.finish(BehaviorStatus.FAILURE, why(refusal))
 
     def _saw(self, frame: Frame) -> None:
         if self.rcs and not self.status.is_final:
@@ -412,13 +322,13 @@ class Behavior(Component[B], Generic[B]):
 
     async def _stop_acting(self) -> None:
         acting, self._acting = self._acting, None
-        await _end_task(acting)
+        await end_task(acting)
 
     async def _release(self) -> None:
         keeping, self._keeping = self._keeping, None
         if keeping is None or self.arc is None:
             return None
-        await _end_task(keeping)
+        await end_task(keeping)
         self.changed()
         while True:
             try:
@@ -436,106 +346,21 @@ class Behavior(Component[B], Generic[B]):
             self._begin(self._carry_out_in_order(instructions), "children")
 
     async def _carry_out_in_order(self, instructions: Sequence[Instruction]) -> None:
-        starting: list[Coroutine[Any, Any, None]] = []
+        starting: list[Coroutine[object, None, None]] = []
         for instruction in instructions:
             match instruction:
                 case StartChild(name):
-                    starting.append(self._start_child(name))
+                    self._abandoned.pop(name, None)
+                    starting.append(self._keeper.start(name))
                 case StopChild(name):
-                    await self._stop_child(name)
+                    await self._keeper.stop(name)
                 case FinishParent(status, payload):
                     await self.children_finished(status, payload)
                 case _:
                     assert_never(instruction)
         await asyncio.gather(*starting)
 
-    async def _start_child(self, name: str) -> None:
-        self._abandoned.pop(name, None)
-        keeping = self._begin(self._keep_child(name), f"child {name}")
-        if keeping is not None:
-            self._kept[name] = keeping
-
-    async def _keep_child(self, name: str) -> None:
-        """Keep the child running until an order stops it; adopt a child of an earlier life of this behavior."""
-        wish = self._wishes[name] = Wish(name)
-        order, at = self._nodes[name].order(self.path), address(Subsystem.MISSION_CONTROL, name)
-        try:
-            stopped = await keep_placed(
-                self.bus,
-                self.clock,
-                wish,
-                order,
-                at,
-                on_placed=self._child_placed,
-                on_changed=self.changed,
-                patience_s=START_PATIENCE_S,
-            )
-        except Refusal as refusal:
-            self.publish_event(name, f"could not be started: {refusal}", LogLevel.WARNING)
-            self._child_reported(name, BehaviorStatus.FAILURE, _why(refusal))
-            return
-        self.publish_event(name, f"is not wanted any more: {stopped}")
-        del self._kept[name], self._wishes[name]
-        self._carry_out(self._children.left(name))
-
-    def _child_placed(self, placement: Placement, was_there: bool) -> None:
-        self._hear_creator(placement.host)
-        if was_there:
-            self.story.note(placement.name, "was running and is adopted")
-            self._begin(self._adopt(placement.name), f"adopt {placement.name}")
-
-    async def _adopt(self, name: str) -> None:
-        """Ask an adopted child for its progress."""
-        child = address(Subsystem.MISSION_CONTROL, name)
-        try:
-            state = await ask_until_answered(
-                self.bus,
-                self.clock,
-                child,
-                AskBehavior(),
-                BehaviorState,
-                each_s=REPLY_TIME_S,
-                within_s=ADOPT_WITHIN_S,
-            )
-        except (LinkError, Refusal) as error:  # it is restarting and then runs from its beginning
-            log.info("child %s does not report its progress: %s", name, error)
-            return
-        self._child_reported(name, state.status, state.payload)
-
-    async def _stop_children_of_an_earlier_life(self) -> None:
-        """Stop running children of an earlier life of this behavior that this life does not start."""
-        try:
-            placed = await ask_until_answered(
-                self.bus,
-                self.clock,
-                PLACER,
-                ListPlacements(),
-                Placements,
-                each_s=REPLY_TIME_S,
-                within_s=ADOPT_WITHIN_S,
-            )
-        except LinkError as error:
-            log.warning("%s does not know which children it left running: %s", self.name, error)
-            return
-        mine = [each.name for each in placed.placements if each.requester == self.address and each.name in self._nodes]
-        await asyncio.gather(*(self._stop_child(name) for name in mine if name not in self._children.status))
-
-    async def _stop_child(self, name: str) -> None:
-        await _end_task(self._kept.pop(name, None))
-        self._wishes.pop(name, None)
-        while True:
-            try:
-                await self.bus.ask(PLACER, StopComponent(name, f"{self.name} ends it"), Ended, within_s=START_TIME_S)
-            except (LinkError, CreatorSilent) as error:
-                log.info("child %s is not stopped yet: %s", name, error)
-            except Refusal as refusal:
-                log.info("child %s: %s", name, refusal)
-                return
-            else:
-                return
-            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
-
-    def _abandon(self, name: str, payload: Mapping[str, Any]) -> None:
+    def _abandon(self, name: str, payload: Mapping[str, object]) -> None:
         """Report a child that could not work as a lasting absence; a finished child that failed is no absence."""
         if "code" in payload:
             remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"
@@ -543,23 +368,15 @@ class Behavior(Component[B], Generic[B]):
             self._abandoned[name] = Absence(name, self.clock.now_s(), cause, remedy=remedy)
             self.changed()
 
-    def _hear_creator(self, host: str) -> None:
-        if host not in self._heard_creators:
-            creator = address(Subsystem.BACKBONE, creator_name(host))
-            self._heard_creators[host] = self.bus.subscribe(creator, Conversation.EVENTS, ProcessFell, self._heard_fall)
+    def _child_left(self, name: str) -> None:
+        self._carry_out(self._children.left(name))
 
-    def _heard_fall(self, envelope: Envelope[Any]) -> None:
-        fell: ProcessFell = envelope.body
-        if fell.name in self._nodes and fell.failing:
-            why = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
-            self._child_reported(fell.name, BehaviorStatus.FAILURE, why)
-
-    def _child_reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+    def _child_reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         if self._children.reported(name, status, payload):
             self.story.note(name, f"finished: {status}")
             self._begin(self._decide(name, status, payload), f"decide on {name}")
 
-    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         decision = await self.child_finished(name, status, payload)
         self.story.note(name, f"{decision} after {status}")
         if decision is not Decision.RETRY:
@@ -571,7 +388,7 @@ class Behavior(Component[B], Generic[B]):
         """Give the ARC back, end the children, and repeat the report until the parent notes it."""
         await self._stop_acting()
         stops = [i.name for i in self._children.end() if isinstance(i, StopChild)]
-        await asyncio.gather(self._release(), *(self._stop_child(name) for name in stops))
+        await asyncio.gather(self._release(), *(self._keeper.stop(name) for name in stops))
         if self._parent is None:
             return
         while True:
@@ -594,7 +411,7 @@ class Behavior(Component[B], Generic[B]):
     def _report(self) -> ChildReport:
         return ChildReport(self.name, self.status, self.payload)
 
-    def _begin(self, work: Coroutine[Any, Any, Any], name: str) -> asyncio.Task[None] | None:
+    def _begin(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:
         """Run the coroutine as a task, unless the component is ending."""
         if self.state is not LifeState.READY:
             work.close()
@@ -614,14 +431,3 @@ def suspended_because(reason: str, by: str) -> str:
         ('higher by console-1', 'silent')
     """
     return f"{reason} by {by}" if by else reason
-
-
-async def _end_task(task: asyncio.Task[None] | None) -> None:
-    """Cancel a task and return when it has ended; its task group handles a bug in it."""
-    if task is not None and task is not asyncio.current_task():
-        task.cancel()
-        await asyncio.wait({task})
-
-
-def _why(refusal: Refusal) -> dict[str, Any]:
-    return {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}

@@ -63,7 +63,7 @@ class BehaviorNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def order(self, parent_path: Sequence[PathStep]) -> Start:
         """Return the order that starts this node under a parent with that path."""
-        plain: dict[str, Any] = msgspec.to_builtins(self)
+        plain: dict[str, object] = msgspec.to_builtins(self)
         return behavior_order(plain, parent_path)
 
 
@@ -129,7 +129,7 @@ class FinishParent:
     """The children have finished: the parent has this final status."""
 
     status: BehaviorStatus
-    payload: Mapping[str, Any] = field(default_factory=dict)
+    payload: Mapping[str, object] = field(default_factory=dict)
 
 
 Instruction = StartChild | StopChild | FinishParent
@@ -151,13 +151,13 @@ class Children:
         self._running: list[str] = []
         self._finished = False
         self.status: dict[str, BehaviorStatus] = {}
-        self.payload: dict[str, Mapping[str, Any]] = {}
+        self.payload: dict[str, Mapping[str, object]] = {}
 
     def begin(self) -> list[Instruction]:
         """Return the orders for the children that run first."""
         return self._start_next()
 
-    def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> bool:
+    def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
         """Record a report; return True if the child has newly finished and the parent must decide."""
         if name not in self._running or self._finished or self.status[name].is_final:
             return False

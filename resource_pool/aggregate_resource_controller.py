@@ -12,26 +12,22 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import math
-import types
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import msgspec
 
+from backbone.addresses import DEPENDENCY_DATABASE, RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.component.peer_monitor import PeerMonitor
-from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     BEAT_EVERY_S,
     AskRequest,
@@ -40,7 +36,6 @@ from backbone.rc_manager.messages import (
     CloseGate,
     CurrentRequest,
     Done,
-    Extend,
     GateClosed,
     GateOpens,
     Leases,
@@ -49,17 +44,11 @@ from backbone.rc_manager.messages import (
     TakePath,
     Withdraw,
 )
-from backbone.scheduling.claims import STREAMED_KINDS, scheduling_request
-from backbone.scheduling.requests import (
-    LEASE_S,
-    MissingRuntime,
-    PathNode,
-    Scheduled,
-    SchedulingRequest,
-    UnknownRequest,
-    Usage,
-)
-from backbone.wire import Envelope, Message
+from backbone.scheduling.claims import STREAMED_KINDS
+from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.wire import Accepts, Envelope, Message
+from resource_pool.arc_request import ArcParameters, request_of, require_runtime, set_of
+from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
 from resource_pool.gate import Gate
 from resource_pool.messages import (
     Accepted,
@@ -76,11 +65,9 @@ from resource_pool.messages import (
     NoSuchAction,
     Noted,
     NotFromYou,
-    NotMySet,
     NotYours,
     Release,
     Resumed,
-    SliceEnds,
     Suspended,
     Suspending,
     SwappedOut,
@@ -88,67 +75,24 @@ from resource_pool.messages import (
     WantLonger,
     WantRuntime,
 )
+from resource_pool.owner_notices import OwnerNotices
+from resource_pool.set_lease import SetLease
 
 log = logging.getLogger(__name__)
 
-RC_REPLY_S = 0.8  # chosen: a robot RC itself gives the radio half a second
 OWNER_GONE_S = 0.5  # chosen: a robot is free within a second of its console's death; a new hub is found sooner
 OWNER_BEAT_S = 0.9  # chosen: less than the RC manager's limit of 1 s for a beat, with one beat to spare
 PREPARE_S = 0.9  # chosen: less than the RC manager's limit for the opening, so the gate opens in time or never
-NOTICE_S = 1.0  # chosen: an owner that needs longer fails its beat too
-NOTICE_AGAIN_S = 0.1  # chosen: a restarted hub is back after a few attempts; machine seconds
 REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first ask for the start of RCs
-ASK_BEFORE_END_S = 0.2  # chosen: question and answer take milliseconds, and a later answer is more accurate
 RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # parameters that may change while it runs
 ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; after this it has missed one
-
-
-class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Request and owner of an ARC; see ``arc_client.claim_parameters``.
-
-    Attributes:
-        owner: Address of the decision process.
-        path: Names and priorities from the mission's root to the owner, or of the console alone.
-        console: True for consoles.
-        minimum_runtime_s: Shortest useful time, seconds.
-        maximum_runtime_s: End of extensions; 0: the minimum.
-        wish: Kind of RC → name.
-        features: Kind of RC → features.
-        usage: Period, packet time, deadline, jitter (seconds) and kind of the packets on the radio.
-        further_usages: The same for each further kind of packet.
-        idle: True: the owner wants no time yet.
-        stops_at_once: True: the owner needs no time to stop at the end of a slice.
-        may_say_not_now: True: ask the owner shortly before the end of a slice that can be extended.
-    """
-
-    owner: str
-    path: list[tuple[str, int]]
-    minimum_runtime_s: float
-    maximum_runtime_s: float = 0.0
-    console: bool = False
-    wish: dict[str, str] = {}
-    features: dict[str, list[str]] = {}
-    usage: tuple[float, float, float, float, str] = (0.05, 0.002, 0.0, 0.0, "drive")
-    further_usages: list[tuple[float, float, float, float, str]] = []
-    idle: bool = False
-    stops_at_once: bool = False
-    may_say_not_now: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class _Notice:
-    """A notice to the owner, the time limit of its answer (machine seconds), and the event of its end."""
-
-    notice: Resumed | Suspending | Suspended
-    within_s: float
-    done: asyncio.Event
 
 
 class AggregateResourceController(Component[ArcParameters]):
     """Base class of every ARC; derive, set ``roles``, override ``prepare``."""
 
     parameters_type = ArcParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
+    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
     """Kinds of RC in its set, one of each."""
     sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
@@ -164,13 +108,11 @@ class AggregateResourceController(Component[ArcParameters]):
         self._rcs: dict[str, str] = {}
         self._asked = asyncio.Event()
         self._sending: asyncio.Task[None] | None = None
-        self._notices: asyncio.Queue[_Notice] = asyncio.Queue()
-        self._lease_until_s = 0.0
+        self._notices = OwnerNotices(bus, clock, self._owner, self.story.note)
+        self._lease = SetLease(self.name, clock.rate)
         self._leased = asyncio.Event()
-        self._slice_end_s = 0.0
+        self._slice = ArcSlice(bus, clock, self._gate, self._owner, longest_s=self._longest_s, note=self.story.note)
         self._offering: asyncio.Task[None] | None = None
-        self._unfounded: dict[str, int] = {}
-        self._unfounded_since_s = 0.0
         self._manager: PeerMonitor | None = None
         self._commands = self._refused = 0
 
@@ -219,12 +161,12 @@ class AggregateResourceController(Component[ArcParameters]):
             self.bus, self.clock, DEPENDENCY_DATABASE, question, RcSets, each_s=2.0, within_s=10.0
         )
         self._sets = found.sets
-        self._request = self._make_request()
+        self._request = request_of(self.name, self.parameters, self._sets, self.sharable_roles)
         self.bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases)
 
     async def serve(self) -> None:
         """Send the request, then watch owner and RC manager until the ARC ends."""
-        self.start_task(self._send_notices(), "notify owner")
+        self.start_task(self._notices.send(), "notify owner")
         self.start_task(self._watch_owner(), "watch owner")
         self.start_task(self._beat(), "beat")
         self.start_task(self._watch_lease(), "watch lease")
@@ -240,7 +182,7 @@ class AggregateResourceController(Component[ArcParameters]):
             except (LinkError, Refusal) as error:  # its RCs are freed by this ARC's death or when their leases expire
                 log.info("not withdrawn: %s", error)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Obey the RC manager for the gate, and the owner for everything else."""
         match asked.body:
             case OpenGate() | CloseGate() | AskRequest() | TakePath() if asked.source != RC_MANAGER:
@@ -262,11 +204,11 @@ class AggregateResourceController(Component[ArcParameters]):
             case WantIdle(idle=idle):
                 await self._change_request(SetIdle(self.name, idle), idle=idle)
             case WantRuntime(minimum_runtime_s=least, maximum_runtime_s=most):
-                self._require_runtime(least, most)
+                require_runtime(self.name, least, most)
                 change = ChangeRuntime(self.name, least, most)
                 await self._change_request(change, minimum_runtime_s=least, maximum_runtime_s=most)
             case WantLonger(until_s=until_s):
-                await self._extend(until_s)
+                await self._slice.extend(until_s)
             case Release(reason=reason):
                 self.end(f"released by {self._owner}: {reason}")
         return Accepted()
@@ -282,7 +224,7 @@ class AggregateResourceController(Component[ArcParameters]):
         fixed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)} - RUN_TIMES
         if fixed:
             raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed))} while it runs")
-        self._require_runtime(now.minimum_runtime_s, now.maximum_runtime_s)
+        require_runtime(self.name, now.minimum_runtime_s, now.maximum_runtime_s)
         self._in_force = now
         if self._request is not None:
             self._ask_by({name: getattr(now, name) for name in RUN_TIMES})
@@ -293,21 +235,6 @@ class AggregateResourceController(Component[ArcParameters]):
         return {"commands": self._commands, "refused_swapped_out": self._refused}
 
     # ------------------------------------------------------------------ asking for run time
-    def _make_request(self) -> SchedulingRequest:
-        given = self.parameters
-        return scheduling_request(
-            self.name,
-            self._sets,
-            owner=self._owner,
-            path=given.path,
-            streams=[Usage(*usage) for usage in (given.usage, *given.further_usages)],
-            streamed=self.sharable_roles,
-            minimum_runtime_s=given.minimum_runtime_s,
-            maximum_runtime_s=given.maximum_runtime_s,
-            console=given.console,
-            idle=given.idle,
-            stops_at_once=given.stops_at_once,
-        )
 
     async def _send_request(self) -> None:
         """Send the request to the RC manager; end if the RC manager refuses it."""
@@ -326,34 +253,13 @@ class AggregateResourceController(Component[ArcParameters]):
         except (Refusal, LinkError) as error:
             placeless = f"got no place in the schedule: {error}"
             self.publish_event(self.name, placeless, LogLevel.WARNING)
-            await self._notify(Suspended(self.name, placeless, "", -1.0)).wait()
+            await self._notices.notify(Suspended(self.name, placeless, "", -1.0)).wait()
             self.end(placeless)
             return
-        self._choose(scheduled.rcs)
+        self._rcs = set_of(self.name, self._sets, scheduled.rcs)
         behind = f", behind {', '.join(scheduled.blockers)}" if scheduled.blockers else ""
         place = f", place {scheduled.position} in line" if scheduled.position else ""
         self.story.note(self.name, f"is {scheduled.state}{place}{behind}")
-
-    def _choose(self, rcs: Iterable[str]) -> None:
-        """Record the set that the RC manager chose.
-
-        Raises:
-            NotMySet: The set is no alternative of the request.
-        """
-        wanted = set(rcs)
-        found = [by_role for by_role in self._sets if set(by_role.values()) == wanted]
-        if not found:
-            raise NotMySet(f"{self.name} asked for no such set: {', '.join(sorted(wanted)) or 'nothing'}")
-        self._rcs = found[0]
-
-    def _require_runtime(self, least_s: float, most_s: float) -> None:
-        """Refuse run times that no slice can have, because a later RC manager would refuse the whole request.
-
-        Raises:
-            MissingRuntime: No slice can have these run times.
-        """
-        if not (0 < least_s < math.inf and (most_s == 0 or least_s <= most_s < math.inf)):
-            raise MissingRuntime(f"{self.name} asks for at least {least_s:g} s and at most {most_s:g} s", arc=self.name)
 
     async def _change_request(self, wish: Message, **changed: bool | float) -> None:
         """Change the request; the RC manager and its successors get the change.
@@ -414,7 +320,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     # ------------------------------------------------------------------ the gate
     async def _open(self, order: OpenGate) -> GateOpens:
-        self._choose(order.epochs)
+        self._rcs = set_of(self.name, self._sets, order.epochs)
         if self._gate.epochs == order.epochs:  # the same order came twice: the first continues
             if self._gate.is_open:
                 return GateOpens()
@@ -423,7 +329,7 @@ class AggregateResourceController(Component[ArcParameters]):
         if self._gate.is_open:  # the order to close it was lost
             self._shut("connected anew", "rc_manager", -1.0)
         self._gate.prepare(order.epochs)
-        self._lease_until_s = self.clock.now_s() + LEASE_S * self.clock.rate
+        self._lease.begin(self.clock.now_s())
         self._leased.set()
         try:
             async with asyncio.timeout(PREPARE_S):
@@ -451,11 +357,11 @@ class AggregateResourceController(Component[ArcParameters]):
         """Open the gate and notify the owner, unless the gate was closed meanwhile."""
         if not self._gate.open(order.epochs, self.clock.now_s()):
             return
-        self._slice_end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
+        self._slice.end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
         self.report(f"granted: {', '.join(self._rcs.values())}")
-        noted = self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
+        noted = self._notices.notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
         if self.parameters.may_say_not_now:
-            self._offering = self.start_task(self._offer_more(noted), "offer more")
+            self._offering = self.start_task(self._slice.offer(noted), "offer more")
 
     async def _close(self, order: CloseGate) -> GateClosed:
         if order.deadline_s > 0 and self._gate.is_open:
@@ -463,7 +369,7 @@ class AggregateResourceController(Component[ArcParameters]):
             within_s = order.deadline_s / self.clock.rate
             try:
                 async with asyncio.timeout(within_s):
-                    await self._notify(notice, within_s).wait()
+                    await self._notices.notify(notice, within_s).wait()
             except TimeoutError:
                 self.story.note(self._owner, "was not ready when its time to stop cleanly was over")
         self._shut(order.reason, order.by, order.expected_s)
@@ -478,48 +384,12 @@ class AggregateResourceController(Component[ArcParameters]):
             self._offering = None
         self.report(f"swapped out: {reason}{f' by {by}' if by else ''}")
         if was_open:
-            self._notify(Suspended(self.name, reason, by, expected_s))
+            self._notices.notify(Suspended(self.name, reason, by, expected_s))
 
-    # ------------------------------------------------------------------ extension of a slice
-    async def _offer_more(self, resumed: asyncio.Event) -> None:
-        """Ask the owner shortly before the end of its slice whether it needs more time, and request the extension.
+    def _longest_s(self) -> float:
+        return max(self.parameters.minimum_runtime_s, self.parameters.maximum_runtime_s)
 
-        The owner is asked again before the end of an extension. It is not asked after the RC manager has ended the
-        slice, because the RCs are then reserved for others.
-        """
-        await resumed.wait()
-        while self._slice_end_s < self._longest_end_s():
-            ask_s = self._slice_end_s - ASK_BEFORE_END_S
-            if self.clock.now_s() < ask_s:
-                await self.clock.sleep_until_s(ask_s)
-                continue  # it may have been extended meanwhile
-            wanted_s = await self._ask_whether_not_now()
-            if not wanted_s > 0:
-                return
-            try:
-                await self._extend(self._slice_end_s + max(wanted_s, ASK_BEFORE_END_S))
-            except (LinkError, Refusal) as error:
-                self.story.note(self.name, f"its slice was not extended: {error}")
-                return
-
-    async def _ask_whether_not_now(self) -> float:
-        question = SliceEnds(self.name, self._slice_end_s, self._longest_end_s())
-        within_s = ASK_BEFORE_END_S / self.clock.rate
-        try:
-            return (await self.bus.ask(self._owner, question, Noted, within_s=within_s)).wanted_s
-        except (LinkError, Refusal) as error:
-            self.story.note(self._owner, f"did not answer whether its slice may end: {error}")
-            return 0.0
-
-    async def _extend(self, until_s: float) -> None:
-        """Request the extension of the slice until this time, at most the maximum run time from the grant on."""
-        until_s = min(until_s, self._longest_end_s())
-        await self._ask_rc_manager(Extend(self.name, until_s))
-        self._slice_end_s = max(self._slice_end_s, until_s)
-
-    def _longest_end_s(self) -> float:
-        given = self.parameters
-        return self._gate.granted_s + max(given.minimum_runtime_s, given.maximum_runtime_s)
+    # ------------------------------------------------------------------ commands
 
     async def _command(self, command: Drive | Halt | Jump) -> Applied:
         try:
@@ -545,55 +415,10 @@ class AggregateResourceController(Component[ArcParameters]):
             expected_start_s=gate.expected_s,
         )
 
-    def _notify(self, notice: Resumed | Suspending | Suspended, within_s: float = NOTICE_S) -> asyncio.Event:
-        """Queue a notice after all earlier ones; the event is set when the owner noted it or the limit expired."""
-        noted = asyncio.Event()
-        self._notices.put_nowait(_Notice(notice, within_s, noted))
-        return noted
-
-    async def _send_notices(self) -> None:
-        """Send one notice after the other, so that no notice overtakes another on its way to a slow owner."""
-        while True:
-            waiting = await self._notices.get()
-            await self._send_until_noted(waiting)
-            waiting.done.set()
-
-    async def _send_until_noted(self, waiting: _Notice) -> None:
-        """Repeat a notice, which may get lost, until the owner notes it or a newer notice waits.
-
-        Other checks detect an owner that hangs or is gone.
-        """
-        while True:
-            try:
-                await self.bus.ask(self._owner, waiting.notice, Noted, within_s=waiting.within_s)
-                return
-            except Refusal as refusal:
-                self.story.note(self._owner, f"did not note {type(waiting.notice).__name__}: {refusal}")
-                return
-            except LinkError as error:
-                self.story.note(self._owner, f"did not note {type(waiting.notice).__name__}: {error}")
-            if isinstance(waiting.notice, Suspending) or not self._notices.empty():
-                return
-            await self.clock.sleep_s(NOTICE_AGAIN_S * self.clock.rate)
-
     # ------------------------------------------------------------------ watching
-    def _heard_leases(self, envelope: Envelope[Any]) -> None:
-        """Extend the lease of the set if all its RCs were renewed."""
-        leases: Leases = envelope.body
-        renewed = {lease.rc: lease.epoch for lease in leases.leases if lease.arc == self.name}
-        if self._gate.epochs and self._gate.epochs.items() <= renewed.items():
-            self._lease_until_s = max(self._lease_until_s, envelope.stamp_s + leases.lease_s)
-        self._doubt(renewed if not self._gate.epochs else {}, envelope.stamp_s)
 
-    def _doubt(self, unfounded: dict[str, int], now_s: float) -> None:
-        """Send the request again if the RC manager renews a hold for a whole lease that this ARC does not have.
-
-        The hold may belong to an earlier ARC of this name. For a shorter time it may be one that is about to open.
-        """
-        if unfounded != self._unfounded:
-            self._unfounded, self._unfounded_since_s = unfounded, now_s
-        elif unfounded and now_s - self._unfounded_since_s >= LEASE_S * self.clock.rate:
-            self._unfounded = {}
+    def _heard_leases(self, envelope: Envelope[Leases]) -> None:
+        if self._lease.heard(envelope.body, envelope.stamp_s, self._gate.epochs):
             self.publish_event(self.name, "is counted as running and holds nothing: sends its request again")
             self.start_task(self._ask_anew(), "ask anew")
 
@@ -604,8 +429,8 @@ class AggregateResourceController(Component[ArcParameters]):
             if not self._gate.epochs:
                 await self._leased.wait()
                 continue
-            await self.clock.sleep_until_s(self._lease_until_s)
-            if self._gate.epochs and self.clock.now_s() >= self._lease_until_s:
+            await self.clock.sleep_until_s(self._lease.until_s)
+            if self._gate.epochs and self.clock.now_s() >= self._lease.until_s:
                 self.publish_event(self.name, "its lease expired: no renewal came in time", LogLevel.WARNING)
                 self._shut("lease", "rc_manager", -1.0)
                 if self._manager is not None and self._manager.is_there:

@@ -7,23 +7,22 @@ commands during a grant. The ARC refuses commands outside a grant.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Protocol
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.messages import Stop, Stopping
-from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal, ReplyTimeout
 from backbone.keys import Conversation
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address
-from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import CreatorSilent, Ended, Start, Started, StopComponent
+from backbone.placer.messages import Ended, StopComponent
 from backbone.placer.wishes import Wish
 from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message
+from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
+from resource_pool.arc_request import claim_parameters
+from resource_pool.drivers.world_messages import AskPose, Pose
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
     Accepted,
@@ -32,25 +31,15 @@ from resource_pool.messages import (
     ArcState,
     AskArc,
     AskBeat,
-    AskPose,
-    AskStop,
     Drive,
-    EmergencyStop,
-    EmergencyStopped,
     Frame,
-    GivenBeforeStop,
     Halt,
     Jump,
-    LiftStop,
     NoSuchAction,
     Noted,
-    OtherStop,
-    Pose,
     Release,
     Resumed,
     SliceEnds,
-    Stopper,
-    StopState,
     Suspended,
     Suspending,
     SwappedOut,
@@ -58,7 +47,9 @@ from resource_pool.messages import (
     WantLonger,
     WantRuntime,
 )
+from resource_pool.robot_stops import ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.stop_knowledge import StopKnowledge
+from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
 
 __all__ = [
     "DEFAULT_DRIVE_USAGE",
@@ -96,9 +87,6 @@ __all__ = [
 ]
 
 log = logging.getLogger(__name__)
-
-REPLY_TIME_S = 1.0  # chosen: a command that takes longer justifies a stop
-START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are starting
 
 
 class NotMyArc(Refusal):
@@ -152,7 +140,7 @@ class ArcClient:
         self,
         clock: Clock,
         kind: str,
-        parameters: dict[str, Any],
+        parameters: dict[str, object],
         *,
         rests: bool = False,
         patience_s: float = 0.0,
@@ -175,29 +163,8 @@ class ArcClient:
         Raises:
             Refusal: The ARC did not start, or its request can never be served.
         """
-        is_there = rests and await self._wake()
-        give_up_s = clock.now_s() + patience_s * clock.rate
-        while True:
-            if not is_there:
-                await self._start_anew(clock, kind, parameters, on_changed, give_up_s)
-            is_there = False
-            self.wish.placed()
-            on_changed()
-            monitor = PeerMonitor(self._bus, self.address)
-            watching = [
-                asyncio.create_task(self._agree_after_absence(monitor), name=f"{self.arc}:agree"),
-                asyncio.create_task(self._note_absence(monitor, clock, on_changed), name=f"{self.arc}:absence"),
-            ]
-            try:
-                await monitor.wait_gone()
-            finally:
-                monitor.close()
-                for task in watching:
-                    task.cancel()
-                await asyncio.gather(*watching, return_exceptions=True)
-            self.wish.missing("it ended while it was wanted", clock.now_s())
-            on_changed()
-            await self._lost()
+        keeper = ArcKeeper(self._bus, self.arc, self.wish, self, clock, on_changed)
+        await keeper.keep(kind, parameters, rests=rests, patience_s=patience_s)
 
     async def handle(self, notice: ArcNotice) -> Noted:
         """Record a notice of the ARC and call the listener; return the reply to the ARC.
@@ -213,7 +180,7 @@ class ArcClient:
                     if notice.until_s > self.granted.until_s:
                         self.granted = notice
                     return Noted()  # repeated: the first answer was lost, or a heartbeat was earlier
-                await self._lost()
+                await self.lost()
                 self.granted, self.suspended = notice, None
                 self._granted.set()
                 self._suspended.clear()
@@ -231,7 +198,7 @@ class ArcClient:
                 await self._listener.arc_suspended(notice)
             case AskBeat(state=state):
                 if state is not None and state.arc == self.arc:
-                    await self._agree(state)
+                    await self.agree(state)
         return Noted()
 
     async def wait_granted(self) -> Resumed:
@@ -267,8 +234,8 @@ class ArcClient:
     def frames(self, listener: Callable[[Frame], None]) -> Subscription:
         """Call the listener with the newest picture of the present grant; pictures of earlier grants never arrive."""
 
-        def arrived(envelope: Envelope[Any]) -> None:
-            frame: Frame = envelope.body
+        def arrived(envelope: Envelope[Frame]) -> None:
+            frame = envelope.body
             if self.granted is not None and self.granted.epochs.get(frame.rc) == frame.epoch:
                 listener(frame)
 
@@ -337,79 +304,15 @@ class ArcClient:
         except Refusal as refusal:
             log.info("%s was gone already: %s", self.arc, refusal.detail)
 
-    async def _wake(self) -> bool:
-        """Wake a resting ARC, which then sends its request; return False if this is not certain."""
-        try:
-            await self.idle(False)
-        except (LinkError, Refusal) as error:
-            log.info("%s does not wake up: %s", self.arc, error)
-            return False
-        return True
-
-    async def _start_anew(
-        self, clock: Clock, kind: str, parameters: dict[str, Any], on_changed: Callable[[], None], give_up_s: float
-    ) -> None:
-        """Start the ARC; first end an ARC that an earlier life of the owner left behind."""
-        while True:
-            try:
-                await self._bus.ask(PLACER, Start(kind, self.arc, parameters), Started, within_s=START_TIME_S)
-                return
-            except NameTaken as refusal:
-                cause = f"one from before has its name: {refusal.detail}"
-                self.wish.missing(cause, clock.now_s())
-                on_changed()
-                await self._end_leftover()
-            except (LinkError, CreatorSilent) as error:
-                cause = f"claimed without an answer: {error}"
-            except Refusal as refusal:
-                if not self.wish.started and clock.now_s() >= give_up_s:
-                    raise
-                cause = f"it was refused: {refusal.detail}"
-            log.info("%s: %s", self.arc, cause)
-            pause_s = self.wish.not_started(cause, clock.now_s())
-            on_changed()
-            await clock.sleep_s(pause_s * clock.rate)
-
-    async def _end_leftover(self) -> None:
-        try:
-            await self._bus.ask(PLACER, StopComponent(self.arc, "left from before"), Ended, within_s=START_TIME_S)
-        except Refusal:  # the placer does not have it: stop it directly
-            with contextlib.suppress(LinkError):
-                await self._bus.ask(self.address, Stop("left from before"), Stopping, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            log.info("%s: ended without an answer: %s", self.arc, error)
-
-    async def _note_absence(self, monitor: PeerMonitor, clock: Clock, on_changed: Callable[[], None]) -> None:
-        """Report the ARC as absent while its token does not stand, also while only the own link may be down."""
-        await monitor.wait_risen(1)
-        while True:
-            await monitor.wait_hidden()
-            self.wish.missing("it cannot be reached", clock.now_s())
-            on_changed()
-            await monitor.wait_there()
-            self.wish.placed()
-            on_changed()
-
-    async def _agree_after_absence(self, monitor: PeerMonitor) -> None:
-        """Ask the ARC for its state whenever its token rises again, because notices may have been lost meanwhile."""
-        await monitor.wait_there()
-        while True:
-            await monitor.wait_risen(monitor.times_risen + 1)
-            try:
-                state = await self.state()
-            except LinkError as error:
-                log.info("%s is back and does not answer: %s", self.arc, error)
-                continue
-            await self._agree(state)
-
-    async def _agree(self, state: ArcState) -> None:
+    async def agree(self, state: ArcState) -> None:
         """Apply the ARC's state as if its notice had arrived."""
         if state.granted and (self.granted is None or self.granted.epochs != state.epochs):
             await self.handle(Resumed(self.arc, state.rcs, state.epochs, -1.0))
         elif self.granted is not None and not state.granted:
             await self.handle(Suspended(self.arc, state.reason, state.by, state.expected_start_s))
 
-    async def _lost(self) -> None:
+    async def lost(self) -> None:
+        """End the grant, because its ARC is gone."""
         if self.granted is not None:
             await self.handle(Suspended(self.arc, "lost", self.arc, -1.0))
 
@@ -433,108 +336,6 @@ class ArcClient:
 
     async def _request(self, wish: Message) -> None:
         await self._bus.ask(self.address, wish, Accepted, within_s=REPLY_TIME_S)
-
-
-def claim_parameters(
-    owner: str,
-    *,
-    path: list[PathNode],
-    minimum_runtime_s: float,
-    maximum_runtime_s: float = 0.0,
-    wish: dict[str, str] | None = None,
-    features: dict[str, list[str]] | None = None,
-    usage: Usage | Sequence[Usage] = DEFAULT_DRIVE_USAGE,
-    console: bool = False,
-    idle: bool = False,
-    stops_at_once: bool = False,
-    may_say_not_now: bool = False,
-) -> dict[str, Any]:
-    """Return the parameters of an ARC for this owner.
-
-    Args:
-        owner: Address of the decision process.
-        path: Priority path from the mission's root, or of the console alone.
-        minimum_runtime_s: Shortest useful time, seconds, above 0.
-        maximum_runtime_s: End of extensions; 0: the minimum.
-        wish: Kind of RC → name (``{"scout": "scout2"}``); kinds left out: any.
-        features: Kind of RC → features it must have (``{"scout": ["camera"]}``).
-        usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
-            kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period.
-        console: True for consoles.
-        idle: True: no time is wanted yet.
-        stops_at_once: True: the owner needs no time to stop at the end of a slice. Then ``arc_suspending`` is not
-            called, and the context switch does not wait for the owner.
-        may_say_not_now: True: the owner is asked shortly before the end of each slice that can be extended.
-
-    Raises:
-        ValueError: No usage is given, or two usages have the same kind.
-    """
-    usages = [usage] if isinstance(usage, Usage) else list(usage)
-    kinds = {one.kind for one in usages}
-    if not usages or len(kinds) < len(usages):
-        raise ValueError(f"{owner} claims with usages of the kinds {[one.kind for one in usages]}")
-    first, *further = ([one.period_s, one.packet_time_s, one.deadline_s, one.jitter_s, one.kind] for one in usages)
-    return {
-        "owner": owner,
-        "path": [[node.name, node.priority] for node in path],
-        "console": console,
-        "minimum_runtime_s": minimum_runtime_s,
-        "maximum_runtime_s": maximum_runtime_s,
-        "wish": wish or {},
-        "features": features or {},
-        "usage": first,
-        "further_usages": further,
-        "idle": idle,
-        "stops_at_once": stops_at_once,
-        "may_say_not_now": may_say_not_now,
-    }
-
-
-async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopState:
-    """Stop a robot, also one that an ARC holds; nothing moves it until ``lift_stop``, and the holder keeps its grant.
-
-    A stop needs neither grant nor ARC nor RC manager; a second stop keeps the first one's author. For operators only.
-
-    Raises:
-        NotFromYou: The component of ``bus`` is no operator.
-        LinkError: The robot's RC did not answer; the outcome is unknown.
-    """
-    return await _ask_robot(bus, robot, EmergencyStop(reason, user))
-
-
-async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:
-    """Lift the stop of a robot.
-
-    Args:
-        bus: Bus of an operator.
-        stop: The stop that the operator saw.
-        user: Name of the operator, for people.
-
-    Raises:
-        OtherStop: A newer stop is in force.
-        NotFromYou: The component of ``bus`` is no operator.
-        LinkError: The robot's RC did not answer.
-    """
-    return await _ask_robot(bus, stop.rc, LiftStop(stop.number, user))
-
-
-async def ask_stop(bus: Bus, robot: str) -> StopState:
-    """Return whether an operator's stop is in force on the robot.
-
-    Raises:
-        LinkError: The robot's RC did not answer.
-    """
-    return await _ask_robot(bus, robot, AskStop())
-
-
-def watch_stops(bus: Bus, listener: Callable[[StopState], None], robot: str = "*") -> Subscription:
-    """Call the listener whenever this robot, or any, is stopped or freed."""
-    at = f"{Subsystem.RESOURCE_POOL}/{robot}"
-    return bus.subscribe(at, Conversation.EVENTS, StopState, lambda heard: listener(heard.body))
-
-
-async def _ask_robot(bus: Bus, robot: str, question: Message) -> StopState:
-    return await bus.ask(address(Subsystem.RESOURCE_POOL, robot), question, StopState, within_s=REPLY_TIME_S)
 
 
 def notice_arc(notice: ArcNotice) -> str:

@@ -3,7 +3,6 @@
 * decision process → ARC: ``ArcQuestion``; ARC → decision process: ``ArcNotice``.
 * ARC → scout RC: ``ScoutCommand``; scout RC → command radio RC: ``RadioCommand``; ARC → framegrabber RC: ``Tune``.
 * framegrabber RC → subscribers of its ARC: ``Frame``, published under the ARC's address.
-* operator → robot RC, past ARC and RC manager: ``EmergencyQuestion``; robot RC → subscribers: ``StopState``.
 
 Commands to RCs are questions: the answer contains the applied values, or is the refusal ``StaleEpoch``.
 """
@@ -15,31 +14,21 @@ from typing import Annotated
 from backbone.errors import Refusal
 from backbone.ranges import (
     FEW,
-    MANY,
     Count,
-    Document,
     Duration,
     Epoch,
     Instant,
-    Line,
     Measure,
     Mention,
-    Meters,
-    Number,
     Payload,
     PixelCount,
     Pixels,
-    Radians,
-    Rate,
     RunTime,
-    Share,
-    StateVector,
     Text,
     WheelSpeed,
 )
 from backbone.scheduling.requests import Usage
 from backbone.wire import Message
-from scout_model.description import AirDescription
 
 
 # ---------------------------------------------------------------------- decision process → ARC
@@ -346,168 +335,6 @@ class Frame(Message, frozen=True):
             raise ValueError(f"{len(self.pixels)} pixels for {self.width_px} x {self.height_px}")
 
 
-# ---------------------------------------------------------------------- operator → robot RC: needs no grant
-class EmergencyStop(Message, frozen=True):
-    """Stop this robot; nothing moves it until the stop is lifted. Every operator may stop it at any time.
-
-    Attributes:
-        reason: Reason, for the holder and the log.
-        user: Name of the operator, for people; empty: the console.
-    """
-
-    reason: Line = ""
-    user: Mention = ""
-
-
-class LiftStop(Message, frozen=True):
-    """Let the robot move again.
-
-    Attributes:
-        number: Number of the stop that the operator saw; a newer stop is not lifted.
-        user: Name of the operator, for people; empty: the console.
-    """
-
-    number: Count
-    user: Mention = ""
-
-
-class AskStop(Message, frozen=True):
-    """Ask whether this robot is stopped."""
-
-
-class Stopper(Message, frozen=True):
-    """An operator who stopped a robot.
-
-    Attributes:
-        by: Name of the operator, for people; without a name the address of the console.
-        console: Address of the operator's console, which is asked before the stop is lifted. Empty: unknown.
-    """
-
-    by: Mention
-    console: Mention = ""
-
-
-class StopState(Message, frozen=True):
-    """Answer to the three questions before; also published as an event on every change.
-
-    Attributes:
-        rc: The robot.
-        is_stopped: True: drives and jumps are refused.
-        number: Number of the last order to stop; grows with each, also if the robot was stopped already.
-        by: The operator who stopped it first, or who lifted the last stop.
-        reason: The operator's reason.
-        at_s: Mission time of the stop, or of its end.
-        is_confirmed: False if the radio did not accept the packet that stops the wheels. Then no new packet moves the
-            robot, and its present motion ends by itself within ``COMMAND_TIMEOUT_S``.
-        console: Address of the console of the operator ``by``.
-        also: Other operators who stopped it since it last moved.
-    """
-
-    rc: Mention
-    is_stopped: bool
-    number: Count
-    by: Mention
-    reason: Text
-    at_s: Instant
-    is_confirmed: bool = True
-    console: Mention = ""
-    also: Annotated[list[Stopper], FEW] = []
-
-
-EmergencyQuestion = EmergencyStop | LiftStop | AskStop
-
-
-# ---------------------------------------------------------------------- the simulated world, played as hardware
-class RadioPacket(Message, frozen=True):
-    """A packet on the air: published under the world's address as a command, without an acknowledgment.
-
-    Attributes:
-        radio: Its sender.
-        network_id: Network id of its receiver.
-        payload: Bytes of the robot's protocol.
-        arc: For the audit: the ARC that held robot and radio.
-        epoch: For the audit: epoch of the robot when the payload was made.
-        number: Its number among the packets of its radio since the radio was opened.
-        air_time_s: Duration of its bits.
-        robot_stop: For the audit: number of the robot's last stop when the payload was made.
-    """
-
-    radio: Mention
-    network_id: Count
-    payload: Payload
-    arc: Mention = ""
-    epoch: Epoch = 0
-    number: Count = 0
-    air_time_s: Duration = 0.0
-    robot_stop: Count = 0
-
-
-class AskWorld(Message, frozen=True):
-    """Ask for the model of the world."""
-
-
-class WorldModel(Message, frozen=True):
-    """Answer to ``AskWorld``: all that another process needs to draw and receive the same pictures.
-
-    Attributes:
-        mjcf: The compiled world's XML.
-        robots: Robot name → network id.
-        seed: Seed of all random processes of the world.
-        air: The air between robots and base.
-        antenna_m: Position of the base's antenna: x, y, z.
-    """
-
-    mjcf: Document
-    robots: Annotated[dict[Mention, Count], MANY]
-    seed: Number = 0
-    air: AirDescription = AirDescription()
-    antenna_m: tuple[Meters, Meters, Meters] = (0.0, 0.0, 1.0)
-
-
-class AskPose(Message, frozen=True):
-    """Ask for the pose of a body. The simulated world or a camera above the room knows it; a robot does not."""
-
-    body: Mention
-
-
-class Pose(Message, frozen=True):
-    """Answer to ``AskPose``: metres and radians in the room's frame, origin in a corner of the floor."""
-
-    body: Mention
-    at_s: Instant
-    x_m: Meters
-    y_m: Meters
-    heading_rad: Radians
-
-
-class WorldState(Message, frozen=True):
-    """State of the world, published once a frame as telemetry.
-
-    Attributes:
-        frame: Number of the frame.
-        at_s: Mission time of the state.
-        state: float64 vector, little endian; only the model knows its meaning.
-        transmitting: Robot → video frequency of its transmitter, if it is on.
-        on_since: Robot that transmits → first frame on this frequency.
-        motors: Robot that transmits → speed of its wheels, 0 to 1 of their limit; a missing robot stands still.
-    """
-
-    frame: Count
-    at_s: Instant
-    state: StateVector
-    transmitting: Annotated[dict[Mention, Mention], MANY]
-    on_since: Annotated[dict[Mention, Count], MANY] = {}
-    motors: Annotated[dict[Mention, Share], MANY] = {}
-
-
-class ClockTick(Message, frozen=True):
-    """The mission's time, published by the world once a frame, for hosts without a shared monotonic clock."""
-
-    frame: Count
-    at_s: Instant
-    rate: Rate
-
-
 # ---------------------------------------------------------------------- refusals
 class SwappedOut(Refusal):
     """The ARC has no grant; facts: ``reason``, ``by``, ``expected_start_s``."""
@@ -558,42 +385,11 @@ class ImpossibleUse(Refusal):
     remedy = "Connect with the next epoch, a lease of at most an hour, and periods that are finite and above 0."
 
 
-class EmergencyStopped(Refusal):
-    """An operator has stopped the robot; it did not move.
-
-    Facts: ``rc``, ``number``, ``is_stopped``, ``by``, ``reason``, ``since_s``.
-    """
-
-    code = "scout.emergency_stop"
-    remedy = "See that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
-
-
-class GivenBeforeStop(EmergencyStopped):
-    """The sender did not know the robot's last stop, which was lifted since; facts as ``EmergencyStopped``."""
-
-    code = "scout.given_before_stop"
-    remedy = "Give the command again, now that you know of the stop: let go of the control and press it again."
-
-
-class OtherStop(Refusal):
-    """Another stop than the one to lift is in force; facts: ``number``, ``by``. Nothing is changed."""
-
-    code = "scout.other_stop"
-    remedy = "See which operator stopped the robot since, and lift that stop if the robot may move."
-
-
 class NoTurnSoon(Refusal):
     """The ARC's stream on the radio is too slow for an urgent packet, which was not sent; fact: ``wait_s``."""
 
     code = "radio.no_turn_soon"
     remedy = "Claim with a shorter period, or with a further usage for this kind of command."
-
-
-class HardwareFault(Refusal):
-    """The hardware did not obey; the RC reports itself down."""
-
-    code = "rc.hardware"
-    remedy = "Check cable, power and driver of the resource."
 
 
 DEFAULT_DRIVE_USAGE = Usage(period_s=0.05, packet_time_s=0.002, kind="drive")

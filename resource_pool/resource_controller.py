@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
@@ -25,7 +25,6 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.ranges import LONGEST_LEASE_S
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     EPOCHS_PER_S,
     AskRc,
@@ -39,10 +38,17 @@ from backbone.rc_manager.messages import (
     most_epoch,
 )
 from backbone.scheduling.requests import Holder, Lease
-from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import AdjustableDriver, DriverSite, NoOptions, build_driver, options_of_drivers
+from backbone.wire import Accepts, Envelope, Message
+from resource_pool.drivers.interface import (
+    AdjustableDriver,
+    DriverSite,
+    HardwareFault,
+    NoOptions,
+    build_driver,
+    options_of_drivers,
+)
 from resource_pool.holds import Hold, HoldTable
-from resource_pool.messages import HardwareFault, ImpossibleUse, NeedsRestart, NotFromYou
+from resource_pool.messages import ImpossibleUse, NeedsRestart, NotFromYou
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +84,7 @@ class ResourceController(Component[R], Generic[R]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RcParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset({"driver", "sharable", "capacity", "links", "options"})
-    commands: ClassVar[types.UnionType | type[Any] | None] = None
+    commands: ClassVar[Accepts | None] = None
     """Commands of this kind of RC, besides the RC manager's questions; each has the fields ``arc`` and ``epoch``."""
     driver_kind: ClassVar[str] = ""
     """Kind of its driver; empty: it has no driver."""
@@ -87,9 +93,9 @@ class ResourceController(Component[R], Generic[R]):
     outlasts_s: ClassVar[float] = 0.0
     """Time for which the effect of a command may outlast the process, mission seconds. For this time a restarted RC
     confirms no disconnection of an earlier hold. 0: the effect ends with the process."""
-    accepts: ClassVar[types.UnionType | type[Any] | None] = Connect | Disconnect | AskRc
+    accepts: ClassVar[Accepts | None] = Connect | Disconnect | AskRc
 
-    def __init_subclass__(cls, **kwargs: Any) -> None:
+    def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
         if cls.commands is not None:
             cls.accepts = Connect | Disconnect | AskRc | cls.commands
@@ -125,14 +131,14 @@ class ResourceController(Component[R], Generic[R]):
         connection.
         """
 
-    async def command(self, asked: Envelope[Any]) -> Message:
+    async def command(self, asked: Envelope[Message]) -> Message:
         """Carry out one of ``commands``. Call ``admit`` first, which refuses commands outside a present hold."""
         return await super().answer(asked)
 
     def ranked(self, arc: str, epoch: int) -> None:
         """Apply the rank of this hold, if it is present. When: with each renewal."""
 
-    def may_command(self, source: str, hold: Hold, order: Any) -> bool:  # noqa: ARG002
+    def may_command(self, source: str, hold: Hold, order: Message) -> bool:  # noqa: ARG002
         """Return whether the source may send a command under this hold; True for the ARC that holds the RC."""
         return source == address(Subsystem.RESOURCE_POOL, hold.arc)
 
@@ -218,7 +224,7 @@ class ResourceController(Component[R], Generic[R]):
             ended = [self.holds.disconnect(hold.arc, hold.epoch) for hold in self.holds.holds()]
             await self._end_holds([hold for hold in ended if hold is not None], "the RC ends")
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the RC manager, and carry out commands."""
         match asked.body:
             case Connect() | Disconnect() if asked.source != RC_MANAGER:
@@ -280,13 +286,13 @@ class ResourceController(Component[R], Generic[R]):
             "safety_faults": self._faults,
         }
 
-    def _check_sender(self, asked: Envelope[Any]) -> None:
+    def _check_sender(self, asked: Envelope[Message]) -> None:
         """Refuse a command of a present hold from a component that may not command it.
 
         Raises:
             NotFromYou: The source may not command under this hold.
         """
-        order = asked.body
+        order: Any = asked.body  # each of ``commands`` has the fields ``arc`` and ``epoch``
         hold = self.holds.find(order.arc, order.epoch)
         if hold is not None and not self.may_command(asked.source, hold, order):
             raise self._stranger(asked.source, f"{type(order).__name__} for {order.arc}")
@@ -358,8 +364,8 @@ class ResourceController(Component[R], Generic[R]):
         self.report(f"held by {holders}{unsafe}" if holders else f"free{unsafe}")
         self.changed()  # the holder may be the same with a new epoch
 
-    def _heard_leases(self, envelope: Envelope[Any]) -> None:
-        leases: Leases = envelope.body
+    def _heard_leases(self, envelope: Envelope[Leases]) -> None:
+        leases = envelope.body
         until_s = min(envelope.stamp_s, self.clock.now_s()) + leases.lease_s
         for lease in leases.leases:
             if lease.rc == self.name:

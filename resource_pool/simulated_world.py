@@ -7,8 +7,6 @@ Other processes draw pictures from the state that it publishes once a frame.
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
@@ -17,15 +15,7 @@ from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.wire import Envelope, Message
-from resource_pool.messages import (
-    AskPose,
-    AskWorld,
-    ClockTick,
-    Pose,
-    RadioPacket,
-    WorldModel,
-    WorldState,
-)
+from resource_pool.drivers.world_messages import AskPose, AskWorld, ClockTick, Pose, RadioPacket, WorldModel, WorldState
 from scout_model.air import antenna_m, distance_m
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
@@ -92,7 +82,7 @@ class SimulatedWorld(Component[WorldParameters]):
             self._world.step_frame()
             self._publish(frame, due_s)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``AskWorld`` and ``AskPose``."""
         match asked.body:
             case AskWorld():
@@ -124,8 +114,8 @@ class SimulatedWorld(Component[WorldParameters]):
             "frames": self._world.frame,
         }
 
-    def _hear(self, envelope: Envelope[Any]) -> None:
-        packet: RadioPacket = envelope.body
+    def _hear(self, envelope: Envelope[RadioPacket]) -> None:
+        packet = envelope.body
         self._packets += 1
         if packet.epoch < self._epochs.get(packet.network_id, 0):
             self._stale += 1

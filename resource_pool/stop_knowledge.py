@@ -8,7 +8,7 @@ later command: the robot's RC refuses every number but that of its last stop.
 
 from __future__ import annotations
 
-from resource_pool.messages import EmergencyStopped, StopState
+from resource_pool.stop_messages import EmergencyStopped, StopState
 
 
 class StopKnowledge:

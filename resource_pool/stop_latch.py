@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import msgspec
 
-from resource_pool.messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
+from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
 
 MOST_AUTHORS = 16  # chosen: more people than operate one robot
 

@@ -8,15 +8,13 @@ sites that tell a camera where it is dark.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from importlib import resources
-from typing import Any
 
 import mujoco
 import numpy as np
 
-from scout_model.carrier import check_stops
 from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, ScoutPlace, Target, WorldDescription
+from scout_model.description_checks import check
 from scout_model.dimensions import (
     BLOB_DIAMETER_M,
     BLOBS_M,
@@ -31,24 +29,22 @@ from scout_model.dimensions import (
     PERSON_HIP_M,
     PIONEER_HEIGHT_M,
     PIONEER_RADIUS_M,
+    TABLE_LEG_M,
+    TABLE_TOP_M,
     WALL_HEIGHT_M,
 )
 from scout_model.errors import InvalidWorld
-from scout_model.radio_link import FIRST_NETWORK_ID, LAST_NETWORK_ID
 from scout_model.robot import robot_class
 from scout_model.room_file import add_room
-from scout_model.targets import CARRIER, SHAPES, part_poses, path_length_m
+from scout_model.targets import CARRIER, part_poses
 
 _WALL_THICKNESS_M = 0.1  # chosen: a Scout in flight does not pass through within one step
 _MARK_THICKNESS_M = 0.002  # chosen: enough to keep mark and surface apart in the depth buffer across the room
 _SHADE_THICKNESS_M = 0.004  # chosen: as much above a mark as that is above its surface
-_TABLE_TOP_M = 0.03  # chosen: a board
-_TABLE_LEG_M = 0.05  # chosen: a Scout sees it and passes beside it
 _FLOOR_LEVEL = 0.45  # as in room.xml
 _AT_A_WALL_M = 0.05  # chosen: what ends so close to a wall darkens it
 _MARKS, _THINGS = 1, 2  # geom groups, see room.xml
 _BOX, _CYLINDER, _SPHERE = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_SPHERE
-_FURNITURE_SHAPES = ("box", "table")
 
 
 def compose(description: WorldDescription) -> str:
@@ -84,82 +80,6 @@ def compose(description: WorldDescription) -> str:
     return str(spec.to_xml())
 
 
-def check(description: WorldDescription) -> None:
-    """Return if the world can be built.
-
-    Raises:
-        InvalidWorld: It cannot; the first reason.
-    """
-    width_m, depth_m = description.width_m, description.depth_m
-    if not (0 < width_m < math.inf and 0 < depth_m < math.inf):
-        raise InvalidWorld(f"a room of {width_m} by {depth_m} m")
-    parts: list[Furniture | ScoutPlace | Target | Ramp | Landmark | DarkPlace] = [
-        *description.furniture,
-        *description.scouts,
-        *description.targets,
-        *description.ramps,
-        *description.landmarks,
-        *description.dark_places,
-    ]
-    names = Counter(part.name for part in parts)
-    for name, uses in names.items():
-        if uses > 1 or not name or "/" in name:
-            raise InvalidWorld(f"name {name!r} is empty, has a '/', or is used {uses} times")
-    ids = Counter(place.network_id for place in description.scouts)
-    for network_id, uses in ids.items():
-        if uses > 1 or not FIRST_NETWORK_ID <= network_id <= LAST_NETWORK_ID:
-            raise InvalidWorld(
-                f"network id {network_id} is used {uses} times or outside {FIRST_NETWORK_ID} to {LAST_NETWORK_ID}"
-            )
-    for place in description.scouts:
-        if not (0 < place.x_m < width_m and 0 < place.y_m < depth_m and math.isfinite(place.heading_rad)):
-            raise InvalidWorld(f"{place.name} at ({place.x_m}, {place.y_m}) m is not in the room")
-        robot_class(place.kind)
-    for dark in description.dark_places:
-        _check_extents(dark.name, (dark.width_m, dark.depth_m, dark.height_m), dark.x_m, dark.y_m)
-    for furniture in description.furniture:
-        _check_shape(furniture)
-    for ramp in description.ramps:
-        _check_extents(ramp.name, (ramp.length_m, ramp.width_m, ramp.height_m), ramp.x_m, ramp.y_m, ramp.heading_rad)
-    for landmark in description.landmarks:
-        if not _finite(landmark.x_m, landmark.y_m, landmark.heading_rad):
-            raise InvalidWorld(f"{landmark.name} is nowhere")
-    for target in description.targets:
-        _check_target(target)
-    check_stops(description)
-
-
-def _check_extents(name: str, sizes_m: tuple[float, ...], *place: float) -> None:
-    if not all(0 < size_m < math.inf for size_m in sizes_m) or not _finite(*place):
-        raise InvalidWorld(f"{name} has impossible sizes {sizes_m} m")
-
-
-def _check_shape(furniture: Furniture) -> None:
-    sizes_m = (furniture.width_m, furniture.depth_m, furniture.height_m)
-    _check_extents(furniture.name, sizes_m, furniture.x_m, furniture.y_m)
-    if furniture.shape not in _FURNITURE_SHAPES:
-        raise InvalidWorld(f"{furniture.name}: shape {furniture.shape!r} is none of {', '.join(_FURNITURE_SHAPES)}")
-    if furniture.shape == "table" and (
-        furniture.height_m <= _TABLE_TOP_M or min(furniture.width_m, furniture.depth_m) <= 2 * _TABLE_LEG_M
-    ):
-        raise InvalidWorld(f"{furniture.name} is too small for a table")
-
-
-def _check_target(target: Target) -> None:
-    if target.shape not in SHAPES:
-        raise InvalidWorld(f"{target.name}: shape {target.shape!r} is none of {', '.join(SHAPES)}")
-    if not all(_finite(*point) for point in target.path) or not 0 < path_length_m(target.path) < math.inf:
-        raise InvalidWorld(f"{target.name}: its path {target.path} leads nowhere")
-    if not 0 < target.speed_m_s < math.inf or not 0 <= target.rest_s < math.inf or not math.isfinite(target.begin_s):
-        raise InvalidWorld(
-            f"{target.name}: speed {target.speed_m_s} m/s, rest {target.rest_s} s, begin {target.begin_s} s"
-        )
-
-
-def _finite(*values: float) -> bool:
-    return all(math.isfinite(value) for value in values)
-
-
 def _asset(name: str) -> str:
     return resources.files("scout_model").joinpath(name).read_text(encoding="utf-8")
 
@@ -169,14 +89,14 @@ def _grey(level: float) -> list[float]:
 
 
 def _part(
-    parent: Any,
+    parent: mujoco.MjsBody,
     name: str,
-    shape: Any,
+    shape: mujoco.mjtGeom,
     centre_m: list[float],
     size_m: list[float],
     level: float,
     group: int = _THINGS,
-    **more: Any,
+    **more: list[float],
 ) -> None:
     """Add a part that is seen and, unless it is a mark, touched; its size is as MuJoCo has it."""
     solid = int(group != _MARKS)
@@ -193,17 +113,21 @@ def _part(
     )
 
 
-def _box(parent: Any, name: str, centre_m: list[float], size_m: list[float], level: float, group: int) -> None:
+def _box(
+    parent: mujoco.MjsBody, name: str, centre_m: list[float], size_m: list[float], level: float, group: int
+) -> None:
     """Add a box; ``size_m`` is its full extent."""
     _part(parent, name, _BOX, centre_m, [extent_m / 2 for extent_m in size_m], level, group)
 
 
-def _cylinder(parent: Any, name: str, radius_m: float, bottom_m: float, top_m: float, level: float, group: int) -> None:
+def _cylinder(
+    parent: mujoco.MjsBody, name: str, radius_m: float, bottom_m: float, top_m: float, level: float, group: int
+) -> None:
     centre_m, half_m = [0.0, 0.0, (bottom_m + top_m) / 2], (top_m - bottom_m) / 2
     _part(parent, name, _CYLINDER, centre_m, [radius_m, half_m, 0.0], level, group)
 
 
-def _add_walls(spec: Any, description: WorldDescription) -> None:
+def _add_walls(spec: mujoco.MjSpec, description: WorldDescription) -> None:
     width_m, depth_m = description.width_m, description.depth_m
     half_m, height_m = _WALL_THICKNESS_M / 2, WALL_HEIGHT_M
     world = spec.worldbody
@@ -214,7 +138,7 @@ def _add_walls(spec: Any, description: WorldDescription) -> None:
     _box(world, "wall_east", [width_m + half_m, depth_m / 2, height_m / 2], along_y, 0.78, 0)
 
 
-def _add_marks(spec: Any, description: WorldDescription) -> None:
+def _add_marks(spec: mujoco.MjSpec, description: WorldDescription) -> None:
     """Put lines on the floor, and skirting boards and posters on the walls, so that a picture shows motion."""
     width_m, depth_m = description.width_m, description.depth_m
     rng = np.random.default_rng(description.seed)
@@ -244,13 +168,13 @@ def _add_marks(spec: Any, description: WorldDescription) -> None:
 
 def _below_tables(description: WorldDescription) -> list[DarkPlace]:
     return [
-        DarkPlace(table.name, table.x_m, table.y_m, table.width_m, table.depth_m, table.height_m - _TABLE_TOP_M)
+        DarkPlace(table.name, table.x_m, table.y_m, table.width_m, table.depth_m, table.height_m - TABLE_TOP_M)
         for table in description.furniture
         if table.shape == "table"
     ]
 
 
-def _add_dark_place(spec: Any, dark: DarkPlace, description: WorldDescription) -> None:
+def _add_dark_place(spec: mujoco.MjSpec, dark: DarkPlace, description: WorldDescription) -> None:
     """Darken floor and walls, and leave a site that tells cameras what else to darken."""
     world = spec.worldbody
     size_m = [dark.width_m, dark.depth_m, dark.height_m]
@@ -282,24 +206,24 @@ def _add_dark_place(spec: Any, dark: DarkPlace, description: WorldDescription) -
             _box(world, f"shade/{dark.name}_{side}", [dark.x_m, wall_m, middle_m], size_m, level, _MARKS)
 
 
-def _add_furniture(spec: Any, furniture: Furniture, dark_places: list[DarkPlace]) -> None:
+def _add_furniture(spec: mujoco.MjSpec, furniture: Furniture, dark_places: list[DarkPlace]) -> None:
     world, x_m, y_m, height_m = spec.worldbody, furniture.x_m, furniture.y_m, furniture.height_m
     if furniture.shape == "box":
         is_dark = any(_is_in(furniture, dark) for dark in dark_places)
         size_m = [furniture.width_m, furniture.depth_m, height_m]
         _box(world, furniture.name, [x_m, y_m, height_m / 2], size_m, 0.56 * (DARKNESS if is_dark else 1.0), _THINGS)
         return
-    under_m = height_m - _TABLE_TOP_M
-    top_m = [furniture.width_m, furniture.depth_m, _TABLE_TOP_M]
-    _box(world, furniture.name, [x_m, y_m, height_m - _TABLE_TOP_M / 2], top_m, 0.56, _THINGS)
+    under_m = height_m - TABLE_TOP_M
+    top_m = [furniture.width_m, furniture.depth_m, TABLE_TOP_M]
+    _box(world, furniture.name, [x_m, y_m, height_m - TABLE_TOP_M / 2], top_m, 0.56, _THINGS)
     # Its underside: just below the top and a little smaller, so that it is not seen from the side.
-    inset_m = _TABLE_LEG_M / 2
+    inset_m = TABLE_LEG_M / 2
     underside_m = [furniture.width_m - inset_m, furniture.depth_m - inset_m, _MARK_THICKNESS_M]
     _box(world, f"{furniture.name}/underside", [x_m, y_m, under_m - _MARK_THICKNESS_M], underside_m, 0.1, _THINGS)
     for number, (right, back) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
-        leg_x_m = x_m + right * (furniture.width_m - _TABLE_LEG_M) / 2
-        leg_y_m = y_m + back * (furniture.depth_m - _TABLE_LEG_M) / 2
-        leg_m = [_TABLE_LEG_M, _TABLE_LEG_M, under_m]
+        leg_x_m = x_m + right * (furniture.width_m - TABLE_LEG_M) / 2
+        leg_y_m = y_m + back * (furniture.depth_m - TABLE_LEG_M) / 2
+        leg_m = [TABLE_LEG_M, TABLE_LEG_M, under_m]
         _box(world, f"{furniture.name}/leg_{number}", [leg_x_m, leg_y_m, under_m / 2], leg_m, 0.3, _THINGS)
 
 
@@ -316,7 +240,7 @@ def _turned(heading_rad: float) -> list[float]:
     return [math.cos(heading_rad / 2), 0.0, 0.0, math.sin(heading_rad / 2)]
 
 
-def _add_ramp(spec: Any, ramp: Ramp) -> None:
+def _add_ramp(spec: mujoco.MjSpec, ramp: Ramp) -> None:
     """Add a wedge. A tilted board would leave an edge at its foot, and be seen below the floor."""
     half_m, across_m, height_m = ramp.length_m / 2, ramp.width_m / 2, ramp.height_m
     corners_m = [
@@ -336,7 +260,7 @@ def _add_ramp(spec: Any, ramp: Ramp) -> None:
     )
 
 
-def _add_landmark(spec: Any, landmark: Landmark) -> None:
+def _add_landmark(spec: mujoco.MjSpec, landmark: Landmark) -> None:
     body = spec.worldbody.add_body(
         name=landmark.name, pos=[landmark.x_m, landmark.y_m, 0.0], quat=_turned(landmark.heading_rad)
     )
@@ -348,7 +272,7 @@ def _add_landmark(spec: Any, landmark: Landmark) -> None:
         _part(body, name, _CYLINDER, [0.0, right_m, up_m], size_m, 0.05, _MARKS, quat=facing)
 
 
-def _add_robot(spec: Any, place: ScoutPlace) -> None:
+def _add_robot(spec: mujoco.MjSpec, place: ScoutPlace) -> None:
     frame = spec.worldbody.add_frame(pos=[place.x_m, place.y_m, 0.0], quat=_turned(place.heading_rad))
     try:
         body = mujoco.MjSpec.from_string(robot_class(place.kind).body_mjcf())
@@ -357,7 +281,7 @@ def _add_robot(spec: Any, place: ScoutPlace) -> None:
         raise InvalidWorld(f"the body of {place.name}, a {place.kind}, cannot be built: {error}") from error
 
 
-def _add_target(spec: Any, target: Target) -> None:
+def _add_target(spec: mujoco.MjSpec, target: Target) -> None:
     # A mocap body must hang on the world, so each swinging leg of a person is a body of its own.
     body, *legs = (
         spec.worldbody.add_body(name=part.body, mocap=True, pos=part.position_m, quat=part.quaternion)
@@ -374,7 +298,7 @@ def _add_target(spec: Any, target: Target) -> None:
     _shape_person(body, legs, target.name)
 
 
-def _shape_carrier(body: Any, name: str) -> None:
+def _shape_carrier(body: mujoco.MjsBody, name: str) -> None:
     length_m, width_m = CARRIER_LENGTH_M, CARRIER_WIDTH_M
     hull_m, deck_m = [length_m, width_m - 0.10, CARRIER_DECK_M - 0.08], [length_m, width_m, 0.03]
     _box(body, f"{name}/hull", [0.0, 0.0, 0.05 + hull_m[2] / 2], hull_m, 0.35, _THINGS)
@@ -385,7 +309,7 @@ def _shape_carrier(body: Any, name: str) -> None:
         _part(body, f"{name}/wheel_{number}", _CYLINDER, centre_m, [0.09, 0.025, 0.0], 0.08, quat=upright)
 
 
-def _shape_person(body: Any, legs: list[Any], name: str) -> None:
+def _shape_person(body: mujoco.MjsBody, legs: list[mujoco.MjsBody], name: str) -> None:
     head_m, shoulder_m = 0.11, PERSON_HEIGHT_M - 0.28
     _cylinder(body, f"{name}/torso", 0.16, PERSON_HIP_M, shoulder_m, 0.35, _THINGS)
     _part(body, f"{name}/head", _SPHERE, [0.0, 0.0, PERSON_HEIGHT_M - head_m], [head_m, 0.0, 0.0], 0.80)

@@ -80,3 +80,5 @@ BLOBS_M = (
 # Room
 DARKNESS = 0.25  # chosen: share of the light that reaches a dark place; a picture of one is clearly the darkest
 WALL_HEIGHT_M = 2.5  # chosen: fills the picture from 9 m away at this view and tilt
+TABLE_TOP_M = 0.03  # chosen: a board
+TABLE_LEG_M = 0.05  # chosen: a Scout sees it and passes beside it

@@ -7,8 +7,6 @@ and the like are passed over.  In the world's model the room's names begin with 
 
 from __future__ import annotations
 
-from typing import Any
-
 import mujoco
 
 from scout_model.errors import InvalidRoom
@@ -25,7 +23,7 @@ _SHOWN = {
 _ROOM, _THINGS = 0, 2  # geom groups, see room.xml
 
 
-def add_room(spec: Any, mjcf: str) -> None:
+def add_room(spec: mujoco.MjSpec, mjcf: str) -> None:
     """Add the user's room to a world that has only a floor and a sun.
 
     Args:

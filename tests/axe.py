@@ -11,7 +11,7 @@ GRAVE = ("serious", "critical")
 
 
 async def serious_findings(page: Any) -> list[str]:
-    """Return what is wrong for people who hear, zoom or use keys, of level serious and above."""
+    """Return the faults for people who use a screen reader, zoom or keys, of level serious and above."""
     package = pytest.importorskip("axe_playwright_python", reason="axe-core is not installed")
     if not await page.evaluate("() => 'axe' in window"):
         await page.evaluate(resources.files(package).joinpath("axe.min.js").read_text())  # past the page's policy

@@ -6,18 +6,17 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import NameTaken, Stop, Stopping
 from backbone.creator.messages import EndedBy, ProcessFell
 from backbone.errors import Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import (
-    ADDRESS,
     AskPlacement,
     Ended,
     ListPlacements,
@@ -151,9 +150,9 @@ class FakePlacer:
         self.stopped: set[str] = set()
         self.on_arc: Callable[[FakeArc], None] = lambda arc: None
         self._lives: dict[str, asyncio.Task[None]] = {}
-        self.bus = network.join(ADDRESS, clock)
+        self.bus = network.join(PLACER, clock)
         self.creator = network.join("backbone/creator-local", clock)
-        self._declared = [self.bus.serve(ADDRESS, PlacerQuestion, self._answer), self.bus.declare_alive(ADDRESS)]
+        self._declared = [self.bus.serve(PLACER, PlacerQuestion, self._answer), self.bus.declare_alive(PLACER)]
 
     def silence(self) -> None:
         """Answer nothing, as a placer that is being restarted."""
@@ -162,7 +161,7 @@ class FakePlacer:
 
     def speak(self) -> None:
         """Answer again."""
-        self._declared = [self.bus.serve(ADDRESS, PlacerQuestion, self._answer), self.bus.declare_alive(ADDRESS)]
+        self._declared = [self.bus.serve(PLACER, PlacerQuestion, self._answer), self.bus.declare_alive(PLACER)]
 
     async def close(self) -> None:
         for name in list(self.components):

@@ -45,7 +45,7 @@ class Hostile(NamedTuple):
 
 
 class NeverDefined(Message, frozen=True):
-    """A message nobody answers."""
+    """A message that no component answers."""
 
 
 def enveloped(body: object, *, wire: object = WIRE_VERSION, more: tuple[object, ...] = ()) -> bytes:

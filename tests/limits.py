@@ -7,7 +7,8 @@
   ``VIRTUAL_LIMIT_S``, or as long as the marker ``virtual_limit(seconds)`` allows.
 * A failure is printed when it happens: the names are there also if the run is killed.
 * A test that starts processes says so with the marker ``processes``. Beside one with the marker ``alone``, which makes
-  the whole machine busy, no other test with processes runs: with ``pytest -n`` each waits for its turn.
+  the whole machine busy or measures a time on it, no other test with processes runs: with ``pytest -n`` each waits for
+  its turn. Such tests come first then, while other workers have tests without processes.
 """
 
 from __future__ import annotations
@@ -89,6 +90,15 @@ class Limits:
             pytest.fail(f"starts a process without the marker 'processes': {self._started[0]}")
 
 
+class AloneFirst:
+    """The order of tests for workers: those that run alone, those with processes, the others."""
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Sort the tests; within a file they keep their order."""
+        items.sort(key=_turn)
+
+
 class FailuresAtOnce:
     """Prints each failure when it happens, in the process that a person looks at."""
 
@@ -105,6 +115,11 @@ class FailuresAtOnce:
             reporter.flush()
 
 
+def _turn(item: pytest.Item) -> int:
+    turns = ("alone", "processes")
+    return next((turn for turn, name in enumerate(turns) if item.get_closest_marker(name) is not None), len(turns))
+
+
 def limit_s(item: pytest.Item) -> float:
     """Return after how many seconds the test is interrupted."""
     marker = item.get_closest_marker("timeout")
@@ -119,7 +134,9 @@ def virtual_limit_s(item: pytest.Item) -> float:
 
 
 def watch(config: pytest.Config, grace_s: float = GRACE_S, locks: tuple[Path, Path] = LOCKS) -> None:
-    """Have all of it for this run."""
+    """Apply all limits to this run."""
     config.pluginmanager.register(Limits(grace_s, Machine(*locks)), "limits")
-    if not hasattr(config, "workerinput"):
+    if hasattr(config, "workerinput"):
+        config.pluginmanager.register(AloneFirst(), "alone-first")
+    else:
         config.pluginmanager.register(FailuresAtOnce(config), "failures-at-once")

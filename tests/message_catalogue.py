@@ -225,7 +225,7 @@ def _beyond(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
 
 
 def _is_of(kind: inspect.Type, value: Any) -> bool:
-    """Say whether a value is of this type, so that only its range could refuse it."""
+    """Return whether a value is of this type, so that only its range could refuse it."""
     match kind:
         case inspect.StrType():
             return isinstance(value, str)

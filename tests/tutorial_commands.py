@@ -17,7 +17,7 @@ TRUE_WITHIN_S = 20.0  # what a command shows may need a turn to become so; only 
 
 
 def run_all(tutorial: Path, folder: Path) -> None:
-    """Run every command in this folder; end what is up afterwards, whatever happened."""
+    """Run every command in this folder; afterwards end missions that are still up, in any case."""
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "COLUMNS": "200"}
     try:
         for command, expected in commands(tutorial):
@@ -47,7 +47,7 @@ def commands(tutorial: Path) -> list[tuple[str, list[str]]]:
 
 
 def is_printed(expected: list[str], printed: str) -> bool:
-    """Say whether the lines are there in this order, others between them allowed; numbers may differ."""
+    """Return whether the lines are there in this order, with others between them; numbers may differ."""
     lines = iter(printed.splitlines())
     return all(any(pattern(line).fullmatch(squeezed(found)) for found in lines) for line in expected)
 

@@ -108,7 +108,7 @@ class Finger:
 
 
 class Cable:
-    """A connection to the server that can be pulled out, also one way: nothing passes then, and nobody is told.
+    """A connection to the server that can be cut, also one way: messages are dropped without notice to either end.
 
     Attributes:
         may_pass: While it is clear, everything waits on its way, and arrives in a burst afterwards.

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from backbone.cli import run
-from backbone.cli_options import CommandTable, SecretFile, Version, complete_mission, finite, hub_endpoint, picture_for
-from backbone.endings import ExitCode, say
+from backbone.command_line.options import (
+    CommandTable,
+    SecretFile,
+    Version,
+    chosen,
+    complete_mission,
+    finite,
+    hub_endpoint,
+    picture_for,
+    run,
+)
+from backbone.command_line.where import Where
+from backbone.launcher.endings import ExitCode, say
 from ui_console.model.profile import Profile
-
-if TYPE_CHECKING:
-    from ui_console.session.joining import Where
 
 KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
@@ -113,7 +119,7 @@ def attach(
     secret_file: SecretFile = None,
 ) -> None:
     """Take over a robot, drive it, give it back."""
-    where, user = _where(mission, connect, secret_file), user or _user()
+    where, user = chosen(mission, connect, secret_file), user or _user()
     script = script or ("-" if as_json else "")
     if profile is Profile.MONITOR:
         _watch(where, user, as_json=as_json)
@@ -145,7 +151,7 @@ def monitor(
     secret_file: SecretFile = None,
 ) -> None:
     """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
-    where, user = _where(mission, connect, secret_file), user or _user()
+    where, user = chosen(mission, connect, secret_file), user or _user()
     if once:
         from ui_console.session.headless import look_once
 
@@ -199,10 +205,10 @@ def serve(
     secret_file: SecretFile = None,
 ) -> None:
     """Serve the console, or with --design the mission designer, as a web page: for browsers, tablets and phones."""
-    from ui_console.web.door import WrongOperator, passes_for, read_operator
+    from ui_console.web.login import WrongOperator, new_rights, read_operator
 
     try:
-        passes = passes_for([read_operator(one) for one in operator or []], priority)
+        rights = new_rights([read_operator(one) for one in operator or []], priority)
     except WrongOperator as wrong:
         raise _usage(f"--operator {wrong}") from wrong
     if key and not certificate:
@@ -211,14 +217,14 @@ def serve(
         raise _usage("--design serves a mission file; --mission and --connect are for missions that are up")
     try:
         from ui_console.design.serving import serve_designer
-        from ui_console.web.serving import Claims, Site, serve_console
+        from ui_console.web.serving import Claims, ServerOptions, serve_console
     except ModuleNotFoundError as missing:
         raise _usage(f"{missing.name} is not installed; install scout-backbone[web]") from missing
-    site, claims = Site(host, port, certificate, key, new_tokens), Claims(kind, away_after)
+    options, claims = ServerOptions(host, port, certificate, key, new_tokens), Claims(kind, away_after)
     if design:
-        run(lambda: serve_designer(design, passes, site))
-    where = _where(mission, connect, secret_file)
-    run(lambda: serve_console(where, passes, site, claims))
+        run(lambda: serve_designer(design, rights, options))
+    where = chosen(mission, connect, secret_file)
+    run(lambda: serve_console(where, rights, options, claims))
 
 
 @app.command(hidden=True, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})
@@ -250,14 +256,6 @@ def _watch(where: Where, user: str, *, as_json: bool) -> None:
     run(lambda: watch_on_screen(where, user))
 
 
-def _where(mission: str | None, connect: str | None, secret_file: Path | None) -> Where:
-    from ui_console.session.joining import Where
-
-    if connect is not None and mission is None:
-        raise typer.BadParameter("--connect needs --mission NAME")
-    return Where(mission, connect, secret_file)
-
-
 def _usage(complaint: str) -> typer.Exit:
     """Print what is wrong with the words of the command, and return what ends it."""
     say(complaint)
@@ -271,7 +269,7 @@ def _need_a_terminal(command: str, instead: str) -> None:
 
 def _user() -> str:
     """Return who is logged in, as far as the system knows."""
-    from backbone.operators import login_name
+    from backbone.mission_log.operators import login_name
 
     return login_name()
 

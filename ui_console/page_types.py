@@ -30,7 +30,7 @@ from ui_console.design.views import (
 )
 from ui_console.model import views
 from ui_console.model.timeline import TimelineView
-from ui_console.web.door import Beat, Hello
+from ui_console.web.login import BeatRequest, Hello
 from ui_console.web.protocol import Intent
 
 FOLDER = Path(__file__).parent / "web" / "page"
@@ -189,10 +189,10 @@ CONSOLE = Page(
     FOLDER / "messages.d.ts",
     View,
     (WhyAnswer, RefusedAnswer, ParametersAnswer, SetAnswer, LogFoundAnswer, LogRefusedAnswer),
-    (Hello, Beat, *get_args(Intent)),
+    (Hello, BeatRequest, *get_args(Intent)),
 )
 DESIGNER = Page(
-    FOLDER / "design_messages.d.ts", DesignView, get_args(DesignAnswer), (Hello, Beat, *get_args(DesignIntent))
+    FOLDER / "design_messages.d.ts", DesignView, get_args(DesignAnswer), (Hello, BeatRequest, *get_args(DesignIntent))
 )
 
 

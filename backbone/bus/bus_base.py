@@ -28,7 +28,7 @@ class BusBase(ABC):
         """Address of the component that uses this bus."""
         self._sequence = 0
         # A dict, not a set: it keeps the order of starts, so tasks that end together end in one order in every run.
-        self._tasks: dict[asyncio.Task[Any], None] = {}
+        self._tasks: dict[asyncio.Task[object], None] = {}
         self._open_questions: dict[asyncio.Future[Any], None] = {}
         self._closing: asyncio.Task[None] | None = None
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
@@ -45,17 +45,17 @@ class BusBase(ABC):
         """Return the counts of messages since the bus was opened."""
         return BusStatistics(self.asked, self.answered, self.published, self.heard, self.refused, self.unreadable)
 
-    def envelope(self, body: Message) -> Envelope[Any]:
+    def envelope(self, body: Message) -> Envelope[Message]:
         """Return the body in an envelope with the next sequence number, now, and the current cause."""
         self._sequence += 1
         return Envelope(WIRE_VERSION, self.source, self._sequence, self._clock.now_s(), current_cause.get(), body)
 
-    def hear(self, listener: Listener, envelope: Envelope[Any]) -> None:
+    def hear(self, listener: Listener, envelope: Envelope[Message]) -> None:
         """Call a listener with the envelope as the current cause; its bugs go to ``on_bug``."""
         self.heard += 1
         self.call(envelope.id, listener, envelope)
 
-    def call(self, cause: str, act: Callable[..., None], *arguments: Any) -> None:
+    def call(self, cause: str, act: Callable[..., None], *arguments: object) -> None:
         """Call a callback with the message of this id as the current cause; its bugs go to ``on_bug``."""
         token = current_cause.set(cause)
         try:
@@ -65,14 +65,14 @@ class BusBase(ABC):
         finally:
             current_cause.reset(token)
 
-    def start(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
+    def start(self, work: Coroutine[object, None, T]) -> asyncio.Task[T]:
         """Run a coroutine as a task that this bus owns until the bus is closed."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks[task] = None
         task.add_done_callback(self._forget)
         return task
 
-    async def reply_to(self, question: Envelope[Any], answer: Answer) -> Envelope[Any] | None:
+    async def reply_to(self, question: Envelope[Message], answer: Answer) -> Envelope[Message] | None:
         """Return the reply or refusal in an envelope, or None after a bug, which went to ``on_bug``."""
         self.answered += 1
         current_cause.set(question.id)
@@ -138,10 +138,10 @@ class BusBase(ABC):
     async def leave(self) -> None:
         """Leave the network. Called when no declaration is left and no task of this bus runs."""
 
-    def _forget(self, task: asyncio.Task[Any]) -> None:
+    def _forget(self, task: asyncio.Task[object]) -> None:
         self._tasks.pop(task, None)
 
-    async def _finish(self, answering: list[asyncio.Task[Any]]) -> None:
+    async def _finish(self, answering: list[asyncio.Task[object]]) -> None:
         await asyncio.gather(*answering, return_exceptions=True)
         await self.leave()
 

@@ -13,16 +13,17 @@ from __future__ import annotations
 import types
 from collections.abc import Awaitable, Callable
 from contextvars import ContextVar
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, overload
 
 from backbone.keys import Conversation
 from backbone.ranges import Count
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 
 Reply = TypeVar("Reply", bound=Message)
-Accepted = type[Any] | types.UnionType
-Answer = Callable[[Envelope[Any]], Awaitable[Message]]
+Answer = Callable[[Envelope[Message]], Awaitable[Message]]
+Kind = TypeVar("Kind", bound=Message)
 Listener = Callable[[Envelope[Any]], None]
+"""A subscriber's callback. ``Bus.subscribe`` checks that it takes the kinds that it subscribes to."""
 LifeListener = Callable[[str, bool], None]
 LinkListener = Callable[[bool], None]
 
@@ -88,7 +89,7 @@ class Bus(Protocol):
             MalformedMessage: The answer has another class than ``reply``. The outcome is unknown.
         """
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
+    def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address until closed.
 
         ``answer`` runs as a task of its own for each question; its ``Refusal`` is raised again at the requester.
@@ -99,8 +100,30 @@ class Bus(Protocol):
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Send the message to all present subscribers. Never waits, and needs no subscriber."""
 
+    @overload
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
+        self,
+        address: str,
+        conversation: Conversation,
+        accepts: type[Kind],
+        listener: Callable[[Envelope[Kind]], None],
+        *,
+        latest: bool = False,
+    ) -> Subscription: ...
+
+    @overload
+    def subscribe(
+        self,
+        address: str,
+        conversation: Conversation,
+        accepts: types.UnionType,
+        listener: Callable[[Envelope[Message]], None],
+        *,
+        latest: bool = False,
+    ) -> Subscription: ...
+
+    def subscribe(
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Subscription:
         """Call the listener, in the event loop, with each publication under this address (``*`` matches a segment).
 

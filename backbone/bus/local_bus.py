@@ -13,16 +13,15 @@ import asyncio
 import functools
 from collections import defaultdict
 from collections.abc import Callable
-from typing import Any
 
 from backbone.bus.bus_base import BusBase
-from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply
+from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
 from backbone.waiting import settle
-from backbone.wire import Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
+from backbone.wire import Accepts, Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
 
-Answered = Callable[[Envelope[Any] | None], None]
+Answered = Callable[[Envelope[Message] | None], None]
 """Callback with the answer to a question, or None if the component died over it."""
 
 
@@ -41,7 +40,7 @@ class LocalNetwork:
         return LocalBus(self, source, clock)
 
     # Transport. A network that loses messages overrides these three.
-    def carry_question(self, address: str, asked: Envelope[Any], answered: Answered) -> None:
+    def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
         """Deliver the question to the component that serves the address, and its outcome to ``answered``.
 
         Raises:
@@ -53,7 +52,7 @@ class LocalNetwork:
         answering = server.owner.start(_answer(server, asked))
         answering.add_done_callback(lambda task: answered(_outcome(task)))
 
-    def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Any]) -> None:
+    def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Message]) -> None:
         """Deliver a publication to one listener."""
         listening.deliver(address, envelope)
 
@@ -96,19 +95,19 @@ class Neighbor(BusBase):
             raise MalformedMessage(f"{address} answered {type(envelope.body).__name__}, not {reply.__name__}")
         return envelope.body
 
-    def publish_to_neighbors(self, address: str, conversation: Conversation, envelope: Envelope[Any]) -> None:
+    def publish_to_neighbors(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Deliver a publication to every listener in this process."""
         for listening in self.network.listeners[conversation]:
             if _matches(listening.pattern, address):
                 self.network.carry_publication(listening, address, envelope)
 
-    def serve_neighbors(self, address: str, accepts: Accepted, answer: Answer) -> Serving:
+    def serve_neighbors(self, address: str, accepts: Accepts, answer: Answer) -> Serving:
         """Answer questions from this process; if several neighbors serve an address, the newest one answers."""
         serving = self.network.servers[address] = Serving(self, address, accepts, answer)
         return serving
 
     def subscribe_to_neighbors(
-        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool
     ) -> Listening:
         """Subscribe to publications of this process."""
         listening = Listening(self, address, conversation, accepts, listener, latest)
@@ -167,7 +166,7 @@ class Declaration:
 class Serving(Declaration):
     """A declaration that answers at an address."""
 
-    def __init__(self, owner: Neighbor, address: str, accepts: Accepted, answer: Answer) -> None:
+    def __init__(self, owner: Neighbor, address: str, accepts: Accepts, answer: Answer) -> None:
         super().__init__(owner, lambda: self._leave(owner.network, address))
         self.kinds, self.answer = kinds_of(accepts), answer
 
@@ -184,16 +183,16 @@ class Listening(Declaration):
         owner: Neighbor,
         pattern: str,
         conversation: Conversation,
-        accepts: Accepted,
+        accepts: Accepts,
         listener: Listener,
         latest: bool,
     ) -> None:
         super().__init__(owner, lambda: owner.network.listeners[conversation].remove(self))
         self.pattern, self.conversation, self.kinds, self.listener = pattern, conversation, kinds_of(accepts), listener
         self.latest = latest
-        self.newest: dict[str, Envelope[Any]] = {}
+        self.newest: dict[str, Envelope[Message]] = {}
 
-    def deliver(self, address: str, envelope: Envelope[Any]) -> None:
+    def deliver(self, address: str, envelope: Envelope[Message]) -> None:
         """Deliver the publication in a step of its own."""
         loop = asyncio.get_running_loop()
         if not self.latest:
@@ -208,7 +207,7 @@ class Listening(Declaration):
         for envelope in newest.values():
             self._hand_over(envelope)
 
-    def _hand_over(self, envelope: Envelope[Any]) -> None:
+    def _hand_over(self, envelope: Envelope[Message]) -> None:
         if self.closed:
             return
         if isinstance(envelope.body, self.kinds):
@@ -251,7 +250,7 @@ class LocalBus(Neighbor):
         _check(self.mission, address)
         return await self.ask_neighbor(address, question, reply, within_s=within_s)
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Serving:
+    def serve(self, address: str, accepts: Accepts, answer: Answer) -> Serving:
         """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
         _check(self.mission, address)
@@ -266,7 +265,7 @@ class LocalBus(Neighbor):
         self.publish_to_neighbors(address, conversation, self.envelope(message))
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Listening:
         """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
@@ -305,7 +304,7 @@ class LocalBus(Neighbor):
         """Return at once, because no declaration is left in the network."""
 
 
-async def _answer(server: Serving, asked: Envelope[Any]) -> Envelope[Any] | None:
+async def _answer(server: Serving, asked: Envelope[Message]) -> Envelope[Message] | None:
     if isinstance(asked.body, server.kinds):
         return await server.owner.reply_to(asked, server.answer)
     server.owner.unreadable += 1
@@ -315,7 +314,7 @@ async def _answer(server: Serving, asked: Envelope[Any]) -> Envelope[Any] | None
     return server.owner.envelope(Refused.of(refusal))
 
 
-def _outcome(answering: asyncio.Task[Envelope[Any] | None]) -> Envelope[Any] | None:
+def _outcome(answering: asyncio.Task[Envelope[Message] | None]) -> Envelope[Message] | None:
     return None if answering.cancelled() or answering.exception() is not None else answering.result()
 
 

@@ -6,7 +6,8 @@ neighbor never leaves the process.
 
 A session reports its own tokens unreliably: late echoes of them return from the hub, and a token that falls here is
 reported as fallen although another process holds it too. So this file reports neighbors' tokens, and asks the hub about
-an address that is or was a neighbor's.
+an address that is or was a neighbor's. A session also drops an answer about a token that it reports in the meantime: a
+"no" counts only when the session's last report agrees.
 """
 
 from __future__ import annotations
@@ -14,11 +15,15 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, Listener, Reply, Subscription
+from backbone.bus.interface import Answer, Clock, LifeListener, Listener, Reply, Subscription
 from backbone.bus.local_bus import LocalNetwork, Neighbor
-from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session
+from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session, watch_links
 from backbone.keys import Conversation
-from backbone.wire import Message
+from backbone.wire import Accepts, Message
+
+AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
+
+AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
 
 
 class SharedSession:
@@ -33,6 +38,7 @@ class SharedSession:
 
     def __init__(self, mission: str, endpoint: str, secret: str = "") -> None:
         self._session = open_session(client_config(endpoint, secret))
+        self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
 
     def join(self, source: str, clock: Clock) -> SharedBus:
@@ -58,7 +64,7 @@ class SharedBus(Neighbor, ZenohBus):
             return await self.ask_neighbor(address, question, reply, within_s=within_s)
         return await super().ask(address, question, reply, within_s=within_s)
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
+    def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address; see ``Bus.serve``."""
         elsewhere = super().serve(address, accepts, answer)
         return _Both(self.serve_neighbors(address, accepts, answer), elsewhere)
@@ -69,7 +75,7 @@ class SharedBus(Neighbor, ZenohBus):
             self.publish_to_neighbors(address, conversation, self.send(address, conversation, message))
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Subscription:
         """Subscribe to publications; see ``Bus.subscribe``."""
         elsewhere = super().subscribe(address, conversation, accepts, listener, latest=latest)
@@ -82,7 +88,7 @@ class SharedBus(Neighbor, ZenohBus):
 
     def watch_alive(self, address: str, listener: LifeListener) -> Subscription:
         """Watch liveliness tokens; see ``Bus.watch_alive``."""
-        watch = _Watch(self, listener)
+        watch = _Watch(self, self._clock, listener)
         elsewhere = super().watch_alive(address, watch.elsewhere_changed)
         return _Both(_Both(elsewhere, self.watch_neighbors(address, watch.here_changed)), watch)
 
@@ -95,9 +101,10 @@ class SharedBus(Neighbor, ZenohBus):
 class _Watch:
     """One watch over tokens of neighbors and of other processes."""
 
-    def __init__(self, bus: SharedBus, listener: LifeListener) -> None:
-        self._bus, self._listener = bus, listener
+    def __init__(self, bus: SharedBus, clock: Clock, listener: LifeListener) -> None:
+        self._bus, self._clock, self._listener = bus, clock, listener
         self._stands: set[str] = set()
+        self._reported: set[str] = set()
         self._checks: dict[str, asyncio.Task[None]] = {}
         self._stale: set[str] = set()
 
@@ -114,6 +121,7 @@ class _Watch:
 
     def elsewhere_changed(self, address: str, stands: bool) -> None:
         """Record a report of the session."""
+        (self._reported.add if stands else self._reported.discard)(address)
         if address not in self._bus.network.tokens:
             self._notify(address, stands)
         elif not self._bus.network.tokens[address]:
@@ -133,11 +141,15 @@ class _Watch:
             self._checks[address] = self._bus.start(self._ask_hub(address))
 
     async def _ask_hub(self, address: str) -> None:
-        stands, is_stale = False, True
-        while is_stale:
+        pauses_s = iter(AGAIN_AFTER_S)
+        while True:
             self._stale.discard(address)
             stands = await self._bus.stands(address)
-            is_stale = address in self._stale
+            if address in self._stale:
+                continue
+            if stands or address not in self._reported or (pause_s := next(pauses_s, None)) is None:
+                break
+            await self._clock.sleep_s(pause_s)
         del self._checks[address]
         self._notify(address, stands)
 

@@ -1,11 +1,11 @@
 """The bus between processes, over Eclipse Zenoh. The only file that imports zenoh.
 
 Zenoh's threads never run component code: they put arrivals into an inbox and wake the event loop once for a whole
-burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one; subscribers and
-queryables keep their one indirect thread.
+burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one, and so are those about
+tokens; other subscribers and queryables keep their one indirect thread.
 
-Measured settings: clients of one hub, no scouting, lease 2 s, ``express`` on questions and replies only, blocking for
-messages that are sent once, dropping for repeated messages (docs/decisions/0003-zenoh-settings.md).
+Measured: ``express`` on questions and replies only, blocking for messages that are sent once, dropping for repeated
+messages (docs/decisions/0003-zenoh-settings.md).
 """
 
 from __future__ import annotations
@@ -16,26 +16,19 @@ import logging
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import zenoh
 
-from backbone.authentication import USER
 from backbone.bus.bus_base import BusBase
-from backbone.bus.interface import (
-    Accepted,
-    Answer,
-    Clock,
-    LifeListener,
-    LinkListener,
-    Listener,
-    Reply,
-    Subscription,
-)
+from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
+from backbone.bus.sockets import close_without_waiting
+from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.waiting import settle
 from backbone.wire import (
+    Accepts,
     Envelope,
     MalformedMessage,
     Message,
@@ -47,11 +40,8 @@ from backbone.wire import (
 )
 
 log = logging.getLogger(__name__)
+T = TypeVar("T")
 
-LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses its own link
-RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
-OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine is there within this
-WAIT_BEFORE_CLOSE_US = 1_000_000  # chosen: the longest time for which a hung consumer may block a sender
 _TIMEOUT_PAYLOAD = b"Timeout"
 
 # Priority, and congestion control for a full queue. Never express: without batching a queue holds two messages and
@@ -73,64 +63,18 @@ _QUALITY = {
 }
 
 
-def _transport() -> dict[str, Any]:
-    return {
-        "unicast": {"open_timeout": 2000, "accept_timeout": 2000},
-        "link": {
-            "tx": {
-                "lease": LINK_LEASE_MS,
-                "keep_alive": 4,
-                "queue": {"congestion_control": {"block": {"wait_before_close": WAIT_BEFORE_CLOSE_US}}},
-            }
-        },
-        "shared_memory": {"enabled": False},
-    }
-
-
-def _config(settings: dict[str, Any], auth: dict[str, Any]) -> zenoh.Config:
-    quiet = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
-    transport = {**_transport(), "auth": auth}
-    return zenoh.Config.from_json5(json.dumps({"scouting": quiet, "transport": transport, **settings}))
-
-
-_RETRY = {"period_init_ms": RETRY_FIRST_MS, "period_max_ms": RETRY_MOST_MS, "period_increase_factor": RETRY_FACTOR}
-
-
 def client_config(endpoint: str, secret: str = "") -> zenoh.Config:
-    """Return the settings of a client of the hub at ``endpoint``.
-
-    Args:
-        secret: Secret that the client proves without sending it; empty: the hub asks for none.
-    """
-    auth = {"usrpwd": {"user": USER, "password": secret}} if secret else {}
-    return _config(
-        {
-            "mode": "client",
-            "connect": {
-                "endpoints": [endpoint],
-                "timeout_ms": OPEN_TIMEOUT_MS,
-                "exit_on_failure": True,
-                "retry": _RETRY,
-            },
-        },
-        auth,
-    )
+    """Return the configuration of a client; see ``client_settings``."""
+    return _config(client_settings(endpoint, secret))
 
 
 def hub_config(listen: list[str], connect: list[str] | None = None, *, dictionary_file: str = "") -> zenoh.Config:
-    """Return the settings of a hub that listens at some endpoints and joins the hubs at others.
+    """Return the configuration of a hub; see ``hub_settings``."""
+    return _config(hub_settings(listen, connect or [], dictionary_file))
 
-    Args:
-        dictionary_file: Users and secrets of its clients; empty: it authenticates no client.
-    """
-    settings: dict[str, Any] = {
-        "mode": "router",
-        "listen": {"endpoints": listen, "exit_on_failure": True},
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-    }
-    if connect:
-        settings["connect"] = {"endpoints": connect, "timeout_ms": -1, "exit_on_failure": False, "retry": _RETRY}
-    return _config(settings, {"usrpwd": {"dictionary_file": dictionary_file}} if dictionary_file else {})
+
+def _config(settings: dict[str, object]) -> zenoh.Config:
+    return zenoh.Config.from_json5(json.dumps(settings))
 
 
 def _is_hub(config: zenoh.Config) -> bool:
@@ -154,6 +98,16 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
         return zenoh.open(config)
     except zenoh.ZError as error:
         raise _unreachable(config, error) from error
+
+
+def watch_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None]:
+    """Keep the close of this session's TCP links from blocking, while the result is kept."""
+
+    def changed(event: zenoh.LinkEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT and event.link.src.startswith("tcp/"):
+            close_without_waiting()
+
+    return session.info.declare_link_events_listener(zenoh.handlers.Callback(changed, indirect=False), history=True)
 
 
 async def close_session(session: zenoh.Session) -> None:
@@ -183,6 +137,7 @@ class ZenohBus(BusBase):
         super().__init__(mission, source, clock)
         self._loop = asyncio.get_running_loop()
         self._session, self._is_hub, self._shared = session, is_hub, shared
+        self._links = None if shared else watch_links(session)
         self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
         self._woken = False
         self._declared: set[_Declared] = set()
@@ -265,7 +220,7 @@ class ZenohBus(BusBase):
             raise body.revive()
         return cast("Reply", body)
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
+    def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
         reader = _reader(accepts)
@@ -276,7 +231,7 @@ class ZenohBus(BusBase):
 
         return self._declare(self._session.declare_queryable(own, lambda query: self.push(arrived, query)))
 
-    async def _answer(self, reader: Reader[Any], answer: Answer, own: str, query: zenoh.Query) -> None:
+    async def _answer(self, reader: Reader[Message], answer: Answer, own: str, query: zenoh.Query) -> None:
         try:
             question = reader.read(_bytes_of(query.payload))
             envelope = await self.reply_to(question, answer)
@@ -292,7 +247,7 @@ class ZenohBus(BusBase):
         finally:
             query.drop()  # type: ignore[no-untyped-call]
 
-    def _write_reply(self, envelope: Any) -> bytes:
+    def _write_reply(self, envelope: Envelope[Message]) -> bytes:
         try:
             return write(envelope)
         except OversizedMessage as refusal:
@@ -304,7 +259,7 @@ class ZenohBus(BusBase):
         if not self.closed:
             self.send(address, conversation, message)
 
-    def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Any]:
+    def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Message]:
         """Publish over the session and return the envelope."""
         publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
         self._publishers.move_to_end((address, conversation))
@@ -327,7 +282,7 @@ class ZenohBus(BusBase):
         return publisher
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Subscription:
         """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
@@ -368,12 +323,12 @@ class ZenohBus(BusBase):
         def changed(sample: zenoh.Sample) -> None:
             self.call("", listener, address_of(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
 
+        def heard(sample: zenoh.Sample) -> None:
+            self.push(changed, sample)
+
         pattern = key(self._mission, address, Conversation.ALIVE)
-        return self._declare(
-            self._session.liveliness().declare_subscriber(
-                pattern, lambda sample: self.push(changed, sample), history=True
-            )
-        )
+        at_once = zenoh.handlers.Callback(heard, indirect=False)
+        return self._declare(self._session.liveliness().declare_subscriber(pattern, at_once, history=True))
 
     def watch_link(self, listener: LinkListener) -> _Declared:
         """Report the loss and return of this session's link; see ``Bus.watch_link``.
@@ -415,7 +370,7 @@ class ZenohBus(BusBase):
         self._publishers.clear()
 
     # ------------------------------------------------------------------ from zenoh's threads into the loop
-    def push(self, act: Callable[[Any], None], what: Any) -> None:
+    def push(self, act: Callable[[T], None], what: T) -> None:
         """Make the loop call ``act(what)``; called from zenoh's threads."""
         self._inbox.append((act, what))
         if not self._woken:
@@ -466,7 +421,7 @@ class _Arrived:
 
     __slots__ = ("_answered", "_bus", "_replied")
 
-    def __init__(self, bus: ZenohBus, answered: asyncio.Future[Any]) -> None:
+    def __init__(self, bus: ZenohBus, answered: asyncio.Future[zenoh.Reply | None]) -> None:
         self._bus, self._answered, self._replied = bus, answered, False
 
     def reply(self, got: zenoh.Reply) -> None:
@@ -484,7 +439,7 @@ class _Arrived:
 class _Each:
     """Receives every sample of a subscriber, in order."""
 
-    def __init__(self, bus: ZenohBus, reader: Reader[Any], listener: Listener) -> None:
+    def __init__(self, bus: ZenohBus, reader: Reader[Message], listener: Listener) -> None:
         self._bus, self._reader, self._listener = bus, reader, listener
 
     def __call__(self, sample: zenoh.Sample) -> None:
@@ -507,7 +462,7 @@ class _Latest(_Each):
     before it reads the flag, and the loop clears the flag before it takes samples out.
     """
 
-    def __init__(self, bus: ZenohBus, reader: Reader[Any], listener: Listener) -> None:
+    def __init__(self, bus: ZenohBus, reader: Reader[Message], listener: Listener) -> None:
         super().__init__(bus, reader, listener)
         self._newest: dict[str, zenoh.Sample] = {}
         self._pushed = False
@@ -537,18 +492,18 @@ def _bytes_of(payload: zenoh.ZBytes | None) -> bytes:
     return payload.to_bytes()
 
 
-_readers: dict[Any, Reader[Any]] = {}
-_reply_readers: dict[type[Any], Reader[Any]] = {}
+_readers: dict[Accepts, Reader[Message]] = {}
+_reply_readers: dict[type[Message], Reader[Message]] = {}
 
 
-def _reader(accepts: Accepted) -> Reader[Any]:
+def _reader(accepts: Accepts) -> Reader[Message]:
     reader = _readers.get(accepts)
     if reader is None:
         reader = _readers[accepts] = Reader(accepts)
     return reader
 
 
-def _reply_reader(reply: type[Any]) -> Reader[Any]:
+def _reply_reader(reply: type[Message]) -> Reader[Message]:
     reader = _reply_readers.get(reply)
     if reader is None:
         reader = _reply_readers[reply] = Reader(reply | Refused)

@@ -12,13 +12,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import types
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar, cast
+from typing import ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
+from backbone.addresses import NAMESERVER
 from backbone.authentication import secret_of
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -36,7 +36,10 @@ from backbone.component.messages import (
     LifeState,
     LogLevel,
     MissionTime,
+    NameTaken,
     Parameters,
+    Register,
+    Registered,
     SetParameter,
     StandingStop,
     Statistics,
@@ -47,11 +50,9 @@ from backbone.component.messages import (
 from backbone.component.story import StoryBook
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
-from backbone.nameserver.messages import NameTaken, Register, Registered
 from backbone.naming import claim_address
 from backbone.spoken import value_text
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
 
@@ -80,10 +81,10 @@ class WrongParameter(Refusal):
     remedy = "Ask the component for its parameters; use one of those names with a value of its type."
 
 
-P = TypeVar("P", bound=msgspec.Struct)
+P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
 
 
-class Component(Generic[P]):
+class Component(Generic[P_co]):
     """Base of every component; derive, set the class variables, override the hooks you need.
 
     Args:
@@ -96,7 +97,7 @@ class Component(Generic[P]):
     parameters_type: ClassVar[type[msgspec.Struct]] = NoParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset()
     """Parameters that a mission file sets by other elements and attributes, not by <parameter>."""
-    accepts: ClassVar[types.UnionType | type[Any] | None] = None
+    accepts: ClassVar[Accepts | None] = None
     """Its own questions, besides the common ones: a message class or a union of them."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
@@ -125,7 +126,7 @@ class Component(Generic[P]):
         self.launch, self.bus, self.clock = launch, bus, clock
         self.pid = os.getpid()
         """Pid of its process. A simulation, where many components share one process, sets other numbers."""
-        self.parameters: P = cast(P, _convert(launch.parameters, self.parameters_type))
+        self.parameters: P_co = cast(P_co, _convert(launch.parameters, self.parameters_type))
         self.story = StoryBook(launch.address, clock)
         self.feedback = ""
         self._state, self._since_s = LifeState.CONNECTING, clock.now_s()
@@ -151,7 +152,7 @@ class Component(Generic[P]):
         answer questions until it is stopped or calls ``end``.
         """
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Return the reply to one of the questions in ``accepts``, or raise a ``Refusal``.
 
         When: at any time between readiness and stop, also while draining, several at once. Not: wait for the requester.
@@ -214,7 +215,7 @@ class Component(Generic[P]):
         """Present state of the component's life cycle."""
         return self._state
 
-    def start_task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
+    def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         """Run the coroutine beside ``serve``, until the component ends; its bug is the component's bug.
 
         If the component is ending, the returned task is cancelled at once.
@@ -379,7 +380,7 @@ class Component(Generic[P]):
             self._group = None  # the group is ending and must get no new tasks
             self.fail(bug)
 
-    async def _unless_ended(self, work: Coroutine[Any, Any, None], name: str) -> bool:
+    async def _unless_ended(self, work: Coroutine[object, None, None], name: str) -> bool:
         """Run the work unless the component must end first; return whether the work was finished."""
         if self._end.is_set():
             work.close()
@@ -409,7 +410,7 @@ class Component(Generic[P]):
     def _publish_state(self) -> None:
         self.bus.publish(self.address, Conversation.STATUS, self.component_state())
 
-    async def _answer(self, asked: Envelope[Any]) -> Message:
+    async def _answer(self, asked: Envelope[Message]) -> Message:
         match asked.body:
             case AskState():
                 return self.component_state()
@@ -434,11 +435,11 @@ class Component(Generic[P]):
             case _:
                 return await self.answer(asked)
 
-    def _set_parameter(self, name: str, value: Any, user: str) -> Parameters:
+    def _set_parameter(self, name: str, value: object, user: str) -> Parameters:
         old = msgspec.to_builtins(self.parameters)
         if name not in old:
             raise WrongParameter(f"{self.name} has no parameter {name!r}; it has: {', '.join(sorted(old)) or 'none'}")
-        before, self.parameters = self.parameters, cast(P, _convert({**old, name: value}, self.parameters_type))
+        before, self.parameters = self.parameters, cast(P_co, _convert({**old, name: value}, self.parameters_type))
         try:
             self.parameters_changed()
         except Refusal:
@@ -448,11 +449,15 @@ class Component(Generic[P]):
         return Parameters(msgspec.to_builtins(self.parameters))
 
 
+AnyComponent = Component[msgspec.Struct]
+"""A component whose kind of parameters does not matter."""
+
+
 def _complaint(bug: BaseException) -> str:
     return f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]
 
 
-def _convert(values: dict[str, Any], kind: type[msgspec.Struct]) -> msgspec.Struct:
+def _convert(values: dict[str, object], kind: type[msgspec.Struct]) -> msgspec.Struct:
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from backbone.atomic_file import is_at, write_all
 from backbone.component.repeats import Repeats
-from backbone.printable import printable_lines
+from backbone.printable_text import printable_lines
 
 LOG_BYTES = 1 << 20  # chosen: a day of an honest component; with the one before it, two
 LINE_BYTES = 8192  # chosen: a long traceback; a longer line quotes a hostile message

@@ -1,10 +1,12 @@
-"""Common messages: the questions that every component answers, and its status."""
+"""Common messages: the questions that every component answers, its status, and its registration."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from typing import Annotated, Any
 
+from backbone.component.log_level import LogLevel as LogLevel  # noqa: PLC0414  a part of these messages
+from backbone.errors import Refusal
 from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
@@ -87,6 +89,27 @@ class ComponentState(Message, frozen=True):
     user: Mention = ""
 
 
+class Register(Message, frozen=True):
+    """Register a name at the nameserver. The component shell asks this before its readiness.
+
+    Attributes:
+        component: The component; its state is CONNECTING.
+    """
+
+    component: ComponentState
+
+
+class Registered(Message, frozen=True):
+    """Answer to ``Register``: the component holds the name until its liveliness token falls."""
+
+
+class NameTaken(Refusal):
+    """A living component has this name."""
+
+    code = "nameserver.taken"
+    remedy = "It runs already: see 'scout-backbone status'. Stop it first, or give the new one a name of its own."
+
+
 class AskTime(Message, frozen=True):
     """Ask for the mission's time."""
 
@@ -142,15 +165,6 @@ class AskStory(Message, frozen=True):
     """
 
     subject: Mention = ""
-
-
-class LogLevel(StrEnum):
-    """Importance of an event, most important first."""
-
-    ALARM = "alarm"  # a robot may act wrongly, or not at all
-    WARNING = "warning"  # the mission continues, degraded
-    NOTICE = "notice"  # an action or finding of a person or behavior
-    INFO = "info"
 
 
 class StoryEvent(Message, frozen=True):

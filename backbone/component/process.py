@@ -9,13 +9,12 @@ import logging
 import re
 import signal
 from collections.abc import Callable, Coroutine, Iterable
-from typing import Any
 
 import uvloop
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
-from backbone.component.component import Component
+from backbone.component.component import AnyComponent, Component
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
@@ -34,7 +33,7 @@ class WrongClassPath(Refusal):
     remedy = "Write the class as package.module:Class, importable on the component's host."
 
 
-def load_class(class_path: str) -> type[Component[Any]]:
+def load_class(class_path: str) -> type[AnyComponent]:
     """Return the component class at ``package.module:Class``.
 
     Raises:
@@ -53,7 +52,7 @@ def load_class(class_path: str) -> type[Component[Any]]:
 def run_process(launch: Launch) -> int:
     """Run the component of this launch and return the process's exit code."""
 
-    def begin() -> Coroutine[Any, Any, None]:
+    def begin() -> Coroutine[object, None, None]:
         component_class = load_class(launch.class_path)
         component_class.before_bus(launch)
         return _live(component_class, launch)
@@ -61,7 +60,7 @@ def run_process(launch: Launch) -> int:
     return run_to_end(launch, begin)
 
 
-def run_to_end(launch: Launch, begin: Callable[[], Coroutine[Any, Any, None]]) -> int:
+def run_to_end(launch: Launch, begin: Callable[[], Coroutine[object, None, None]]) -> int:
     """Run the coroutine of ``begin`` in an event loop of this process and return the process's exit code.
 
     Args:
@@ -117,7 +116,7 @@ def refusal_in_log(lines: Iterable[str], address: str) -> Refusal | None:
     return refusal
 
 
-async def _live(component_class: type[Component[Any]], launch: Launch) -> None:
+async def _live(component_class: type[AnyComponent], launch: Launch) -> None:
     clock = MissionClock(launch.clock_origin_monotonic_s, launch.clock_rate)
     bus = component_class.open_bus(launch, clock)
     try:
@@ -132,7 +131,7 @@ async def _live(component_class: type[Component[Any]], launch: Launch) -> None:
 
 
 async def run_with_heartbeat(
-    launch: Launch, clock: Clock, life: Coroutine[Any, Any, None], doing: Callable[[], str] = str
+    launch: Launch, clock: Clock, life: Coroutine[object, None, None], doing: Callable[[], str] = str
 ) -> None:
     """Run this coroutine and the process's heartbeat beside it."""
     heartbeat = Heartbeat(launch.run_directory, doing)

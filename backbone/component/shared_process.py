@@ -15,13 +15,12 @@ import signal
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.shared_bus import SharedSession
-from backbone.component.component import Component
+from backbone.component.component import AnyComponent, Component
 from backbone.component.launch import Launch
 from backbone.component.membership import (
     AlreadyMember,
@@ -40,7 +39,7 @@ from backbone.component.membership import (
 )
 from backbone.component.process import exit_code_of, load_class, run_to_end, run_with_heartbeat
 from backbone.waiting import end_tasks
-from backbone.wire import Envelope, Message
+from backbone.wire import Envelope, Message, UnknownMessage
 
 
 @dataclass
@@ -54,7 +53,7 @@ class _Member:
     """
 
     launch: Launch
-    component: Component[Any] | None = None
+    component: AnyComponent | None = None
     ended: asyncio.Future[int] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
     end_reason: str = ""
     asked: asyncio.Future[int] | None = None
@@ -121,17 +120,16 @@ class SharedProcess:
         """End all members in good order; then ``run`` returns."""
         self._end.set()
 
-    def members(self) -> dict[str, Component[Any]]:
+    def members(self) -> dict[str, AnyComponent]:
         """Return the present members, by name."""
         living = [self._members[life] for life in self._lives]
         return {member.launch.name: member.component for member in living if member.component is not None}
 
     # ------------------------------------------------------------------ questions
-    async def _answer(self, asked: Envelope[Any]) -> Message:
+    async def _answer(self, asked: Envelope[Message]) -> Message:
         if asked.source != self._launch.requester:
             raise NotItsCreator(f"{asked.source} asked {self.address} for {type(asked.body).__name__}")
-        question: BeginMember | AwaitEnd | EndMember = asked.body
-        match question:
+        match asked.body:
             case BeginMember(launch=launch, life=life):
                 self._admit(launch, life)
                 return MemberBegun()
@@ -140,6 +138,8 @@ class SharedProcess:
             case EndMember(life=life):
                 self._member(life).end(f"ordered by {asked.source}")
                 return MemberEnding()
+            case _:
+                raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 
     def _member(self, life: int) -> _Member:
         member = self._members.get(life)
@@ -206,7 +206,7 @@ async def _live(launch: Launch) -> None:
         await session.close()
 
 
-async def _load(class_path: str) -> type[Component[Any]]:
+async def _load(class_path: str) -> type[AnyComponent]:
     """Import and return the class without blocking the other members.
 
     Raises:

@@ -10,8 +10,6 @@ from backbone.naming import Subsystem
 from backbone.ranges import FEW, MANY, Count, Line, Mention
 from backbone.wire import Message
 
-ADDRESS = "backbone/component_database"
-
 
 class Multiplicity(StrEnum):
     """Number of components of a type that may run at the same time (RAM 2002, "Backbone")."""

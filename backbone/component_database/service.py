@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
@@ -21,7 +20,6 @@ from backbone.component_database.messages import (
     Types,
 )
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import RECONNECT_S, Components, ListComponents
 from backbone.wire import Envelope, Message
 
@@ -53,7 +51,7 @@ class ComponentDatabase(Component[ComponentDatabaseParameters]):
         """Use the new types from now on."""
         self._catalogue = Catalogue(self.parameters.types)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Admit`` and ``ListTypes``."""
         match asked.body:
             case Admit(type=type_name, name=name):

@@ -10,32 +10,18 @@ import asyncio
 import logging
 import math
 import os
-import signal
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
-from typing import Any, Protocol, assert_never
+from typing import Any, assert_never
 
 import msgspec
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
-from backbone.component.asking import ask_until_answered
-from backbone.component.heartbeat import Vitals, forget_heartbeat, read_vitals
+from backbone.component.heartbeat import forget_heartbeat, read_vitals
 from backbone.component.launch import Launch
-from backbone.component.logs import log_path
-from backbone.component.membership import (
-    PROCESSES,
-    AwaitEnd,
-    BeginMember,
-    EndMember,
-    MemberBegun,
-    MemberEnded,
-    MemberEnding,
-    process_address,
-    read_process_address,
-)
+from backbone.component.membership import PROCESSES, read_process_address
 from backbone.component.messages import Absence, Stop, Stopping
-from backbone.component.process import EXIT_REFUSED, refusal_in_log
 from backbone.creator.decisions import (
     AskToStop,
     ForkComponent,
@@ -49,6 +35,7 @@ from backbone.creator.decisions import (
     SendSignal,
     SupervisionWakesAt,
 )
+from backbone.creator.failed_starts import log_of, start_failed
 from backbone.creator.messages import (
     READY_WITHIN_S,
     EndProcess,
@@ -60,55 +47,19 @@ from backbone.creator.messages import (
     Spawn,
     StartFailed,
 )
-from backbone.creator.shared_processes import (
-    AdmitMember,
-    EndMemberAlone,
-    ForkProcess,
-    MemberGone,
-    MemberNotStarted,
-    MemberRuns,
-    ProcessesWakeAt,
-    ProcessInstruction,
-    SharedProcesses,
-    SignalProcess,
-)
-from backbone.creator.silence import LOOK_EVERY_S, Silence
-from backbone.creator.supervision import Phase, Supervision, describe
-from backbone.creator.zygote import NoProcess
-from backbone.errors import BackboneError, Refusal, code_of
-from backbone.naming import IllegalName, Subsystem, component_of
+from backbone.creator.shared_process_keeper import SharedProcessKeeper
+from backbone.creator.signs_of_life import ReadVitals, SignsOfLife
+from backbone.creator.silence import LOOK_EVERY_S
+from backbone.creator.supervision import Phase, Supervision
+from backbone.creator.zygote import Forks, NoProcess
+from backbone.errors import BackboneError
+from backbone.naming import IllegalName, component_of
 from backbone.waiting import settle
 
 log = logging.getLogger(__name__)
 
-LAST_LINES = 20
-_LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
 OVERLAP_S = 0.3  # chosen: ten times what an obeying component takes; a slower one delays no other
-ADMIT_EACH_S = 1.0  # chosen: a thousand times what an answer takes
-AWAIT_EACH_S = 60.0  # chosen: the question stays open until the member ends; it is repeated in case its answer was lost
 _DEFAULTS = EndProcess("")
-
-
-class Forks(Protocol):
-    """What a keeper needs of a zygote; see ``Zygote``."""
-
-    on_exit: Callable[[int, int], None]
-    on_lost: Callable[[], None]
-
-    async def fork(self, launch: Launch) -> int:
-        """Start the component and return its pid, or raise ``NoProcess``."""
-
-    def kill(self, pid: int, number: signal.Signals) -> None:
-        """Send the signal to the component's process tree."""
-
-    def keep_running(self) -> str:
-        """Continue the zygote if it was stopped; return what was wrong, empty: nothing."""
-
-    async def close(self) -> None:
-        """End the zygote and everything it forked."""
-
-
-ReadVitals = Callable[[str, int], Vitals | None]
 
 
 class ProcessKeeper:
@@ -136,20 +87,25 @@ class ProcessKeeper:
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
         self._zygote, self._clock = zygote, clock or MissionClock.started_now()
         self._bus: Bus | None = None
-        self._supervision, self._shared = Supervision(), SharedProcesses()
+        self._supervision = Supervision()
+        self._shared = SharedProcessKeeper(
+            zygote,
+            self._clock,
+            self._supervision,
+            launch_of=lambda name: self._kept[name].launch,
+            report=self._carry_out,
+            task=self._task,
+        )
         self._kept: dict[str, _Kept] = {}
         self._failures: dict[str, StartFailed] = {}
         self._starting: dict[str, list[asyncio.Future[int]]] = {}
         self._ending: dict[str, list[asyncio.Future[ProcessEnded]]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
-        self._read_vitals, self._silences = read_vitals, dict[int, Silence]()
-        self._doing: dict[int, str] = {}
+        self._signs = SignsOfLife(read_vitals)
         self._zygote_trouble, self._zygote_trouble_since_s = "", 0.0
         self._looking: asyncio.Task[None] | None = None
         self._alarm: asyncio.Task[None] | None = None
         self._alarm_s = math.inf
-        self._shared_alarm: asyncio.Task[None] | None = None
-        self._talks: dict[int, set[asyncio.Task[None]]] = {}
         self._is_closing = False
         self._lives, self._pid = 0, pid or os.getpid()
         zygote.on_exit = self._exited
@@ -157,6 +113,7 @@ class ProcessKeeper:
     def use(self, bus: Bus) -> None:
         """From now on learn readiness and ask processes to stop over this bus."""
         self._bus = bus
+        self._shared.use(bus)
         bus.watch_alive("*/*", self._token_changed)
         bus.watch_alive(PROCESSES, self._process_token_changed)
 
@@ -200,14 +157,14 @@ class ProcessKeeper:
         if one is None:
             raise self._failures.get(name) or NotHere(f"no {name} here", name=name)
         if one.end is not None:
-            raise self._start_failed(name, f"is {one.phase}; {one.last_end}")
+            raise self._failed(name, f"is {one.phase}; {one.last_end}")
         if one.phase is Phase.READY:
             return one.pid
         try:
             async with asyncio.timeout(within_s):
                 return await self._readiness(name)
         except TimeoutError:
-            raise self._start_failed(name, f"was not ready within {within_s:g} s") from None
+            raise self._failed(name, f"was not ready within {within_s:g} s") from None
 
     # End
     async def end(
@@ -268,7 +225,7 @@ class ProcessKeeper:
                 one.restarts,
                 one.last_end,
                 one.silent_s,
-                "" if one.phase is Phase.READY else self._doing.get(one.pid, ""),
+                "" if one.phase is Phase.READY else self._signs.doing(one.pid),
             )
             for one in self._supervision
         ]
@@ -324,39 +281,34 @@ class ProcessKeeper:
             log.info("ignored: %s", illegal.detail)
             return
         if stands and any((k.launch.host, k.launch.process) == (host, process) for k in self._kept.values()):
-            self._carry_out_shared(self._shared.serving(process, pid, self._now_s()))
+            self._shared.serving(process, pid)
 
     async def _look_for_life(self, run_directory: str) -> None:
         while True:
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
             now_s = self._now_s()
-            for pid in {one.pid for one in self._supervision if one.pid} | self._shared.pids():
-                if (vitals := self._read_vitals(run_directory, pid)) is not None:
-                    self._doing[pid] = vitals.doing
-                    silent_s = self._silences.setdefault(pid, Silence()).look(vitals, now_s)
-                    self._observed(pid, silent_s, now_s, beats=vitals.beats > 0)
+            pids = {one.pid for one in self._supervision if one.pid} | self._shared.pids()
+            for pid, silent_s, beats in self._signs.look(run_directory, pids, now_s):
+                self._observed(pid, silent_s, now_s, beats=beats)
             trouble = self._zygote.keep_running()
             if trouble != self._zygote_trouble:
                 self._zygote_trouble, self._zygote_trouble_since_s = trouble, now_s
                 self.on_changed()
 
     def _observed(self, pid: int, silent_s: float, now_s: float, *, beats: bool) -> None:
-        self._carry_out_shared(self._shared.observed(pid, silent_s, now_s))
+        self._shared.observed(pid, silent_s, now_s)
         for one in [one for one in self._supervision if one.pid == pid]:
             if beats or one.phase is not Phase.READY:  # a ready process without a beat could not create its file
                 self._carry_out(self._supervision.observed(one.name, silent_s, now_s))
 
     def _exited(self, pid: int, returncode: int) -> None:
-        self._silences.pop(pid, None)
-        self._doing.pop(pid, None)
+        self._signs.forget(pid)
         if self._kept:
             forget_heartbeat(next(iter(self._kept.values())).launch.run_directory, pid)
         if not self._shared.has(pid):
             self._carry_out(self._supervision.exited(pid, returncode, self._now_s()))
             return
-        for talk in self._talks.pop(pid, set()):
-            talk.cancel()
-        self._carry_out_shared(self._shared.exited(pid, returncode))
+        self._shared.exited(pid, returncode)
 
     async def _fork(self, launch: Launch, forked: asyncio.Future[int] | None) -> None:
         name = launch.name
@@ -370,44 +322,6 @@ class ProcessKeeper:
         if forked is not None and not forked.done():
             forked.set_result(pid)
         self._carry_out(self._supervision.forked(name, pid, self._now_s()))
-
-    async def _fork_process(self, process: str, member: Launch) -> None:
-        launch = msgspec.structs.replace(
-            member,
-            subsystem=Subsystem.BACKBONE,
-            name=process,
-            type="shared_process",
-            class_path="",
-            parameters={},
-            requester="" if self._bus is None else self._bus.source,
-        )
-        try:
-            pid = await self._zygote.fork(launch)
-        except NoProcess as error:
-            self._carry_out_shared(self._shared.fork_failed(process, str(error)))
-            return
-        self._carry_out_shared(self._shared.forked(process, pid, self._now_s()))
-
-    async def _share_life(self, bus: Bus, at: str, launch: Launch, life: int) -> None:
-        """Have the shared process admit the component, then wait for its end; cancelled when the process ends."""
-        try:
-            await ask_until_answered(
-                bus, self._clock, at, BeginMember(launch, life), MemberBegun, each_s=ADMIT_EACH_S, within_s=math.inf
-            )
-        except Refusal as refusal:
-            self._carry_out_shared(self._shared.refused(life, str(refusal), self._now_s()))
-            return
-        self._carry_out_shared(self._shared.admitted(life))
-        ended = await ask_until_answered(
-            bus, self._clock, at, AwaitEnd(life), MemberEnded, each_s=AWAIT_EACH_S, within_s=math.inf
-        )
-        self._carry_out_shared(self._shared.member_ended(life, ended.exit_code, self._now_s()))
-
-    async def _end_member(self, bus: Bus, at: str, life: int) -> None:
-        try:
-            await bus.ask(at, EndMember(life), MemberEnding, within_s=ADMIT_EACH_S)
-        except BackboneError as error:  # supervision's next step is to kill the process
-            log.info("%s did not accept the order to end a member: %s", at, error)
 
     async def _ask_to_stop(self, kept: _Kept, within_s: float) -> None:
         try:
@@ -423,10 +337,6 @@ class ProcessKeeper:
         await self._clock.sleep_until_s(at_s * self._clock.rate)
         self._carry_out(self._supervision.woken(self._now_s()))
 
-    async def _ring_shared(self, at_s: float) -> None:
-        await self._clock.sleep_until_s(at_s * self._clock.rate)
-        self._carry_out_shared(self._shared.woken(self._now_s()))
-
     # Instructions
     def _carry_out(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
         for instruction in instructions:
@@ -436,27 +346,27 @@ class ProcessKeeper:
                 case AskToStop(name=name, within_s=within_s):
                     self._task(self._ask_to_stop(self._kept[name], within_s), f"ask {name} to stop")
                 case SendSignal(name=name, number=number) if self._kept[name].launch.process:
-                    self._carry_out_shared(self._shared.signalled(name, number))
+                    self._shared.signalled(name, number)
                 case SendSignal(name=name, pid=pid, number=number):
                     log.info("%s to %s, pid %d", number.name, name, pid)
                     self._zygote.kill(pid, number)
                 case ReportReady(name=name, pid=pid):
                     _settle(self._starting.pop(name, []), pid)
                 case ReportStartFailed(name=name, how=how):
-                    failure, waiting = self._start_failed(name, how), self._starting.pop(name, [])
+                    failure, waiting = self._failed(name, how), self._starting.pop(name, [])
                     if not waiting:  # a hub's failure: raised at the next ``wait_ready``
                         self._failures[name] = failure
                     _settle(waiting, failure)
                 case ReportEnded(name=name, by=by, exit_code=exit_code):
-                    _settle(self._starting.pop(name, []), self._start_failed(name, "was ended"))
+                    _settle(self._starting.pop(name, []), self._failed(name, "was ended"))
                     _settle(self._ending.pop(name, []), ProcessEnded(name, by, exit_code))
                 case ReportLeft(name=name):
                     log.info("%s ended by itself in good order", name)
-                    _settle(self._starting.pop(name, []), self._start_failed(name, "ended by itself"))
+                    _settle(self._starting.pop(name, []), self._failed(name, "ended by itself"))
                 case ReportFell(name=name, how=how, restart_in_s=restart_in_s, failing=failing):
                     if restart_in_s < 0:
-                        _settle(self._starting.pop(name, []), self._start_failed(name, how))
-                    self.on_fell(ProcessFell(name, how, restart_in_s, self._last_lines(name), failing))
+                        _settle(self._starting.pop(name, []), self._failed(name, how))
+                    self.on_fell(ProcessFell(name, how, restart_in_s, log_of(self._launch_of(name)), failing))
                 case ReportSilent(name=name, silent_s=silent_s):
                     self.on_silent(name, silent_s)
                 case SupervisionWakesAt(at_s=at_s):
@@ -473,48 +383,9 @@ class ProcessKeeper:
         incarnation = f"{launch.host}.{self._pid}.{self._lives}"
         launch = kept.launch = msgspec.structs.replace(launch, incarnation=incarnation)
         if launch.process:
-            self._carry_out_shared(self._shared.wanted(launch.name, launch.process, self._now_s()))
+            self._shared.wanted(launch)
         else:
             self._task(self._fork(launch, forked), f"fork {launch.name}")
-
-    def _carry_out_shared(self, instructions: list[ProcessInstruction]) -> None:
-        for instruction in instructions:
-            match instruction:
-                case ForkProcess(process=process, name=name):
-                    self._task(self._fork_process(process, self._kept[name].launch), f"fork {process}")
-                case AdmitMember(process=process, pid=pid, name=name, life=life):
-                    launch = self._kept[name].launch
-                    at = process_address(launch.host, process, pid)
-                    self._talk(pid, self._share_life(self._required_bus(), at, launch, life), f"life of {name}")
-                case EndMemberAlone(process=process, pid=pid, name=name, life=life):
-                    at = process_address(self._kept[name].launch.host, process, pid)
-                    self._talk(pid, self._end_member(self._required_bus(), at, life), f"end {name}")
-                case SignalProcess(process=process, pid=pid, number=number):
-                    log.info("%s to shared process %s, pid %d", number.name, process, pid)
-                    self._zygote.kill(pid, number)
-                case MemberRuns(name=name, pid=pid):
-                    self._carry_out(self._supervision.forked(name, pid, self._now_s()))
-                case MemberNotStarted(name=name, why=why, returncode=returncode):
-                    self._carry_out(self._supervision.fork_failed(name, why, self._now_s(), returncode))
-                case MemberGone(name=name, returncode=returncode, how=how):
-                    self._carry_out(self._supervision.left(name, returncode, how, self._now_s()))
-                case ProcessesWakeAt(at_s=at_s):
-                    if self._shared_alarm is not None and self._shared_alarm is not asyncio.current_task():
-                        self._shared_alarm.cancel()
-                    self._shared_alarm = self._task(self._ring_shared(at_s), "shared processes' alarm")
-                case _:
-                    assert_never(instruction)
-
-    def _required_bus(self) -> Bus:
-        if self._bus is None:
-            raise RuntimeError("a shared process serves before there is a bus to hear of it")
-        return self._bus
-
-    def _talk(self, pid: int, work: Coroutine[Any, Any, None], name: str) -> None:
-        """Run work that is cancelled when its shared process ends."""
-        talks, talk = self._talks.setdefault(pid, set()), self._task(work, name)
-        talks.add(talk)
-        talk.add_done_callback(talks.discard)
 
     def _set_alarm(self, at_s: float) -> None:
         if self._alarm is not None and self._alarm is not asyncio.current_task():
@@ -524,7 +395,7 @@ class ProcessKeeper:
         self._alarm_s = at_s
         self._alarm = self._task(self._ring(at_s), "supervision's alarm")
 
-    def _task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
+    def _task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         task = asyncio.create_task(work, name=name)
         self._tasks.add(task)
         task.add_done_callback(self._task_done)
@@ -535,22 +406,15 @@ class ProcessKeeper:
         if not task.cancelled() and (bug := task.exception()) is not None:
             self.on_bug(bug)
 
+    def _failed(self, name: str, how: str) -> StartFailed:
+        return start_failed(name, how, self._launch_of(name))
+
+    def _launch_of(self, name: str) -> Launch | None:
+        kept = self._kept.get(name)
+        return kept.launch if kept is not None else None
+
     def _now_s(self) -> float:
         return self._clock.now_s() / self._clock.rate
-
-    def _start_failed(self, name: str, how: str) -> StartFailed:
-        lines, kept = self._last_lines(name), self._kept.get(name)
-        if kept is not None and how == describe(EXIT_REFUSED):  # the log ends with its refusal
-            refusal = refusal_in_log(lines, kept.launch.address)
-            if refusal is not None:
-                return StartFailed(refusal.detail, remedy=refusal.remedy, name=name, how=how, refused=code_of(refusal))
-        return StartFailed("\n".join([f"{name}: {how}", *lines]), name=name, how=how)
-
-    def _last_lines(self, name: str) -> list[str]:
-        kept = self._kept.get(name)
-        if kept is None or not kept.launch.run_directory:
-            return []
-        return last_lines(kept.launch.run_directory, kept.launch.process or name)
 
 
 @dataclass
@@ -560,16 +424,6 @@ class _Kept:
     launch: Launch
     order: Spawn
     end_reason: str = ""
-
-
-def last_lines(run_directory: str, name: str) -> list[str]:
-    """Return the end of a component's log, at most ``LAST_LINES`` lines; empty if there is none."""
-    try:
-        with log_path(run_directory, name).open("rb") as file:
-            file.seek(max(0, file.seek(0, os.SEEK_END) - _LAST_BYTES))
-            return file.read().decode(errors="replace").splitlines()[-LAST_LINES:]
-    except FileNotFoundError:
-        return []
 
 
 def _as_spawn(launch: Launch, policy: RestartPolicy, ready_within_s: float) -> Spawn:

@@ -168,7 +168,7 @@ async def wait_gone(pids: Collection[int]) -> None:
 
 
 def die_with_parent() -> None:
-    """Have the kernel send SIGKILL to this process when the thread that forked it ends."""
+    """Ask the kernel to send SIGKILL to this process when the thread that forked it ends."""
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 

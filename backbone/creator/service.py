@@ -8,11 +8,12 @@ Source: S000, "creator"; RAM 2002, "Backbone".
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 import psutil
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.heartbeat import read_vitals
@@ -33,11 +34,11 @@ from backbone.creator.messages import (
     Spawned,
     UnlistedType,
 )
-from backbone.creator.process_keeper import Forks, ProcessKeeper, ReadVitals
-from backbone.creator.zygote import Zygote
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.creator.signs_of_life import ReadVitals
+from backbone.creator.zygote import Forks, Zygote
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, legal
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.wire import Envelope, Message
 
 LONGEST_CLASS_PATH = 200  # chosen: as much of a refused class path as a person reads
@@ -114,7 +115,7 @@ class Creator(Component[CreatorParameters]):
             self._publish_load()
             await self.clock.sleep_s(LOAD_EACH_S * self.clock.rate)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Spawn`` and ``EndProcess`` of the placer, and ``ListProcesses`` of any component."""
         question: Message = asked.body
         match question:
@@ -197,7 +198,7 @@ class Creator(Component[CreatorParameters]):
         self.story.note(order.name, f"is ready, pid {pid}, ordered by {order.requester or PLACER}")
         return Spawned(launch.address, pid)
 
-    def _refuse_strangers(self, asked: Envelope[Any]) -> None:
+    def _refuse_strangers(self, asked: Envelope[Message]) -> None:
         if asked.source != PLACER:
             raise NotThePlacer(f"{asked.source} asked {self.address} for {type(asked.body).__name__}")
 

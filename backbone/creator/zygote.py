@@ -16,6 +16,7 @@ import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable
+from typing import Protocol
 
 import msgspec
 
@@ -47,6 +48,25 @@ _answer_decoder = msgspec.msgpack.Decoder(Answer)
 
 class NoProcess(BackboneError):
     """The component got no process: the system refused one, or the zygote was killed repeatedly."""
+
+
+class Forks(Protocol):
+    """What a keeper needs of a zygote; see ``Zygote``."""
+
+    on_exit: Callable[[int, int], None]
+    on_lost: Callable[[], None]
+
+    async def fork(self, launch: Launch) -> int:
+        """Start the component and return its pid, or raise ``NoProcess``."""
+
+    def kill(self, pid: int, number: signal.Signals) -> None:
+        """Send the signal to the component's process tree."""
+
+    def keep_running(self) -> str:
+        """Continue the zygote if it was stopped; return what was wrong, empty: nothing."""
+
+    async def close(self) -> None:
+        """End the zygote and everything it forked."""
 
 
 class Zygote:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from backbone.errors import Refusal
 from backbone.ranges import FEW, MANY, Duration, Mention, Share, Values
 from backbone.wire import Message
-
-ADDRESS = "backbone/dependency_database"
 
 
 class Resource(Message, frozen=True):
@@ -43,7 +41,7 @@ class Resource(Message, frozen=True):
     links: Annotated[dict[Mention, Annotated[list[Mention], MANY]], FEW] = {}
     process: Mention = ""
 
-    def rc_parameters(self) -> dict[str, Any]:
+    def rc_parameters(self) -> dict[str, object]:
         """Return the parameters of its RC's launch: driver, sharing and links, then its own."""
         common = {"driver": self.driver, "sharable": self.sharable, "capacity": self.capacity, "links": self.links}
         return {**common, **self.parameters}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
@@ -48,7 +46,7 @@ class DependencyDatabase(Component[DependencyDatabaseParameters]):
         """Use the new list of hardware from now on."""
         self._inventory = Inventory(self.parameters.resources)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``AskResources`` and ``FindRcs``."""
         match asked.body:
             case AskResources():

@@ -15,9 +15,11 @@ from backbone.errors import Refusal
 from backbone.placer.messages import Start
 
 if TYPE_CHECKING:
-    from backbone.mission.model import Behavior, MissionDescription
+    from backbone.mission.model import BehaviorDescription, MissionDescription
 
 PathStep = tuple[str, int]
+Node = Mapping[str, Any]
+"""A node of the behavior tree as plain data, with the nodes below it."""
 TREE_PARAMETERS = ("path", "arc", "children")
 
 
@@ -38,7 +40,7 @@ def behavior_orders(description: MissionDescription) -> list[Start]:
     return [behavior_order(_node(behavior), top) for behavior in description.behaviors]
 
 
-def behavior_order(node: Mapping[str, Any], parent_path: Sequence[PathStep]) -> Start:
+def behavior_order(node: Node, parent_path: Sequence[PathStep]) -> Start:
     """Return the order that starts one node of the tree.
 
     Args:
@@ -61,13 +63,13 @@ def behavior_order(node: Mapping[str, Any], parent_path: Sequence[PathStep]) -> 
     return Start(node["type"], node["name"], {**own, **tree}, process=node.get("process", ""))
 
 
-def _node(behavior: Behavior) -> dict[str, Any]:
+def _node(behavior: BehaviorDescription) -> Node:
     node = behavior.model_dump(mode="json")
     _refuse_reserved(node)
     return node
 
 
-def _refuse_reserved(node: Mapping[str, Any]) -> None:
+def _refuse_reserved(node: Node) -> None:
     for child in node["children"]:
         behavior_order(child, ())
         _refuse_reserved(child)

@@ -20,6 +20,10 @@ _PEOPLE = {"number": "a number", "integer": "a whole number", "string": "a text"
 _TYPES = {"number": float, "integer": int, "string": str, "boolean": bool, "null": None}
 
 
+ValueSchema = dict[str, Any]
+"""The JSON schema of the values of a parameter."""
+
+
 class ParameterFacts(msgspec.Struct, frozen=True):
     """A parameter of a class.
 
@@ -28,7 +32,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
     """
 
     name: str
-    schema: dict[str, Any] = {}
+    schema: ValueSchema = {}
     doc: str = ""
 
     @property
@@ -72,7 +76,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
     def _span(self) -> list[str]:
         return [f"{word} {self.schema[limit]:g}" for limit, word in _LIMITS.items() if limit in self.schema]
 
-    def accepts(self, value: Any) -> bool:
+    def accepts(self, value: object) -> bool:
         """Return whether the class starts with this value."""
         try:
             msgspec.convert(value, _value_type(self.schema))
@@ -132,7 +136,7 @@ def parameters_of(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
     )
 
 
-def _simple(one: Mapping[str, Any], definitions: Mapping[str, Any]) -> dict[str, Any]:
+def _simple(one: ValueSchema, definitions: ValueSchema) -> ValueSchema:
     """Return the part of a schema that a value in a mission file can meet: no objects, no lists."""
     if "$ref" in one:
         return _simple(definitions[one["$ref"]], definitions)
@@ -142,7 +146,7 @@ def _simple(one: Mapping[str, Any], definitions: Mapping[str, Any]) -> dict[str,
     return kept
 
 
-def _type_text(schema: Mapping[str, Any]) -> str:
+def _type_text(schema: ValueSchema) -> str:
     if "enum" in schema:
         return "one of " + ", ".join(map(str, schema["enum"]))
     if "anyOf" in schema:
@@ -150,7 +154,7 @@ def _type_text(schema: Mapping[str, Any]) -> str:
     return str(schema.get("type", "any"))
 
 
-def _value_type(schema: Mapping[str, Any]) -> Any:
+def _value_type(schema: ValueSchema) -> Any:
     """Return the type that msgspec accepts the same values for."""
     if "enum" in schema:
         return Literal[tuple(schema["enum"])]

@@ -1,6 +1,6 @@
 """What a mission has without saying so: a host, the core services, and the types that the project brings along.
 
-Whatever the file declares itself takes the place of it: a type of a shipped type's name replaces that type, because
+The file's own declarations come first: a type of a shipped type's name replaces that type, because
 missions name types by name alone, and a class of one's own under a known name is how hardware is exchanged.
 """
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
@@ -19,7 +18,13 @@ from backbone.mission.declaration.elements import (
 )
 from backbone.mission.declaration.parts import Declared, ParameterElement
 from backbone.mission.declaration.world_elements import AirElement, TargetElement, WorldElement
-from backbone.mission.model import ArcWish, Behavior, Component, CoreService, MissionDescription
+from backbone.mission.model import (
+    ArcWish,
+    BehaviorDescription,
+    ComponentDescription,
+    CoreServiceDescription,
+    MissionDescription,
+)
 from backbone.mission.room_files import room_text
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, parameter_value
 
@@ -29,14 +34,16 @@ def describe(mission: MissionElement, source: str) -> MissionDescription:
     hosts = () if mission.hosts is None else mission.hosts.host
     world = mission.world
     resources = () if mission.resources is None else mission.resources.resource
+    members = (*resources, *(() if world is None else (world,)))
+    host_of_process = {one.process: one.host for one in members if one.process and one.host}
     return MissionDescription(
         name=mission.name,
         priority=mission.priority,
         hosts=hosts,
         core=_core(mission, [host.name for host in hosts]),
         types=() if mission.types is None else tuple(map(_component_type, mission.types.type)),
-        resources=tuple(_resource(resource, world) for resource in resources),
-        components=() if world is None else (_world(world, resources, source),),
+        resources=tuple(_resource(resource, world, host_of_process) for resource in resources),
+        components=() if world is None else (_world(world, resources, source, host_of_process),),
         behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
         source=source,
     )
@@ -46,9 +53,11 @@ def _parameters(given: Iterable[ParameterElement]) -> dict[str, bool | int | flo
     return {one.name: parameter_value(one.value) for one in given}
 
 
-def _core(mission: MissionElement, hosts: Sequence[str]) -> tuple[CoreService, ...]:
+def _core(mission: MissionElement, hosts: Sequence[str]) -> tuple[CoreServiceDescription, ...]:
     written = () if mission.core is None else mission.core.service
-    services = [CoreService(type=one.type, host=one.host, parameters=_parameters(one.parameter)) for one in written]
+    services = [
+        CoreServiceDescription(type=one.type, host=one.host, parameters=_parameters(one.parameter)) for one in written
+    ]
     return tuple(sorted(services, key=lambda one: (CORE_SERVICES.index(one.type), hosts.index(one.host))))
 
 
@@ -65,22 +74,23 @@ def _component_type(declared: TypeElement) -> ComponentType:
     )
 
 
-def _resource(declared: ResourceElement, world: WorldElement | None) -> Resource:
+def _resource(declared: ResourceElement, world: WorldElement | None, host_of_process: Mapping[str, str]) -> Resource:
     links: dict[str, list[str]] = {}
     for used in declared.uses:
         links.setdefault(used.type, []).append(used.name)
     played_by = {WORLD: world.name} if world is not None and declared.driver == SIMULATED else {}
-    values = declared.model_dump(exclude={"uses", "parameter", "features"})
+    values = declared.model_dump(exclude={"uses", "parameter", "features", "host"})
     return Resource(
         **values,
+        host=declared.host or host_of_process.get(declared.process, ""),
         features=list(declared.features),
         parameters={**played_by, **_parameters(declared.parameter)},
         links=links,
     )
 
 
-def _behavior(declared: BehaviorElement) -> Behavior:
-    return Behavior(
+def _behavior(declared: BehaviorElement) -> BehaviorDescription:
+    return BehaviorDescription(
         **declared.model_dump(include=set(BehaviorAttributes.model_fields), exclude_defaults=True),
         parameters=_parameters(declared.parameter),
         arc=None if declared.arc is None else _arc(declared.arc),
@@ -97,18 +107,20 @@ def _arc(declared: ArcElement) -> ArcWish:
 
 
 # ---------------------------------------------------------------------- the world
-def _world(world: WorldElement, resources: Sequence[ResourceElement], source: str) -> Component:
+def _world(
+    world: WorldElement, resources: Sequence[ResourceElement], source: str, host_of_process: Mapping[str, str]
+) -> ComponentDescription:
     ids = {one.name: _parameters(one.parameter).get(NETWORK_ID) for one in resources}
-    return Component(
+    return ComponentDescription(
         type=world.type,
         name=world.name,
-        host=world.host,
+        host=world.host or host_of_process.get(world.process, ""),
         parameters={**_parameters(world.parameter), WORLD: _world_content(world, ids, source)},
         process=world.process,
     )
 
 
-def _world_content(world: WorldElement, ids: Mapping[str, Any], source: str) -> dict[str, Any]:
+def _world_content(world: WorldElement, ids: Mapping[str, object], source: str) -> dict[str, object]:
     """Return the world as plain data, with the field names of ``scout_model.description.WorldDescription``."""
     return {
         "width_m": world.room.width_m,
@@ -128,7 +140,7 @@ def _world_content(world: WorldElement, ids: Mapping[str, Any], source: str) -> 
     }
 
 
-def _body(declared: Declared, *left_out: str) -> dict[str, Any]:
+def _body(declared: Declared, *left_out: str) -> dict[str, object]:
     """Return the attributes of a body, its heading in radians."""
     values = declared.model_dump(exclude=set(left_out))
     if "heading_deg" in values:
@@ -136,5 +148,5 @@ def _body(declared: Declared, *left_out: str) -> dict[str, Any]:
     return values
 
 
-def _target(target: TargetElement) -> dict[str, Any]:
+def _target(target: TargetElement) -> dict[str, object]:
     return {**_body(target, "point"), "path": [[point.x_m, point.y_m] for point in target.point]}

@@ -12,8 +12,8 @@ import msgspec
 
 from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import SHIPPED
-from backbone.mission.declaration.reference import reference_text
 from backbone.mission.declaration.xsd import XSD, xsd_text
+from backbone.mission.reference import reference_text
 from backbone.mission.shipped_types import shipped_types
 
 REFERENCE = Path("docs/reference/mission-file.md")

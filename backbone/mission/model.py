@@ -10,14 +10,21 @@ from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.mission.declaration.elements import ArcAttributes, BehaviorAttributes, Host
 
-__all__ = ["ArcWish", "Behavior", "Component", "CoreService", "Host", "MissionDescription"]
+__all__ = [
+    "ArcWish",
+    "BehaviorDescription",
+    "ComponentDescription",
+    "CoreServiceDescription",
+    "Host",
+    "MissionDescription",
+]
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
 
-class CoreService(_Part):
+class CoreServiceDescription(_Part):
     """A core service and where it runs.
 
     Attributes:
@@ -29,7 +36,7 @@ class CoreService(_Part):
     parameters: dict[str, Any] = {}
 
 
-class Component(_Part):
+class ComponentDescription(_Part):
     """A component the mission starts at its beginning, besides RCs and behaviors (the simulated world).
 
     Attributes:
@@ -57,7 +64,7 @@ class ArcWish(ArcAttributes):
     features: dict[str, tuple[str, ...]] = {}
 
 
-class Behavior(BehaviorAttributes):
+class BehaviorDescription(BehaviorAttributes):
     """A node of the behavior tree.
 
     Attributes:
@@ -68,7 +75,7 @@ class Behavior(BehaviorAttributes):
 
     parameters: dict[str, Any] = {}
     arc: ArcWish | None = None
-    children: tuple[Behavior, ...] = ()
+    children: tuple[BehaviorDescription, ...] = ()
 
 
 class MissionDescription(_Part):
@@ -88,11 +95,11 @@ class MissionDescription(_Part):
     name: str
     priority: int
     hosts: tuple[Host, ...]
-    core: tuple[CoreService, ...]
+    core: tuple[CoreServiceDescription, ...]
     types: tuple[ComponentType, ...]
     resources: tuple[Resource, ...]
-    components: tuple[Component, ...]
-    behaviors: tuple[Behavior, ...]
+    components: tuple[ComponentDescription, ...]
+    behaviors: tuple[BehaviorDescription, ...]
     source: str
 
     @property
@@ -100,6 +107,6 @@ class MissionDescription(_Part):
         """Machines besides the one that runs the nameserver; each offers itself by a command typed there."""
         return tuple(host for host in self.hosts[1:] if not host.is_loopback)
 
-    def core_parameters(self, service: str) -> dict[str, Any]:
+    def core_parameters(self, service: str) -> dict[str, object]:
         """Return what the file sets of a core service's parameters, of the first of this type."""
         return next((dict(core.parameters) for core in self.core if core.type == service), {})

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from backbone.errors import BackboneError
 from backbone.naming import MAX_NAME_LENGTH
 
-HINTS_AT_MOST = 50  # chosen: nobody reads more at once, and looking for one costs milliseconds
+HINTS_AT_MOST = 50  # chosen: more than a person reads at once, and each hint costs milliseconds
 NAMES_LISTED = 8  # chosen: fits a line
 QUOTED_LENGTH = 60  # chosen: same
 

@@ -6,8 +6,6 @@ stranger must not hide what is wrong beside it, for ``check`` reports everything
 
 from __future__ import annotations
 
-from typing import Any
-
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
@@ -131,9 +129,9 @@ def _remark(meant: str) -> str:
 
 
 # ---------------------------------------------------------------------- what pydantic judges
-def _values(element: Element) -> dict[str, Any]:
+def _values(element: Element) -> dict[str, object]:
     """Return an element as the declared classes read it: attributes and children by their names."""
-    values: dict[str, Any] = {name: attribute.value for name, attribute in element.attributes.items()}
+    values: dict[str, object] = {name: attribute.value for name, attribute in element.attributes.items()}
     for tag, (_least, most) in vocabulary()[element.tag].children.items():
         inside = [_values(child) for child in element.all(tag)]
         if most > 1:

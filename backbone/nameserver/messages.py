@@ -4,27 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from backbone.component.messages import ComponentState
+from backbone.component.messages import ComponentState, Register
 from backbone.errors import Refusal
 from backbone.ranges import MANY, Instant, Mention
 from backbone.wire import Message
 
-ADDRESS = "backbone/nameserver"
 RECONNECT_S = 1.0  # chosen: machine seconds, twice the 0.5 s in which components find a restarted hub
-
-
-class Register(Message, frozen=True):
-    """Register a name. The component shell asks this before its readiness.
-
-    Attributes:
-        component: The component; its state is CONNECTING.
-    """
-
-    component: ComponentState
-
-
-class Registered(Message, frozen=True):
-    """Answer to ``Register``: the component holds the name until its liveliness token falls."""
 
 
 class Resolve(Message, frozen=True):
@@ -72,13 +57,6 @@ class Disappeared(Message, frozen=True):
     """Published when a component's liveliness token has fallen."""
 
     address: Mention
-
-
-class NameTaken(Refusal):
-    """A living component has this name."""
-
-    code = "nameserver.taken"
-    remedy = "It runs already: see 'scout-backbone status'. Stop it first, or give the new one a name of its own."
 
 
 class UnknownName(Refusal):

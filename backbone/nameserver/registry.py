@@ -23,8 +23,8 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from backbone.component.messages import ComponentState, LifeState
-from backbone.nameserver.messages import Appeared, Components, Disappeared, NameTaken, UnknownName
+from backbone.component.messages import ComponentState, LifeState, NameTaken
+from backbone.nameserver.messages import Appeared, Components, Disappeared, UnknownName
 from backbone.naming import component_of, did_you_mean
 
 CLAIM_WITHIN_S = 1.0  # chosen: a claim follows its registration within milliseconds, on a busy machine within a second

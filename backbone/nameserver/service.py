@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from pathlib import Path
-from typing import Any, assert_never
+from typing import assert_never
 
 import msgspec
 
@@ -22,7 +22,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import AskState, ComponentState
+from backbone.component.messages import AskState, ComponentState, NameTaken, Register, Registered
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import (
@@ -31,9 +31,6 @@ from backbone.nameserver.messages import (
     Disappeared,
     ListComponents,
     NameserverQuestion,
-    NameTaken,
-    Register,
-    Registered,
     Resolve,
     Resolved,
 )
@@ -116,7 +113,7 @@ class Nameserver(Component[NameserverParameters]):
             address = await self._to_introduce.get()
             self.start_task(self._introduce(address), f"introduce {address}")
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Register``, ``Resolve`` and ``ListComponents``."""
         match asked.body:
             case Register(component=component):

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated
 
 from backbone.component.messages import Absence, ComponentState
 from backbone.picture.words import absence_line
@@ -35,7 +35,7 @@ class HealthWord(StrEnum):
 
 
 class MissionHealth(Message, frozen=True):
-    """How a mission is; published by the launcher on every change, and every ``SAY_EVERY_S``: its silence is noticed.
+    """Health of a mission; the launcher publishes it on every change, and every ``SAY_EVERY_S`` as its heartbeat.
 
     Attributes:
         absent: Absent components: vital ones first, then by name.
@@ -48,7 +48,7 @@ class MissionHealth(Message, frozen=True):
         """Return one line for each absent component, for people."""
         return [absence_line(absence, now_s) for absence in self.absent]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return ``health`` and ``absent`` as plain data."""
         return {"health": str(self.word), "absent": plain(self.absent)}
 

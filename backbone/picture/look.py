@@ -1,32 +1,30 @@
-"""Looks at a mission from outside: asks the core services, and takes what they say into a picture.
+"""Look at a mission from outside: ask the core services, and take their answers into a picture.
 
-A question without an answer never makes the picture look whole: the service that did not answer is absent, and what
-the picture lacks because of it stands in its ``problems``.
+A question without an answer never makes the picture look whole: the service that did not answer is absent, and the
+picture's ``problems`` name the gaps.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable
-from typing import Any
 
 import msgspec
 
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.component.messages import Absence, AskTime, MissionTime
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import ListProcesses, Processes, ProcessState
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import LAUNCHER, component_of
+from backbone.naming import component_of
 from backbone.picture.mission import MissionPicture, misses
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.printable import printable_all
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
+from backbone.wire import Message
 
 LOOK_TIME_S = 1.0  # chosen: a person waits this long for a picture
 NAMES_SHOWN = 8  # chosen: a line of a terminal
@@ -35,12 +33,12 @@ NAMES_SHOWN = 8  # chosen: a line of a terminal
 async def look(
     bus: Bus, now_s: float, *, before: MissionPicture | None = None, rate: float = 1.0, schedule: bool = True
 ) -> MissionPicture:
-    """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of what they say.
+    """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of their answers.
 
     Args:
-        before: The picture to take it into: an absence keeps its beginning, and a nameserver that does not answer
-            leaves it as it was, marked as stale. None: a new one.
-        schedule: False: ask the RC manager only whether it lives.
+        before: The picture to update: an absence keeps its begin, and if the nameserver does not answer the picture
+            stays as it was, marked as stale. None: a new one.
+        schedule: False: only check that the RC manager answers.
 
     Raises:
         LinkError: The nameserver did not answer, and there is no earlier picture.
@@ -55,9 +53,10 @@ async def look(
         return before
     picture = before or MissionPicture(bus.mission, rate=rate)
     keepers = sorted({LAUNCHER, *(one.address for one in listing.components if one.type == CREATOR)})
-    question, answer = (AskSchedule(), Schedule) if schedule else (AskTime(), MissionTime)
     answers = await asyncio.gather(
-        _ask_or_absence(bus, now_s, RC_MANAGER, question, answer),
+        _ask_or_absence(bus, now_s, RC_MANAGER, AskSchedule(), Schedule)
+        if schedule
+        else _ask_or_absence(bus, now_s, RC_MANAGER, AskTime(), MissionTime),
         _ask_or_absence(bus, now_s, PLACER, AskTime(), MissionTime),
         *(_ask_or_absence(bus, now_s, keeper, ListProcesses(), Processes) for keeper in keepers),
     )
@@ -75,7 +74,7 @@ async def look(
 
 
 def _gone_stale(picture: MissionPicture, silence: Absence, now_s: float) -> None:
-    """Leave the picture as it was, but for the time and for the nameserver that is missed."""
+    """Leave the picture as it was, but for the time and the nameserver's absence."""
     picture.stale_since_s = picture.at_s if picture.stale_since_s is None else picture.stale_since_s
     others = (absence for absence in picture.missed if absence.name != silence.name)
     picture.missed = (*_remembered([silence], picture.missed), *others)
@@ -83,8 +82,10 @@ def _gone_stale(picture: MissionPicture, silence: Absence, now_s: float) -> None
     picture.at_s = now_s
 
 
-async def _ask_or_absence(bus: Bus, now_s: float, address: str, question: Any, reply: type[Any]) -> Any:
-    """Return the answer, or that the one who should have answered is absent."""
+async def _ask_or_absence(
+    bus: Bus, now_s: float, address: str, question: Message, reply: type[Schedule | MissionTime | Processes]
+) -> Schedule | MissionTime | Processes | Absence:
+    """Return the answer, or the absence of the component that did not answer."""
     try:
         return printable_all(await bus.ask(address, question, reply, within_s=LOOK_TIME_S))
     except (Refusal, LinkError) as error:
@@ -95,13 +96,13 @@ async def _ask_or_absence(bus: Bus, now_s: float, address: str, question: Any, r
 
 
 def _remembered(missed: Iterable[Absence], before: Iterable[Absence]) -> tuple[Absence, ...]:
-    """Return the absences, each since it was first missed."""
+    """Return the absences, each with its first time."""
     since_s = {absence.name: absence.since_s for absence in before}
     return tuple(msgspec.structs.replace(each, since_s=since_s.get(each.name, each.since_s)) for each in missed)
 
 
 def _lacks(listing: Components, processes: Iterable[ProcessState]) -> list[str]:
-    """Return why the list of components is not whole, one line for each reason."""
+    """Return why the list of components is incomplete, one line for each reason."""
     listed = {component_of(component.address) for component in listing.components}
     unknown = {component_of(address) for address in listing.unknown}
     running = {process.spawn.name for process in processes if process.pid} - listed - unknown

@@ -1,22 +1,22 @@
 """A mission as its observers know it: messages in; lines, tables and plain data out.
 
 Rules of this file: no bus, no clock, no screen; times are mission seconds and arguments. Command line, launcher and
-consoles keep the same picture: some ask for all of it now and then (``look``), others hear what is published.
+consoles keep the same picture: some ask for all of it now and then (``look``), others subscribe to its messages.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, assert_never
+from typing import assert_never
 
 from backbone.component.messages import Absence, ComponentState, LifeState, MissionTime, StandingStop, StoryEvent
 from backbone.creator.messages import Processes, ProcessState
-from backbone.mission_log import Log, MissionLog, PeopleKnown
+from backbone.mission_log.log import Log, MissionLog, PeopleKnown
+from backbone.mission_log.operators import OperatorActed
+from backbone.mission_log.people import People
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.naming import Subsystem, component_of
-from backbone.operators import OperatorActed
-from backbone.people import People
 from backbone.picture.health import MissionHealth, health
 from backbone.picture.words import stop_line
 from backbone.scheduling.requests import RequestState
@@ -41,22 +41,22 @@ Said = (
     | Processes
     | MissionTime
 )
-"""Messages of which a picture is made."""
+"""Messages that make up a picture."""
 
 
 @dataclass
 class MissionPicture:
-    """A mission as far as it was heard of.
+    """A mission as an observer knows it.
 
     Attributes:
         at_s: Mission time of the last look.
-        components: Who is there, by address.
-        processes: What creators and launcher say of their processes, by component name.
+        components: The present components, by address.
+        processes: Reports of creators and launcher on their processes, by component name.
         schedule: The RC manager's; None if it did not answer.
-        problems: Services that did not answer, and what the picture lacks.
-        missed: What this observer misses: services that did not answer, components that failed, hang or ended.
+        problems: Services that did not answer, and gaps of the picture.
+        missed: Absences this observer found: services that did not answer, components that failed, hang or ended.
         stale_since_s: Mission time at which the rest of the picture was true; None: now.
-        log: The newest of what happened, and who sits at which console.
+        log: The newest events, and the persons at the consoles.
     """
 
     mission: str
@@ -79,7 +79,7 @@ class MissionPicture:
         """Take a message in.
 
         Args:
-            source: Address of the component that said it.
+            source: Address of the sender.
         """
         match said:
             case Schedule():
@@ -101,31 +101,31 @@ class MissionPicture:
                 assert_never(said)
 
     def changes(self, listed: Components) -> list[ComponentState | Disappeared]:
-        """Return what a list says: who is there and, if it is complete, who is not any more."""
+        """Return the present components of a list and, if it is complete, those that left."""
         gone = self.components.keys() - {component.address for component in listed.components}
         return [*listed.components, *(Disappeared(address) for address in sorted(gone) if listed.complete)]
 
     def _meet(self, component: ComponentState) -> None:
         self.people.heard(component)
         known = self.components.get(component.address)
-        is_over = known is None and component.state is LifeState.STOPPED  # said after the word that it is gone
+        is_over = known is None and component.state is LifeState.STOPPED  # it came after the message of its end
         if not is_over and (known is None or not is_older(component, known)):
             self.components[component.address] = component
 
     # ------------------------------------------------------------------ views out
     @property
     def health(self) -> MissionHealth:
-        """How the mission is, and what it lacks."""
+        """The mission's health, with absences."""
         return health(self.components, self.missed, self.at_s, self.rate)
 
     @property
     def stops(self) -> dict[str, StandingStop]:
-        """The emergency stops in force, by the name of the component that was stopped."""
+        """The emergency stops in force, by the name of the stopped component."""
         return {component_of(at): c.stop for at, c in sorted(self.components.items()) if c.stop is not None}
 
     @property
     def people(self) -> People:
-        """Who sits at which console."""
+        """The person at each console."""
         return self.log.people
 
     def stop_lines(self) -> list[str]:
@@ -146,7 +146,7 @@ class MissionPicture:
         process = self.processes.get(component_of(component.address))
         return process.restarts if process else 0
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return the whole picture as plain data."""
         shown = ("type", "host", "pid", "state", "since_s", "feedback", "requester")
         components = [
@@ -173,11 +173,11 @@ class MissionPicture:
 def misses(
     components: Iterable[ComponentState], processes: Iterable[ProcessState], now_s: float, rate: float = 1.0
 ) -> list[Absence]:
-    """Return what an observer misses by what nameserver, launcher and creators say: what failed, hangs or fell.
+    """Return the absences by the reports of nameserver, launcher and creators: failed, hung or fallen components.
 
     Args:
-        components: Who is registered.
-        processes: What is kept by launcher and creators.
+        components: The registered components.
+        processes: The processes of launcher and creators.
     """
     found = {
         component_of(c.address): Absence(component_of(c.address), c.since_s, c.feedback or "it failed", _RESTARTS)
@@ -193,15 +193,15 @@ def misses(
 
 
 def _fallen(process: ProcessState, now_s: float, rate: float, listed: set[str]) -> Absence | None:
-    """Return what is wrong with a process; None: nothing is."""
+    """Return the fault of a process; None: it has none."""
     name, is_core = process.spawn.name, process.spawn.subsystem == Subsystem.BACKBONE
     if process.silent_s >= HUNG_AFTER_S:
         cause = f"it hangs: its event loop did not run for {process.silent_s:.1f} s"
         doing = "its creator ends and restarts it if it stays silent"
         return Absence(name, now_s - process.silent_s * rate, cause, doing, vital=is_core)
-    if not process.pid and process.last_end:  # without an end before, it is being started for the first time
+    if not process.pid and process.last_end:  # without an earlier end, it is being started for the first time
         return Absence(name, now_s, process.last_end, _RESTARTS, vital=is_core)
-    if is_core and name not in listed:  # other components come and go; one that starts is no absence
+    if is_core and name not in listed:  # other components come and go; a starting one is no absence
         return Absence(
             name, now_s, f"its process {process.pid} is not registered", process.doing or "it starts", vital=True
         )
@@ -209,22 +209,22 @@ def _fallen(process: ProcessState, now_s: float, rate: float, listed: set[str]) 
 
 
 def is_older(one: ComponentState, other: ComponentState) -> bool:
-    """Say whether one was said before the other by the same process: its life only goes on.
+    """Return whether the same process sent one state before the other, by the order of its life.
 
-    Their times do not tell: the nameserver dates a readiness by when it saw it.
+    Their times cannot decide: the nameserver dates a readiness by its own observation.
     """
     return one.pid == other.pid and _LIFE.index(one.state) < _LIFE.index(other.state)
 
 
 def holders_line(schedule: Schedule) -> str:
-    """Return one line for a terminal that shows only lines: who runs, who waits.
+    """Return one line for a terminal that shows only lines: running and waiting ARCs.
 
     Example:
         >>> holders_line(Schedule(0.0, [], [], []))
-        'nobody asks for anything'
+        'no ARC has a request'
     """
     running = [request.arc for request in schedule.requests if request.state is RequestState.RUNNING]
     waiting = [request.arc for request in schedule.requests if request.state is RequestState.WAITING]
     if not schedule.requests:
-        return "nobody asks for anything"
-    return f"runs: {', '.join(running) or 'nobody'}; waits: {', '.join(waiting) or 'nobody'}"
+        return "no ARC has a request"
+    return f"runs: {', '.join(running) or 'none'}; waits: {', '.join(waiting) or 'none'}"

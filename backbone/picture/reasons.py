@@ -1,53 +1,50 @@
-"""``why`` and ``story``: ask whoever knows, and put their answers in order."""
+"""``why`` and ``story``: ask the components concerned, and put their answers in order."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
-from backbone.bus.interface import Bus, Clock
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
+from backbone.bus.interface import Bus, Clock, Reply
 from backbone.component.messages import Absence, AskStory, ComponentState, Story, StoryEvent
 from backbone.component.story import LENGTH as STORY_LENGTH
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, Refusal
-from backbone.log_lines import event_json
-from backbone.mission_log import AskPeople, PeopleKnown
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.mission_log.lines import event_json
+from backbone.mission_log.log import AskPeople, PeopleKnown
+from backbone.mission_log.people import People, screens_of
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.naming import LAUNCHER, component_of
-from backbone.people import People, screens_of
+from backbone.naming import component_of
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
 from backbone.picture.words import RULES, absence_line, stop_line
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.printable import printable_all
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy
 from backbone.scheduling.requests import RequestState, UnknownRequest
 from backbone.scheduling.views import Why
 from backbone.spoken import counted
-from backbone.wire import plain
+from backbone.wire import Message, plain
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long
 
 
 @dataclass(frozen=True)
 class Reasons:
-    """Why something is as it is: its schedule, its place, its own words; at least one of them.
+    """Reasons for the state of a name: its schedule, its placement, its own report; at least one of them.
 
     Attributes:
-        name: What was asked about.
+        name: Name in the question.
         why: The RC manager's answer, if it knows the name.
         placement: The placer's answer, if it placed it.
-        component: What the component says of itself, if there is one.
-        absence: That it is wanted and absent, if it is.
+        component: The component's own report, if there is one.
+        absence: Its absence, if it is wanted and absent.
         led_to: If the name is a message's: the events that the message led to.
-        remarks: What else is known of the name: of a host, of a person, of a message that led to nothing.
-        people: Who sits at which console; they are called by their names.
+        remarks: Further facts: of a host, of a person, of a message that led to nothing.
+        people: The person at each console; the answer names persons.
     """
 
     name: str
@@ -61,7 +58,7 @@ class Reasons:
 
     @property
     def is_known(self) -> bool:
-        """Whether there is anything to tell."""
+        """Whether there is any reason."""
         return any((self.why, self.placement, self.component, self.absence, self.led_to, self.remarks))
 
     def lines(self, now_s: float) -> list[str]:
@@ -94,7 +91,7 @@ class Reasons:
             lines += [f"  {event.at_s:.3f} s  {event.where}  {event.subject}: {event.what}" for event in self.led_to]
         return lines
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return the reasons as plain data."""
         return {
             "name": self.name,
@@ -108,8 +105,8 @@ class Reasons:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What a name that a person types means.
+class AskedName:
+    """Meaning of a name that a person types.
 
     Attributes:
         name: Name of the component, request or resource.
@@ -120,14 +117,14 @@ class Asked:
     message: str = ""
 
     @classmethod
-    def of(cls, text: str) -> Asked:
-        """Return what is meant by a name, an address, an alarm, or the id of a message, with its subsystem or without.
+    def of(cls, text: str) -> AskedName:
+        """Return the meaning of a name, an address, an alarm, or the id of a message, with its subsystem or without.
 
         Example:
-            >>> Asked.of("rc_manager").name, Asked.of("backbone/rc_manager").name, Asked.of("lost:scout1").name
-            ('rc_manager', 'rc_manager', 'scout1')
-            >>> Asked.of("rc_manager#112")
-            Asked(name='rc_manager', message='rc_manager#112')
+            >>> AskedName.of("backbone/rc_manager").name, AskedName.of("lost:scout1").name
+            ('rc_manager', 'scout1')
+            >>> AskedName.of("rc_manager#112")
+            AskedName(name='rc_manager', message='rc_manager#112')
         """
         address, number, _ = text.rpartition(":")[2].partition("#")
         return cls(component_of(address), text if number else "")
@@ -140,7 +137,7 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         UnknownName: None of them knows it.
         LinkError: None of them answered.
     """
-    asked = Asked.of(text)
+    asked = AskedName.of(text)
     name = asked.name
     why, placement, resolved, picture = await asyncio.gather(
         _or_error(bus, RC_MANAGER, AskWhy(name), Why),
@@ -152,7 +149,7 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
     remarks = [*host_remarks(name, picture), *person_remarks(name, picture)]
     if asked.message and not told.events:
         remarks.append(
-            f"nobody tells that {asked.message} led to anything; each tells of its newest {STORY_LENGTH} events"
+            f"no component has an event that {asked.message} led to; each keeps its newest {STORY_LENGTH} events"
         )
     reasons = Reasons(
         name,
@@ -165,13 +162,13 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         picture.people,
     )
     if not reasons.is_known:
-        errors = (why, placement, resolved)
-        raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), resolved)
+        errors = [one for one in (why, placement, resolved) if isinstance(one, Refusal | LinkError)]
+        raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), errors[-1])
     return printable_all(reasons)
 
 
 def host_remarks(name: str, picture: MissionPicture) -> list[str]:
-    """Return what is known of a machine of the mission; nothing if the name is none's."""
+    """Return the facts of a machine of the mission; none if no machine has this name."""
     there = [component_of(at) for at, component in sorted(picture.components.items()) if component.host == name]
     missed = [absence for absence in picture.health.absent if absence.name == creator_name(name)]
     if not missed and not any(c.host == name and c.type == CREATOR for c in picture.components.values()):
@@ -183,7 +180,7 @@ def host_remarks(name: str, picture: MissionPicture) -> list[str]:
 
 
 def person_remarks(name: str, picture: MissionPicture) -> list[str]:
-    """Return at which consoles a person sits, and what comes of it; nothing if the name is none's."""
+    """Return the consoles of a person, and their requests; none if no person has this name."""
     screens = screens_of(name, picture.components.values())
     if not screens:
         return []
@@ -200,12 +197,12 @@ def person_remarks(name: str, picture: MissionPicture) -> list[str]:
 
 @dataclass(frozen=True)
 class Told:
-    """What the components of a mission tell.
+    """Events from the stories of a mission's components.
 
     Attributes:
         events: In the order of their times.
-        missing: Components that did not tell, and why: the events are not all there are.
-        people: Who sits at the consoles that are spoken of, or sat there.
+        missing: Components that did not answer, with reasons: the events are incomplete.
+        people: Present and past persons at the consoles of the events.
     """
 
     events: Sequence[StoryEvent]
@@ -217,13 +214,13 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     """Ask every component for the events about a name, an address or a message.
 
     Raises:
-        LinkError: The nameserver did not answer: nobody is known who could be asked.
+        LinkError: The nameserver did not answer: there is no list of components to ask.
     """
-    asked = Asked.of(text)
+    asked = AskedName.of(text)
     listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
-    picture, *stories = await asyncio.gather(
+    picture, stories = await asyncio.gather(
         _seen(bus, clock),
-        *(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components),
+        asyncio.gather(*(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components)),
     )
     events = [event for story in stories if isinstance(story, Story) for event in story.events]
     missing = [
@@ -231,7 +228,7 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
         for component, story in zip(listing.components, stories, strict=True)
         if not isinstance(story, Story)
     ]
-    missing += [f"{address}: it did not say yet who it is" for address in listing.unknown]
+    missing += [f"{address}: it has not registered yet" for address in listing.unknown]
     named = {component_of(missed.partition(": ")[0]) for missed in missing}
     absent = [each for each in picture.health.absent if each.name not in named]
     missing += [f"{each.name}: it is absent, {each.cause}" for each in absent]
@@ -241,7 +238,7 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
 
 
 async def _seen(bus: Bus, clock: Clock) -> MissionPicture:
-    """Return how the mission is and who sat at its consoles, as far as nameserver and launcher answer."""
+    """Return the mission's picture with the persons at its consoles, as far as nameserver and launcher answer."""
     picture, known = await asyncio.gather(_looked(bus, clock), _or_error(bus, LAUNCHER, AskPeople(), PeopleKnown))
     if isinstance(known, PeopleKnown):
         picture.take(known)
@@ -249,21 +246,21 @@ async def _seen(bus: Bus, clock: Clock) -> MissionPicture:
 
 
 async def _looked(bus: Bus, clock: Clock) -> MissionPicture:
-    """Return how the mission is; nothing of it if the nameserver does not answer, which the other questions tell of."""
+    """Return the mission's picture; an empty one if the nameserver does not answer, which other questions report."""
     try:
         return await look(bus, clock.now_s(), rate=clock.rate)
     except (Refusal, LinkError):
         return MissionPicture(bus.mission)
 
 
-def _question(address: str, asked: Asked) -> AskStory:
-    """Ask the component itself for all it knows, the others for what is about it; of a message all for its effects."""
+def _question(address: str, asked: AskedName) -> AskStory:
+    """Ask the component itself for its whole story, the others for events about it; for a message all components."""
     if asked.message:
         return AskStory(asked.message)
     return AskStory() if component_of(address) == asked.name else AskStory(asked.name)
 
 
-async def _or_error(bus: Bus, address: str, question: Any, reply: type[Any]) -> Any:
+async def _or_error(bus: Bus, address: str, question: Message, reply: type[Reply]) -> Reply | Refusal | LinkError:
     try:
         return await bus.ask(address, question, reply, within_s=REPLY_TIME_S)
     except (Refusal, LinkError) as error:

@@ -33,10 +33,10 @@ _STATE_STYLE = {
 _HEALTH_STYLE = {HealthWord.OK: "bold green", HealthWord.DEGRADED: "bold yellow", HealthWord.FAILED: "bold red"}
 _TROUBLES_SHARE = 4  # chosen: a quarter of the terminal; the rest still shows components and events
 _FRAME_LINES = 2  # a panel's upper and lower edge
-_EVENTS_MOST = 12  # chosen: more than a glance takes in would push components off the picture
+_EVENTS_MOST = 12  # chosen: more events than a glance takes in would push components off the picture
 _EVENTS_LEAST = 3
 _NUMBERS = ("pid", "restarts")
-_NEXT_MOST = 3  # chosen: who comes after these is seen in the schedule
+_NEXT_MOST = 3  # chosen: the schedule shows the further ones
 
 
 def live_screen(picture: MissionPicture, events: Iterable[StoryEvent] | None, height: int) -> RenderableType:
@@ -45,8 +45,8 @@ def live_screen(picture: MissionPicture, events: Iterable[StoryEvent] | None, he
     On a terminal of 120 × 40 a mission of 26 components fits; on a smaller one components are left out first.
 
     Args:
-        picture: What there is.
-        events: Newest last; as many of the newest are shown as there is room for. None: nobody listens to them.
+        picture: The mission.
+        events: Newest last; the newest are shown as far as there is room. None: the caller has no events.
         height: Lines of the terminal.
     """
     head = _head(picture)
@@ -87,7 +87,7 @@ def _head(picture: MissionPicture) -> Text:
 
 
 def _troubles(picture: MissionPicture) -> list[Text]:
-    """Return what is absent, which stops are in force, and what the picture lacks, one line each."""
+    """Return the absences, the stops in force, and the gaps of the picture, one line each."""
     style = _HEALTH_STYLE[picture.health.word]
     lines = [Text(picture.people.named(line), style=style) for line in picture.health.lines(picture.at_s)]
     lines += [Text(line, style="bold red") for line in picture.stop_lines()]
@@ -160,7 +160,7 @@ def _request_lines(schedule: Schedule, now_s: float) -> list[Text]:
         reason.append(f"for {', '.join(request.blockers)}, " if request.blockers else "")
         reason.append(f"{counted(request.turns, 'turn')} so far, {request.priority}{_risen(request)}")
         lines += [line, reason]
-    return lines or [Text("nobody asks for anything", style="dim")]
+    return lines or [Text("no ARC has a request", style="dim")]
 
 
 def _event_line(event: StoryEvent) -> Text:
@@ -169,7 +169,7 @@ def _event_line(event: StoryEvent) -> Text:
 
 
 def screen(picture: MissionPicture) -> RenderableType:
-    """Return the whole picture: health and what is absent first, then components, holders, schedule."""
+    """Return the whole picture: health and absences first, then components, holders, schedule."""
     troubles = _troubles(picture)
     for line in troubles:
         line.no_wrap = False
@@ -208,7 +208,7 @@ def _components_table(picture: MissionPicture) -> Table:
 
 
 def _rcs_table(schedule: Schedule) -> Table:
-    """Return who holds what now and who is next."""
+    """Return the table of the RCs with their present and next holders."""
 
     def row(rc: RcView) -> tuple[str, ...]:
         until = (f"{until_s:.1f} s" if until_s >= 0 else "being freed" for until_s in rc.until_s)
@@ -225,7 +225,7 @@ def _rcs_table(schedule: Schedule) -> Table:
 
 
 def _coming(rc: RcView) -> list[str]:
-    """Return the first ones that will hold the RC, and when; how many more there are."""
+    """Return the next holders of the RC with their times, and the number of further ones."""
     timed = zip(rc.next, rc.next_s, strict=False)
     first = [f"{arc} at {start_s:.1f} s" for arc, start_s in itertools.islice(timed, _NEXT_MOST)] or rc.next[
         :_NEXT_MOST
@@ -234,7 +234,7 @@ def _coming(rc: RcView) -> list[str]:
 
 
 def _requests_table(schedule: Schedule, now_s: float) -> Table:
-    """Return who runs and who waits, since when, until when, and why."""
+    """Return the table of the requests: state, times, reasons."""
 
     def row(one: RequestView) -> tuple[str | Text, ...]:
         state, lasts = Text(str(one.state), style=_STATE_STYLE[one.state]), f"{now_s - one.since_s:.1f} s"
@@ -249,7 +249,7 @@ def _risen(request: RequestView) -> str:
 
 
 def _reason(request: RequestView) -> str:
-    """Return why it is so, and by which rule; of who waits without a predicted start also what would end that."""
+    """Return the reason with its rule; without a predicted start also the event that would end the wait."""
     reason = f"{request.because} (rule {request.rule})" if request.rule else request.because
     starves = request.state is RequestState.WAITING and request.expected_start_s < 0
     return f"{reason}; until {request.would_change}" if starves and request.would_change else reason

@@ -1,50 +1,50 @@
-"""The words for what a picture shows, for command line, terminal and page: one sentence for one fact. Pure."""
+"""The words for the facts of a picture, for command line, terminal and page: one sentence for one fact. Pure."""
 
 from __future__ import annotations
 
 from backbone.component.messages import Absence, StandingStop
-from backbone.people import People
+from backbone.mission_log.people import People
 from backbone.scheduling.views import RequestView
 
 WANTED = "self"
-"""The word for what a console gave away of its own will."""
+"""The word for a robot that the console itself gave back."""
 
 UNDECIDED = ("lost", "lease")
-"""The words for a loss that nobody decided: the console was cut off, or paused."""
+"""The words for losses without a decision: the console was cut off, or paused."""
 
 _SENTENCES = {
     "slice": "it is the turn of {by}",
     "higher": "{by} has the higher priority",
     "rc": "{by} does not answer",
     "capacity": "{by} can give less than before",
-    "order": "{by} could not serve everybody in time",
+    "order": "{by} could not serve all its holders in time",
     "failed": "it could not be made ready",
-    WANTED: "no time was wanted",
+    WANTED: "no run time was wanted",
     "silent": "this console gave no sign of life",
-    "lease": "nothing was heard of the RC manager for too long",
-    "lost": "what held it for this console has ended",
+    "lease": "the RC manager was silent for too long",
+    "lost": "the ARC that held it for this console has ended",
 }
 """The words of ``Suspended.reason``."""
 
 RULES = {
-    "3": "each starts as early as it fits whole, and takes nothing from those before it",
-    "5": "a slice ends only if somebody entitled can use the RCs",
-    "6": "RCs are stopped and freed, then settle for the next one",
-    "8": "policy strict: none starts while a higher one of its group waits",
-    "9": "who is higher may keep others waiting for ever; that is allowed, and shown",
-    "11": "what is down or can give too little serves nobody",
-    "14": "who wants no time now keeps its request and frees its RCs",
-    "15": "a big group is not planned whole: each RC is reserved for the first in line",
+    "3": "each ARC starts as early as its whole slice fits without delaying the ARCs before it",
+    "5": "a slice ends only if an entitled ARC can use the RCs",
+    "6": "RCs are stopped and freed, then settle for the next ARC",
+    "8": "policy strict: no ARC starts while a higher one of its group waits",
+    "9": "a higher ARC may keep others waiting for ever; that is allowed, and shown",
+    "11": "an RC that is down or has too little capacity serves no ARC",
+    "14": "an idle ARC keeps its request and frees its RCs",
+    "15": "a large group is not planned whole: each RC is reserved for the first in line",
 }
-"""The rules of scheduling that decide why something is as it is, by the numbers they have in the documentation."""
+"""The rules of scheduling, by their numbers in the documentation."""
 
 
 def why_lost(reason: str, by: str) -> str:
-    """Return why something was taken from a console, or is kept from it, as part of a sentence.
+    """Return why a console lost its robot, or does not get it, as part of a sentence.
 
     Args:
         reason: The scheduler's word, or any text.
-        by: Because of whom, as people call them; empty: nobody.
+        by: Name of the cause, for people; empty: none.
 
     Example:
         >>> why_lost("slice", "ben"), why_lost("silent", ""), why_lost("a fuse blew", "")
@@ -52,12 +52,12 @@ def why_lost(reason: str, by: str) -> str:
     """
     sentence = _SENTENCES.get(reason)
     if sentence is not None:
-        return sentence.format(by=by or "somebody else")
+        return sentence.format(by=by or "another ARC")
     return f"{reason}, because of {by}" if by else reason
 
 
 def because(request: RequestView, people: People) -> str:
-    """Return why a request runs or waits, without what its row says anyway, by the names of people."""
+    """Return why a request runs or waits, without the words its row has anyway, by the names of people."""
     return people.named(request.because.removeprefix(f"{request.arc} {request.state}: "))
 
 

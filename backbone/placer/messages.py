@@ -9,8 +9,6 @@ from backbone.errors import Refusal
 from backbone.ranges import FEW, MANY, Instant, Mention, NameOrNone, Pid, Text, Values
 from backbone.wire import Message
 
-ADDRESS = "backbone/placer"
-
 
 class Start(Message, frozen=True):
     """Start a component and answer when it is ready.

@@ -25,114 +25,16 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, NameTaken
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
 from backbone.creator.messages import HostLoad, ProcessState, Spawn
-from backbone.nameserver.messages import NameTaken
-from backbone.naming import Subsystem, address, did_you_mean
-from backbone.placer.messages import NotPlaced, Placement
+from backbone.naming import Subsystem, did_you_mean
+from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase, PlacementRecord
+from backbone.placer.messages import NotPlaced
 from backbone.placer.placement import CandidateHost, Choice, obstacle, place
 
 STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; no mission stops so many in that time
-
-
-class PlacementPhase(StrEnum):
-    """Phase of a placement."""
-
-    STARTING = "starting"  # its creator has the order; it is not ready yet
-    RUNNING = "running"  # its creator has it
-    WAITING = "waiting"  # wanted, but lost its host or its process
-
-
-@dataclass(slots=True)
-class PlacementRecord:
-    """One placement.
-
-    Attributes:
-        spawn: The order to its creator.
-        pin: The only possible host; empty: any.
-        host: The host on which it runs or starts; empty: none.
-        pid: Its process; 0 if unknown.
-        since_s: Mission time of the last decision about it.
-        reasons: One line a host.
-        unwanted: True from the order to stop it.
-        suspect: True while the placer must ask its creator whether it still runs.
-        lost: True from the loss of its host until it has another; it may return with the old host.
-        missing_since_s: Mission time from which on it is missing; negative: it is not missing.
-        cause: Why it is missing.
-        doing: What the placer does to start it again.
-    """
-
-    spawn: Spawn
-    pin: str
-    phase: PlacementPhase
-    host: str
-    since_s: float
-    pid: int = 0
-    reasons: tuple[str, ...] = ()
-    unwanted: bool = False
-    suspect: bool = False
-    lost: bool = False
-    missing_since_s: float = -1.0
-    cause: str = ""
-    doing: str = ""
-
-    @property
-    def address(self) -> str:
-        """Address of the component."""
-        return address(self.spawn.subsystem, self.spawn.name)
-
-    def placement(self) -> Placement:
-        """Return the record as a message."""
-        spawn = self.spawn
-        return Placement(spawn.name, spawn.type, self.host, spawn.requester, self.since_s, list(self.reasons))
-
-    def runs(self, pid: int) -> None:
-        """Record that it has a process and is no longer missing."""
-        self.pid, self.suspect = pid, False
-        self.missing_since_s, self.cause, self.doing = -1.0, "", ""
-
-    def misses(self, cause: str, now_s: float) -> None:
-        """Record that the component, which ran, is missing."""
-        self.phase, self.host, self.pid, self.suspect = PlacementPhase.WAITING, "", 0, False
-        self.cause, self.doing = cause, "is to be placed again"
-        if self.missing_since_s < 0:
-            self.missing_since_s = now_s
-
-
-@dataclass(frozen=True, slots=True)
-class PlaceAgain:
-    """Start this component again, which is missing."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class EndOrphan:
-    """End the component of this name on this host, because it is wanted on another host or not at all."""
-
-    host: str
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class Inspect:
-    """Ask this host's creator for its processes, and report the answer."""
-
-    host: str
-
-
-@dataclass(frozen=True, slots=True)
-class Note:
-    """Add this event about the subject to the story."""
-
-    subject: str
-    what: str
-
-
-Instruction = PlaceAgain | EndOrphan | Inspect | Note
 
 
 @dataclass(slots=True)

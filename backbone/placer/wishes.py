@@ -14,13 +14,12 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, NameTaken
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.creator.messages import START_MOST_S
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import NameTaken
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, CreatorSilent, NotPlaced, Placement, Start, Started, StoppedMeanwhile
 from backbone.waiting import first_of
 

@@ -2,11 +2,12 @@
 
 Rules of this file:
 
-* All or nothing: if one step of a connection fails, all of it is undone before anybody is told.
-* An RC that does not confirm its disconnection in time keeps nothing else waiting if nobody else holds it: it is left,
-  the caller puts it down, and it is not up again before it confirmed. One that others hold, too, is waited for until
-  its lease is over. A holder may be late, there are never two. After a death the successor confirms (decision 0006).
-* An ARC that does not answer delays nobody: its epoch ends with the disconnection of its RCs.
+* All or nothing: if one step of a connection fails, the switch undoes all of it before it reports the failure.
+* An RC without another holder that does not confirm its disconnection in time delays no other RC: the switch leaves it,
+  the caller counts it as down, and it is up again only after it confirmed. If an RC has other holders, the switch waits
+  until its lease is over. A holder may be late, there are never two. After a death the successor confirms (decision
+  0006).
+* An ARC that does not answer delays no other ARC: its epoch ends with the disconnection of its RCs.
 
 Source: RAM 2002, "The RC Scheduler", last paragraph.
 """
@@ -18,7 +19,6 @@ import logging
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
@@ -38,23 +38,23 @@ from backbone.scheduling.requests import LEASE_S, RcUse
 
 log = logging.getLogger(__name__)
 
-RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer is not there
+RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer counts as gone
 ASK_AGAIN_S = 0.1  # chosen: a killed RC is back after two or three of these; a twentieth of a lease
 ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it opens
-CONFIRM_S = 0.04  # chosen: ten round trips, within the tolerance of a trace; also for what is late already
-CLOSE_S = 0.2  # chosen: an ARC shuts its gate in milliseconds; one that hangs must not cost the next its turn
+CONFIRM_S = 0.04  # chosen: ten round trips, within the tolerance of a trace; also for RCs that are late already
+CLOSE_S = 0.2  # chosen: an ARC shuts its gate in milliseconds; a hung ARC must not cost the next one its turn
 
-Note = Callable[[str, str], Any]
+Note = Callable[[str, str], object]
 Hold = tuple[str, str, int]
 """RC, ARC and epoch."""
 
 
 class ContextSwitch:
-    """Speaks to RCs and ARCs on behalf of the schedule manager.
+    """Connects, disconnects and opens for the schedule manager.
 
     Args:
-        note: Keeps that something happened to a subject.
-        may_leave: Says whether an RC need not be waited for when an ARC loses it: it is down, or has no other holder.
+        note: Adds an event to the story of a subject.
+        may_leave: Returns whether a switch may leave an RC that an ARC loses: it is down, or has no other holder.
     """
 
     def __init__(self, bus: Bus, clock: Clock, note: Note, may_leave: Callable[[str, str], bool]) -> None:
@@ -63,18 +63,18 @@ class ContextSwitch:
         self._left: defaultdict[str, dict[Hold, float]] = defaultdict(dict)
 
     def gives_back(self, arc: str) -> bool:
-        """Say whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
+        """Return whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
         return arc in self._given_back
 
     async def connect(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
-        """Connect all RCs to the ARC and have it open its gate, or undo all of it.
+        """Connect all RCs to the ARC and order it to open its gate, or undo all of it.
 
         Args:
-            order: What the schedule manager decided.
-            uses: How the ARC uses each RC; exclusively if not said.
+            order: Instruction of the schedule manager.
+            uses: The ARC's use of each RC; exclusive for missing ones.
 
         Returns:
-            None: the gate is open. Else the RC that failed, empty if it was the ARC; nothing is held.
+            None: the gate is open. Else the RC that failed, empty if it was the ARC; the ARC holds nothing.
         """
         settled_s = self._clock.now_s() + order.settle_s
         failed = await self._connect_rcs(order, uses)
@@ -91,14 +91,14 @@ class ContextSwitch:
         return failed or ""
 
     async def revoke(self, order: RevokeArc, within_s: float) -> list[str]:
-        """Close the ARC's gate and disconnect its RCs; return when nothing is held any more, but for what was left.
+        """Close the ARC's gate and disconnect its RCs; return once all RCs are free, but for RCs that were left.
 
         Args:
-            order: What the schedule manager decided.
-            within_s: Mission seconds after which RCs that nobody else holds are left.
+            order: Instruction of the schedule manager.
+            within_s: Mission seconds after which RCs without another holder are left.
 
         Returns:
-            RCs that did not confirm: put them down, and ``clear`` them before they count as up.
+            RCs that did not confirm: the caller counts them as down, and calls ``clear`` before they count as up.
         """
         free_by_s = self._clock.now_s() + within_s
         close = CloseGate(order.why, order.by, order.deadline_s, order.expected_s)
@@ -112,14 +112,14 @@ class ContextSwitch:
         return disconnecting.result()
 
     async def clear(self, rc: str, found: Sequence[Hold]) -> bool:
-        """End what an RC that was down still holds: by its own word, and what was left while it was down.
+        """End the remaining holds of an RC that was down: those it reports, and those left while it was down.
 
         Returns:
-            It confirmed that it holds nothing any more.
+            True if it confirmed the end of all holds.
         """
         left = self._left[rc]
-        while holds := {*found, *(hold for hold, until_s in left.items() if until_s > self._clock.now_s())}:
-            if await self._disconnect([*holds], "held from before it was down", math.inf):
+        while holds := [*dict.fromkeys([*found, *(one for one in left if left[one] > self._clock.now_s())])]:
+            if await self._disconnect(holds, "held from before it was down", math.inf):
                 return False
             found = ()
             for hold in holds:
@@ -127,7 +127,7 @@ class ContextSwitch:
         return True
 
     async def disconnect(self, holds: Sequence[Hold], reason: str) -> None:
-        """Disconnect all at once; wait for each until it confirms or its lease is over."""
+        """Disconnect all at once; wait until each confirms or its lease is over."""
         await self._disconnect(holds, reason, math.inf)
 
     async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
@@ -157,7 +157,7 @@ class ContextSwitch:
             log.warning("%s did not open: %s", order.arc, error)
             self._note(order.arc, f"did not open its gate: {error}")
             return False
-        await self._clock.sleep_until_s(settled_s)  # the ARC opens by the same clock: no word of it is needed
+        await self._clock.sleep_until_s(settled_s)  # the ARC opens by the same clock: it need not report that
         return True
 
     async def _close_gate(self, arc: str, question: CloseGate) -> None:
@@ -168,7 +168,7 @@ class ContextSwitch:
             self._note(arc, f"did not close its gate: {error}")
 
     async def _disconnect(self, holds: Sequence[Hold], reason: str, free_by_s: float) -> list[str]:
-        """Disconnect all at once; from ``free_by_s`` on leave those that may be left to ``clear``.
+        """Disconnect all at once; after ``free_by_s`` leave the RCs that may be left to ``clear``.
 
         Returns:
             RCs that did not confirm: they were left, or their leases are over.
@@ -178,7 +178,7 @@ class ContextSwitch:
         return [rc for (rc, _, _), has_confirmed in zip(holds, confirmed, strict=True) if not has_confirmed]
 
     async def _end(self, hold: Hold, reason: str, lease_until_s: float, free_by_s: float) -> bool:
-        """Return whether the RC confirmed that it is disconnected."""
+        """Disconnect; return whether the RC confirmed that."""
         rc, arc, epoch = hold
         complain = self._note
         while (left_s := self._real_s(lease_until_s)) > 0:
@@ -189,7 +189,7 @@ class ContextSwitch:
             except (Refusal, LinkError) as error:
                 complain(rc, f"did not confirm its disconnection from {arc}: {error}")
                 complain = _keep_quiet
-                does_not_obey = isinstance(error, Refusal)  # its hardware comes to rest by itself if at all
+                does_not_obey = isinstance(error, Refusal)  # its hardware stops by itself if at all
             if free_by_s < math.inf and self._may_leave(rc, arc) and self._real_s(free_by_s) < ASK_AGAIN_S:
                 self._left[rc][hold] = lease_until_s
                 return False
@@ -198,12 +198,12 @@ class ContextSwitch:
         return False
 
     def _real_s(self, until_s: float) -> float:
-        """Return for how long it is until then by people's clocks."""
+        """Return the seconds until then by people's clocks."""
         return (until_s - self._clock.now_s()) / self._clock.rate
 
 
 def _keep_quiet(_subject: str, _what: str) -> None:
-    """Note nothing: it was noted already."""
+    """Do nothing: the event was noted already."""
 
 
 def _holds(arc: str, epochs: Mapping[str, int]) -> list[Hold]:

@@ -1,9 +1,9 @@
-"""Credibility: whether an RC can be as it says.
+"""Credibility: checks the state that an RC reports.
 
 An RC that contradicts itself, its hardware or its grants is put aside alone: the RC manager plans nothing on it,
-says why, and asks it again until it makes sense. What it says is not taken over meanwhile.
+publishes the reason, and asks it again until its answer is credible. It ignores the RC's reports meanwhile.
 
-Rule of this file: pure; time is an argument. ``ranges`` held each number by itself before; here they are compared.
+Rule of this file: pure; time is an argument. ``ranges`` checked each number by itself; here they are compared.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ SKEW = 2  # chosen: clocks of two hosts may differ, so an RC may be as far ahead
 
 
 def contradiction(state: RcState, resource: Resource, now_s: float, given: int | None = None) -> str:
-    """Return what in the state of an RC cannot be, for people; empty if all of it can.
+    """Return the contradiction in the state of an RC, for people; empty if there is none.
 
     Args:
-        state: As the RC says.
-        resource: As the mission file says.
+        state: The RC's report.
+        resource: Its declaration in the mission file.
         given: Largest epoch given for this RC so far; None if an earlier RC manager may have given larger ones.
     """
     if state.name != resource.name:
@@ -30,7 +30,7 @@ def contradiction(state: RcState, resource: Resource, now_s: float, given: int |
     if not 0 <= state.capacity <= 1:
         return f"it says that it can give {state.capacity} of its time"
     if not 0 <= state.last_epoch <= SKEW * most_epoch(now_s):
-        return f"it says that it saw epoch {state.last_epoch}, which nobody can have given until now"
+        return f"it says that it saw epoch {state.last_epoch}, above any epoch given until now"
     return _contradiction_of_holders(state, resource, now_s, given)
 
 

@@ -1,11 +1,11 @@
-"""What is said between the RC manager, the RCs and the ARCs, and what others may ask the RC manager.
+"""Messages between the RC manager, the RCs and the ARCs, and questions of others to the RC manager.
 
-Who speaks to whom:
+Senders and receivers:
 
 * ARC → RC manager: ``SchedulingRequest``, ``Withdraw``, ``SetIdle``, ``ChangeRuntime``, ``Extend``.
 * RC manager → ARC: ``OpenGate``, ``CloseGate``, ``AskRequest``, ``TakePath``.
 * RC manager → RC: ``Connect``, ``Disconnect``, ``AskRc``; ``Leases`` as a publication.
-* anybody → RC manager: ``AskSchedule``, ``AskWhy``, ``AskAttributes``, ``SetPriority``, ``MoveNode``.
+* any component → RC manager: ``AskSchedule``, ``AskWhy``, ``AskAttributes``, ``SetPriority``, ``MoveNode``.
 """
 
 from __future__ import annotations
@@ -32,16 +32,14 @@ from backbone.ranges import (
 from backbone.scheduling.requests import Holder, Lease, PathNode, RcUse, SchedulingRequest
 from backbone.wire import Message
 
-ADDRESS = "backbone/rc_manager"
-
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
-EPOCHS_PER_S = 1000  # chosen: an RC that restarts begins above all it ever had, as no RC changes hands so often
+EPOCHS_PER_S = 1000  # chosen: a restarted RC begins above all its earlier epochs, as no RC changes hands so often
 EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s
 BEAT_EVERY_S = 0.3  # chosen: ARC to RC manager; a hung ARC is noticed within BEAT_MISSED_S
 BEAT_MISSED_S = 1.0  # chosen: three beats
 
 
-# ---------------------------------------------------------------------- what an ARC asks for
+# ---------------------------------------------------------------------- requests of ARCs
 
 
 class Withdraw(Message, frozen=True):
@@ -52,7 +50,7 @@ class Withdraw(Message, frozen=True):
 
 
 class SetIdle(Message, frozen=True):
-    """Keep the request, free the RCs (idle), or want them again (not idle)."""
+    """Keep the request but free the RCs (idle), or queue it again (not idle)."""
 
     arc: Mention
     idle: bool
@@ -67,32 +65,32 @@ class ChangeRuntime(Message, frozen=True):
 
 
 class Extend(Message, frozen=True):
-    """Let the running slice last until this mission time, at most until grant + maximum run time."""
+    """Extend the running slice to this mission time, at most to grant + maximum run time."""
 
     arc: Mention
     until_s: Instant
 
 
 class SetPriority(Message, frozen=True):
-    """Give a node of the behavior tree, or a console, another priority among its siblings."""
+    """Set the priority of a node of the behavior tree, or of a console, among its siblings."""
 
     node: Mention
     priority: Priority
 
 
 class MoveNode(Message, frozen=True):
-    """Put a node of the behavior tree, with all below it, below another parent; its priority stays."""
+    """Move a node of the behavior tree, with all below it, below another parent; its priority stays."""
 
     node: Mention
     parent: Mention
 
 
 class Done(Message, frozen=True):
-    """Answer to requests that need no other: it is so now."""
+    """Answer to a request without another answer: it was carried out."""
 
 
 class Beat(Message, frozen=True):
-    """Published by each ARC under ``Conversation.BEAT`` every ``BEAT_EVERY_S``: my loop runs and my owner's too."""
+    """Heartbeat of an ARC and its owner; the ARC publishes it under ``Conversation.BEAT`` every ``BEAT_EVERY_S``."""
 
     arc: Mention
 
@@ -104,7 +102,7 @@ class OpenGate(Message, frozen=True):
     Attributes:
         epochs: RC name → epoch of this connection.
         settled_s: Mission time at which the RCs have settled; they began when they were ordered to connect.
-        until_s: Mission time until which the slice lasts at least, counted from now.
+        until_s: Earliest end of the slice, mission time, if it began now.
     """
 
     epochs: Annotated[dict[Mention, Epoch], FEW]
@@ -113,15 +111,15 @@ class OpenGate(Message, frozen=True):
 
 
 class GateOpens(Message, frozen=True):
-    """Answer to ``OpenGate``: all is prepared; commands pass from ``settled_s`` on, and the owner hears ``Resumed``."""
+    """Answer to ``OpenGate``: all is prepared; commands pass from ``settled_s`` on, and the owner gets ``Resumed``."""
 
 
 class CloseGate(Message, frozen=True):
-    """Let nothing pass any more.
+    """Close the gate.
 
     Attributes:
         reason: Why: ``slice``, ``higher``, ``rc``, ``self`` …
-        by: ARC or RC because of which.
+        by: ARC or RC that caused it.
         deadline_s: Seconds the decision process has to stop cleanly; 0: none, a higher one overrides.
         expected_s: Mission time of the next expected slot; negative: unknown.
     """
@@ -133,15 +131,15 @@ class CloseGate(Message, frozen=True):
 
 
 class GateClosed(Message, frozen=True):
-    """Answer to ``CloseGate``: nothing passes."""
+    """Answer to ``CloseGate``: the gate is closed."""
 
 
 class AskRequest(Message, frozen=True):
-    """What do you ask for and what do you hold? Asked by a restarted RC manager."""
+    """A restarted RC manager asks an ARC for its request and its holds."""
 
 
 class TakePath(Message, frozen=True):
-    """An operator changed your owner's priority or place: ask by this path from now on, also a later RC manager."""
+    """An operator changed the priority or place of the ARC's owner: its requests have this path from now on."""
 
     path: Annotated[list[PathNode], FEW]
 
@@ -152,7 +150,7 @@ class CurrentRequest(Message, frozen=True):
     Attributes:
         request: As last sent.
         rcs: The set chosen for it; empty if none yet.
-        epochs: What it holds; empty if the gate is closed.
+        epochs: RC → epoch of each hold; empty if the gate is closed.
         granted_s: Mission time of the grant; negative if the gate is closed.
     """
 
@@ -169,8 +167,8 @@ class Connect(Message, frozen=True):
     Attributes:
         epoch: Larger than every earlier epoch of this RC.
         lease_s: Seconds of mission time after which the hold ends unless renewed.
-        use: How the ARC uses this RC.
-        companions: All RCs of the set with their epochs, so that RCs reached through another can be.
+        use: The ARC's use of this RC.
+        companions: All RCs of the set with their epochs, for RCs that are reached through another one.
         rank: Place in the order of user priority among the holders, 0 first; for sharable RCs.
     """
 
@@ -189,7 +187,7 @@ class Connected(Message, frozen=True):
 
 
 class Disconnect(Message, frozen=True):
-    """Stop serving this ARC: safe state, nothing queued survives. Right even if it is not connected."""
+    """Stop serving this ARC: safe state, no queued command survives. Valid also if it is not connected."""
 
     arc: Mention
     epoch: Epoch
@@ -207,16 +205,16 @@ class Disconnected(Message, frozen=True):
 
 
 class AskRc(Message, frozen=True):
-    """Who holds you?"""
+    """Ask an RC for its state."""
 
 
 class RcState(Message, frozen=True):
-    """Answer to ``AskRc``: the truth about this resource.
+    """Answer to ``AskRc``: the state of this RC, which is the truth.
 
     Attributes:
         sharable: True if several ARCs may hold it.
         capacity: Share of its time it can give.
-        holders: Who holds it now.
+        holders: Its present holders.
         last_epoch: Largest epoch it has seen.
         applied: Commands applied since its start.
         refused_stale: Commands of an older epoch or another ARC it refused.
@@ -237,12 +235,11 @@ class RcState(Message, frozen=True):
 class Leases(Message, frozen=True):
     """Published by the RC manager every ``RENEW_EVERY_S``: these holds last another ``lease_s`` from the stamp.
 
-    An RC that knows better publishes its ``RcState``: one that does not have a hold any more which is
-    renewed here, or one that is called missing.
+    An RC that lost a hold renewed here, or that is listed as missing, publishes its ``RcState``.
 
     Attributes:
         lease_s: For how long, seconds of mission time.
-        missing: RCs that do not answer, as far as the RC manager knows.
+        missing: RCs that do not answer the RC manager.
     """
 
     leases: Annotated[list[Lease], MANY]
@@ -250,19 +247,19 @@ class Leases(Message, frozen=True):
     missing: Annotated[list[Mention], MANY] = []
 
 
-# ---------------------------------------------------------------------- for everybody
+# ---------------------------------------------------------------------- for any component
 class AskSchedule(Message, frozen=True):
-    """Who holds what, who waits?"""
+    """Ask for the schedule."""
 
 
 class AskWhy(Message, frozen=True):
-    """Why does this ARC, decision process or RC wait, run or stand idle?"""
+    """Ask why this ARC, decision process or RC waits, runs or is idle."""
 
     name: Mention
 
 
 class AskAttributes(Message, frozen=True):
-    """What is asked for by this ARC, by this decision process, or by all at and below this node?"""
+    """Ask for the requests of this ARC, of this decision process, or of all at and below this node."""
 
     name: Mention
 
@@ -274,7 +271,7 @@ class TraceLine(Message, frozen=True):
 
 
 class FixedRules(Refusal):
-    """The rules by which is scheduled do not change while the mission runs."""
+    """The scheduling rules do not change while the mission runs."""
 
     code = "scheduling.fixed_rules"
     remedy = "Change the parameters of the rc_manager in the mission file, and bring the mission up again."
@@ -295,7 +292,7 @@ class Held(Refusal):
 
 
 def most_epoch(now_s: float) -> int:
-    """Return the largest epoch that can have been given by this mission time: an RC begins with the time of its start.
+    """Return the largest epoch possible at this mission time: an RC's epochs begin with the time of its start.
 
     Example:
         >>> most_epoch(2.5)

@@ -1,7 +1,7 @@
-"""Which RCs can be planned on: those that run, are as they say, and hold nothing from before.
+"""Watch over the RCs: the schedule may use those that run, are credible, and have no holds from before.
 
-An RC that is missing, does not answer or contradicts itself is down for the schedule manager, alone; it is asked again
-until it makes sense and has confirmed that it holds nothing any more.
+An RC that is missing, does not answer or contradicts itself is down for the schedule manager, alone; the watch asks it
+again until its answer is credible and it has confirmed the end of all holds.
 """
 
 from __future__ import annotations
@@ -9,15 +9,14 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Coroutine, Iterable
-from typing import Any, Protocol
+from typing import Protocol
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import LogLevel
+from backbone.component.messages import LogLevel, NameTaken
 from backbone.component.story import StoryBook
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import NameTaken
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start, Started
 from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch, in_pool
 from backbone.rc_manager.credibility import contradiction
@@ -30,7 +29,7 @@ from backbone.wire import MalformedMessage
 log = logging.getLogger(__name__)
 
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
-MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease: what keeps an RC from connecting is mostly an old hold
+MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease: mostly an old hold keeps an RC from connecting
 
 
 class Service(Protocol):
@@ -42,20 +41,20 @@ class Service(Protocol):
     manager: ScheduleManager
 
     def happened(self, event: Event) -> None:
-        """Have the schedule manager decide on the event."""
+        """Pass the event to the schedule manager, and carry its instructions out."""
 
     def publish_event(self, subject: str, what: str, level: LogLevel) -> None:
-        """Put an event about the subject into the mission's log."""
+        """Publish an event about the subject to the mission's log."""
 
-    def start_task(self, work: Coroutine[Any, Any, None], name: str) -> object:
+    def start_task(self, work: Coroutine[object, None, None], name: str) -> object:
         """Run the coroutine until the component ends."""
 
 
 class RcWatch:
-    """Meets RCs that appear, and those that failed again and again.
+    """Checks RCs that appear, and repeatedly those that failed.
 
     Attributes:
-        resources: RC → its resource; set before anything else is asked.
+        resources: RC → its resource; set before any other use.
         up: RCs that count as up.
     """
 
@@ -64,8 +63,8 @@ class RcWatch:
 
         Args:
             service: The RC manager.
-            context_switch: Ends what an RC still holds.
-            recovery: Knows which components there are.
+            context_switch: Ends an RC's remaining holds.
+            recovery: Knows the present components.
         """
         self._service = service
         self._context_switch = context_switch
@@ -87,7 +86,7 @@ class RcWatch:
         return sorted(self.resources.keys() - self.up - self._failing)
 
     async def have_running(self, rcs: Iterable[str]) -> None:
-        """Start those RCs through the placer that do not run; return when all answer, or the placer works on them.
+        """Start stopped RCs through the placer; return when all answer, or the placer works on them.
 
         Raises:
             Refusal: One of them cannot be started.
@@ -99,9 +98,9 @@ class RcWatch:
         await asyncio.gather(*(asyncio.shield(self._starts[rc]) for rc in missing))
 
     async def meet(self, rc: str) -> bool:
-        """Ask the RC how it is and let the schedule manager know; return whether it is up.
+        """Ask the RC for its state and pass that to the schedule manager; return whether it is up.
 
-        It counted as down, so whoever holds it still does so by an earlier grant: that ends first.
+        The RC counted as down, so its remaining holds are from earlier grants: they are ended first.
         """
         if rc in self.up:
             return True
@@ -121,7 +120,7 @@ class RcWatch:
         return True
 
     def meet_again(self, rc: str) -> None:
-        """Meet an RC that appeared or spoke; if it is not up then, in a while."""
+        """Check an RC that appeared or published; if it is not up then, check it again later."""
 
         async def again() -> None:
             if not await self.meet(rc):
@@ -130,17 +129,17 @@ class RcWatch:
         self._service.start_task(again(), f"meet {rc}")
 
     def meet_in_a_while(self, rc: str) -> None:
-        """Meet an RC that failed until it is up; not at once, or it and the schedule would try each other for ever."""
+        """Check a failed RC until it is up; not at once, or RC and schedule would retry each other for ever."""
         if rc not in self._failing:
             self._failing.add(rc)
             self._service.start_task(self._meet_later(rc), f"meet {rc}")
 
     def failed(self, rc: str) -> None:
-        """Count the RC as down; the schedule manager knows."""
+        """Count the RC as down; the schedule manager has been informed."""
         self.up.discard(rc)
 
     def forget(self, rc: str) -> bool:
-        """Count an RC that is gone as down; return whether it was up or put aside."""
+        """Count an RC that left as down; return whether it was up or put aside."""
         was_known = rc in self.up or bool(self._faults.pop(rc, ""))
         self.up.discard(rc)
         return was_known
@@ -153,7 +152,7 @@ class RcWatch:
             self.meet_again(rc)
 
     def believes(self, state: RcState) -> bool:
-        """Return whether what an RC published of itself can be taken over; if not, the RC itself is asked."""
+        """Return whether a published state of an RC is credible; if not, ask the RC itself."""
         rc, service = state.name, self._service
         if rc not in self.resources:
             return False
@@ -168,7 +167,7 @@ class RcWatch:
         return True
 
     def believed(self, found: Found) -> Found:
-        """Return what was found without the RCs that cannot be as they say; they are met once this one serves."""
+        """Return the findings without the RCs that are not credible; they are checked once this manager serves."""
         now_s = self._service.clock.now_s()
         believed = {rc: s for rc, s in found.rcs.items() if not contradiction(s, self.resources[rc], now_s)}
         return Found(believed, found.arcs)
@@ -198,7 +197,7 @@ class RcWatch:
             self._failing.discard(rc)
 
     async def _ask(self, rc: str, given: int | None = None) -> RcState | None:
-        """Return how the RC is by its own answer; None if there is none, or one that cannot be, and it is put aside."""
+        """Return the RC's own report of its state; None if it does not answer, or is not credible and put aside."""
         bus, clock = self._service.bus, self._service.clock
         try:
             state = await bus.ask(in_pool(rc), AskRc(), RcState, within_s=RC_REPLY_S)
@@ -206,7 +205,7 @@ class RcWatch:
             self._put_aside(rc, f"its answer cannot be read: {nonsense.detail}")
             return None
         except (Refusal, LinkError) as error:
-            log.warning("%s does not say how it is: %s", rc, error)
+            log.warning("%s did not answer with its state: %s", rc, error)
             return None
         fault = contradiction(state, self.resources[rc], clock.now_s(), given)
         if fault:
@@ -215,7 +214,7 @@ class RcWatch:
         return state
 
     async def _ask_doubted(self, rc: str) -> None:
-        """Ask an RC itself about which something was published that cannot be: anybody may publish in its name."""
+        """Ask an RC itself after a publication that is not credible: any component may publish in its name."""
         self._doubted.add(rc)
         try:
             await self._ask(rc, self._service.manager.epoch_of(rc))
@@ -223,7 +222,7 @@ class RcWatch:
             self._doubted.discard(rc)
 
     def _put_aside(self, rc: str, fault: str) -> None:
-        """Plan nothing on this RC until it makes sense, and go on with the others."""
+        """Plan nothing on this RC until it is credible, and go on with the others."""
         self.up.discard(rc)
         if self._faults.get(rc) != fault:
             self._faults[rc] = fault

@@ -1,8 +1,8 @@
-"""Recovery: which components there are, who holds each RC by its own word, and what each ARC asks for.
+"""Recovery: collects the components, the holders from the RCs, and the requests from the ARCs.
 
-Rule of this file: it asks and listens; what follows from the answers, others decide.
+Rule of this file: it asks and collects; it decides nothing.
 
-Source: RAM 2002, "The RC Scheduler"; truth lives with those who hold the hardware.
+Source: RAM 2002, "The RC Scheduler"; the RCs have the truth.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import logging
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock, Reply
 from backbone.component.messages import ComponentState
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.context_switch import RC_REPLY_S
@@ -32,7 +32,7 @@ RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a starting RC manager finds.
+    """Findings of a starting RC manager.
 
     Attributes:
         rcs: RCs that answered, by name.
@@ -43,7 +43,7 @@ class Found:
     arcs: Mapping[str, CurrentRequest]
 
     def holds_rightly(self, arc: str) -> bool:
-        """Say whether every RC the ARC thinks it holds says so too."""
+        """Return whether every RC confirms the ARC's belief that it holds it."""
         current = self.arcs.get(arc)
         if current is None or not current.epochs:
             return False
@@ -53,7 +53,7 @@ class Found:
         )
 
     def orphans(self) -> list[tuple[str, str, int]]:
-        """Return RC, ARC and epoch of each hold that is not right."""
+        """Return RC, ARC and epoch of each hold without a matching belief of its ARC."""
         return [
             (rc.name, holder.arc, holder.epoch)
             for rc in self.rcs.values()
@@ -62,7 +62,7 @@ class Found:
         ]
 
     def adopted(self, resources: Mapping[str, Resource], now_s: float) -> list[tuple[float, Adopted]]:
-        """Return since when each ARC that rightly holds RCs is connected to them, in the order in which they began."""
+        """Return the time of connection of each ARC with confirmed holds, in the order of these times."""
         found = []
         for arc, current in self.arcs.items():
             if self.holds_rightly(arc):
@@ -74,11 +74,11 @@ class Found:
 
 
 def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
-    """Return the event that makes an RC known.
+    """Return the event that introduces an RC.
 
     Args:
-        resource: As the mission file has it.
-        state: As the RC says; None: it is not up.
+        resource: Its declaration in the mission file.
+        state: The RC's report; None: it is not up.
     """
     return RcKnown(
         rc=resource.name,
@@ -99,10 +99,10 @@ class Recovery:
         self._bus, self._clock = bus, clock
 
     async def find(self, rcs: Collection[str]) -> Found:
-        """Ask every RC who holds it and every ARC what it asks for.
+        """Ask every RC for its holders and every ARC for its request.
 
         Args:
-            rcs: Names of all RCs there can be.
+            rcs: Names of all declared RCs.
         """
         pool = [c.address for c in await self._listing() if c.address.startswith(f"{Subsystem.RESOURCE_POOL}/")]
         held = await self.ask_all([at for at in pool if component_of(at) in rcs], AskRc(), RcState)
@@ -110,11 +110,11 @@ class Recovery:
         return Found(held, asked)
 
     async def present(self) -> set[str]:
-        """Return the names of all components, once the nameserver can tell for sure."""
+        """Return the names of all components, once the nameserver's list is complete."""
         return {component_of(component.address) for component in await self._listing()}
 
     async def ask_all(self, addresses: Sequence[str], question: Message, reply: type[Reply]) -> dict[str, Reply]:
-        """Ask all at once; return the answers of those that gave one, by name."""
+        """Ask all at once; return the answers, by name."""
 
         async def one(of: str) -> Reply | None:
             try:
@@ -126,7 +126,7 @@ class Recovery:
         return {component_of(of): got for of, got in zip(addresses, answers, strict=True) if got is not None}
 
     async def until_answered(self, of: str, question: Message, reply: type[Reply]) -> Reply:
-        """Ask a core service again and again until it answers."""
+        """Ask a core service repeatedly until it answers."""
         while True:
             try:
                 return await self._bus.ask(of, question, reply, within_s=SERVICE_REPLY_S)

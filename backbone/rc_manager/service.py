@@ -16,22 +16,21 @@ import logging
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
-from typing import Any, assert_never
+from typing import assert_never
 
+from backbone.addresses import DEPENDENCY_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
-from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
+from backbone.rc_manager.beats import Beats
 from backbone.rc_manager.context_switch import ContextSwitch, in_pool
 from backbone.rc_manager.messages import (
-    BEAT_MISSED_S,
     RENEW_EVERY_S,
     AskAttributes,
     AskRequest,
@@ -80,6 +79,7 @@ from backbone.scheduling.events import (
     Wanted,
     Woken,
 )
+from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
@@ -125,9 +125,10 @@ class RcManager(Component[RcManagerParameters]):
             goes_on=bool(given.trace) and _has_lines(Path(given.trace)),
             planner=load_planner(given.planner),
         )
+        self.answers = Answers(self.manager)
         self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}
-        self._beats: dict[str, float] = {}
+        self._beats = Beats(clock.rate)
         self._requesting: Counter[str] = Counter()
         self._switches: dict[str, asyncio.Task[None]] = {}
         self._wake = asyncio.Event()
@@ -190,14 +191,14 @@ class RcManager(Component[RcManagerParameters]):
         }
 
     # ------------------------------------------------------------------ questions
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ARCs, consoles and tools."""
         match asked.body:
             case SchedulingRequest() as request:
                 return await self._request(request)
             case Withdraw(arc=arc, reason=reason):
                 self._uses.pop(arc, None)
-                self._beats.pop(arc, None)
+                self._beats.forget(arc)
                 self.happened(Departed(arc, reason or "self"))
             case SetIdle(arc=arc, idle=idle):
                 self.happened(Idled(arc) if idle else Wanted(arc))
@@ -213,11 +214,11 @@ class RcManager(Component[RcManagerParameters]):
                 self.happened(NodeMoved(node, parent))
                 self._tell_paths(node)
             case AskSchedule():
-                return self.manager.schedule(self.clock.now_s())
+                return self.answers.schedule(self.clock.now_s())
             case AskWhy(name=name):
-                return self.manager.why(name, self.clock.now_s())
+                return self.answers.why(name, self.clock.now_s())
             case AskAttributes(name=name):
-                return self.manager.attributes(name)
+                return self.answers.attributes(name)
             case _:
                 return await super().answer(asked)
         return Done()
@@ -230,12 +231,12 @@ class RcManager(Component[RcManagerParameters]):
             self._admit(request, rcs)
         finally:
             self._requesting[request.arc] -= 1
-        return self.manager.scheduled(request.arc, self.clock.now_s())
+        return self.answers.scheduled(request.arc, self.clock.now_s())
 
     def _tell_paths(self, node: str) -> None:
         """Tell the ARCs at and below the node by which path they ask now: a later RC manager must hear of it."""
         with contextlib.suppress(UnknownRequest):  # nobody asks there yet
-            for one in self.manager.attributes(node).requests:
+            for one in self.answers.attributes(node).requests:
                 self.start_task(self._tell_path(one.arc, one.path), f"path of {one.arc}")
 
     async def _tell_path(self, arc: str, path: list[PathNode]) -> None:
@@ -250,7 +251,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _remember(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
         self._uses[request.arc] = next(uses for uses in request.alternatives if set(uses) == set(rcs))
-        self._beats[request.arc] = self.clock.now_s()
+        self._beats.heard(request.arc, self.clock.now_s())
 
     # ------------------------------------------------------------------ decide, then do
     def happened(self, event: Event, at_s: float | None = None) -> None:
@@ -278,7 +279,7 @@ class RcManager(Component[RcManagerParameters]):
             case _:
                 assert_never(instruction)
 
-    def _switch(self, arc: str, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    def _switch(self, arc: str, work: Callable[[], Coroutine[object, None, None]]) -> None:
         """Run the work after whatever is still under way for this ARC was ended."""
         before = self._switches.get(arc)
 
@@ -351,7 +352,7 @@ class RcManager(Component[RcManagerParameters]):
             if current.rcs and not found.holds_rightly(arc):
                 self._admit(current.request, tuple(current.rcs))
 
-    def _heard_from_nameserver(self, envelope: Envelope[Any]) -> None:
+    def _heard_from_nameserver(self, envelope: Envelope[Message]) -> None:
         match envelope.body:
             case Appeared(component=component):
                 self._appeared(component_of(component.address), component.address)
@@ -362,9 +363,9 @@ class RcManager(Component[RcManagerParameters]):
         if name in self._resources and at.startswith("resource_pool/"):
             self._rcs.meet_again(name)
 
-    def _heard_rc(self, envelope: Envelope[Any]) -> None:
+    def _heard_rc(self, envelope: Envelope[RcState]) -> None:
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
-        state: RcState = envelope.body
+        state = envelope.body
         rc = state.name
         if not self._rcs.believes(state):
             return
@@ -387,7 +388,7 @@ class RcManager(Component[RcManagerParameters]):
             self.happened(RcWentDown(name))
         elif name in self._uses:
             self._uses.pop(name)
-            self._beats.pop(name, None)
+            self._beats.forget(name)
             self.happened(Departed(name, "dead"))
 
     def _link_changed(self, up: bool) -> None:
@@ -417,10 +418,8 @@ class RcManager(Component[RcManagerParameters]):
         """Renew the leases of ARCs whose beat is fresh; end the hold of those that hang."""
         rate = self.clock.rate
         while True:
-            now_s = self.clock.now_s()
-            for arc in [arc for arc, at_s in self._beats.items() if now_s - at_s > BEAT_MISSED_S * rate]:
-                log.warning("%s has not beaten for %.1f s", arc, (now_s - self._beats[arc]) / rate)
-                del self._beats[arc]
+            for arc, silent_s in self._beats.look(self.clock.now_s()).items():
+                log.warning("%s has not beaten for %.1f s", arc, silent_s)
                 self._uses.pop(arc, None)
                 self.happened(Departed(arc, "silent"))
             self._publish_leases()
@@ -433,7 +432,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def publish_news(self) -> None:
         """Publish the schedule, and how many run if that is news."""
-        schedule = self.manager.schedule(self.clock.now_s())
+        schedule = self.answers.schedule(self.clock.now_s())
         running = sum(1 for request in schedule.requests if request.state == "running")
         feedback = f"{running} of {len(schedule.requests)} ARCs run"
         if self._trace.stopped_by:
@@ -443,10 +442,10 @@ class RcManager(Component[RcManagerParameters]):
             super().publish_news()
         self.bus.publish(self.address, Conversation.SCHEDULE, schedule)
 
-    def _heard_beat(self, envelope: Envelope[Any]) -> None:
+    def _heard_beat(self, envelope: Envelope[Beat]) -> None:
         arc = envelope.body.arc
         if arc in self._uses:
-            self._beats[arc] = self.clock.now_s()
+            self._beats.heard(arc, self.clock.now_s())
         elif arc not in self._switches and not self._requesting[arc]:
             self._switch(arc, lambda: self._meet_arc(arc))
 

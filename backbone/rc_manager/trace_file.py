@@ -1,7 +1,7 @@
 """The file of the schedule trace: whole lines, in the order of the decisions, without a gap.
 
-A mission outlives its trace: at the first line that cannot be written the trace stops, with whole lines only, and says
-why. It does not go on later, because a judge would take what is missing for a fault of the scheduler.
+A mission outlives its trace: at the first line that cannot be written the trace stops, with whole lines only, and the
+mission's log has the reason. It does not go on later, because a judge would blame the scheduler for the missing lines.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ class TraceFile:
     """Appends to the file at this path.
 
     Args:
-        path: The file; empty: nothing is written.
+        path: The file; empty: no trace.
     """
 
     def __init__(self, path: str) -> None:
         self._descriptor: int | None = None
         self.stopped_by = ""
-        """What ended the trace before its time; empty: nothing did."""
+        """The error that ended the trace early; empty: none did."""
         if not path:
             return
         try:
@@ -41,14 +41,14 @@ class TraceFile:
             write_all(self._descriptor, json.dumps(line).encode() + b"\n")
         except OSError as error:
             self.stopped_by = str(error.strerror)
-            with contextlib.suppress(OSError):  # no file but a device or pipe
+            with contextlib.suppress(OSError):  # a device or pipe, no file
                 os.ftruncate(self._descriptor, end)
             self.close()
             return False
         return True
 
     def close(self) -> None:
-        """Write no more; idempotent."""
+        """End the trace; idempotent."""
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None

@@ -1,6 +1,6 @@
-"""Alternatives: which of the sets of RCs that would do an ARC should wait for, or why none will ever do.
+"""Alternatives: chooses the set of RCs that an ARC waits for, or refuses a request that can never run.
 
-Rule of this file: it chooses once, when an ARC asks; time does not count. What is chosen stays.
+Rule of this file: it chooses once, when an ARC sends its request; time does not count. The chosen set stays.
 
 Source: RAM 2002, resource controllers: a robot "not in use by another process" is selected.
 """
@@ -26,21 +26,21 @@ from backbone.scheduling.state import ScheduleState
 
 Wish = Mapping[str, RcUse]
 
-SHORTEST_RUNTIME_S = 0.001  # chosen: less than any context switch takes; shorter slices only keep RCs from everybody
+SHORTEST_RUNTIME_S = 0.001  # chosen: less than any context switch takes; shorter slices only waste the RCs' time
 
 
 def choose(state: ScheduleState, request: SchedulingRequest) -> tuple[str, ...]:
     """Return the set of RCs this request should wait for.
 
-    What it already waits for or holds stays. Otherwise RCs that did not fail come first, then those
-    no other ARC asked for exclusively (two claims of any robot get two robots), then those that are
-    running, then the request's own order.
+    A set that it already waits for or holds stays. Otherwise RCs that did not fail come first, then RCs
+    without another ARC's exclusive request (two claims of any robot get two robots), then running RCs,
+    then the request's own order.
 
     Raises:
-        MissingRuntime: It does not say for how long it must run at least.
+        MissingRuntime: The request has no valid minimum run time.
         UnknownRc: All alternatives name RCs that do not exist.
         CapacityExceeded: It could not run even alone; facts ``demanded``, ``used`` and ``free``.
-        SchedulingRefusal: It asks for nothing, or for streams that make no sense.
+        SchedulingRefusal: The request has no RC, or a stream with impossible times.
     """
     _check_form(request)
     known = [wish for wish in request.alternatives if wish.keys() <= state.rcs.keys()]
@@ -103,7 +103,7 @@ def _share(streams: Sequence[Usage]) -> float:
 
 
 def can_be_planned(least_s: float, most_s: float) -> bool:
-    """Say whether slices of these times can be planned."""
+    """Return whether slices of these times can be planned."""
     return SHORTEST_RUNTIME_S <= least_s <= most_s <= A_DAY_S
 
 

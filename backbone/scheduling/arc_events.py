@@ -1,6 +1,6 @@
-"""ARC events: what follows from what ARCs ask and say, and from the outcomes of their context switches.
+"""ARC events: the effects of ARCs' requests and messages, and of the outcomes of their context switches.
 
-The rest of an ARC's life is decided by the plan (``schedule_manager``).
+The plan decides the rest of an ARC's life (``schedule_manager``).
 
 Rules of this file (numbers as in docs and ``why``):
 
@@ -51,17 +51,17 @@ class ArcEvents:
         self._retrying: dict[str, ArcEntry] = {}
         self._damping = Damping()
 
-    # What ARCs want.
+    # Requests of ARCs.
 
     def requested(self, event: Requested) -> None:
-        """An ARC asks, or asks again: for other RCs it asks anew, once those it has are free."""
+        """Take in a request or a new version of it; a request for other RCs counts once the present ones are free."""
         request = event.request
         known = self._state.arcs.get(request.arc)
         if known is None:
             self._add(event)
             return
         if known.afterwards is Afterwards.GONE and known.holds:
-            self._successors[request.arc] = event  # it asks anew while its last RCs are still being freed
+            self._successors[request.arc] = event  # a new request while its last RCs are still being freed
             return
         place_in_tree = self._priorities.place(request)
         if dict(known.uses) != _chosen(request, event.rcs) or known.place_in_tree != place_in_tree:
@@ -76,9 +76,9 @@ class ArcEvents:
             self.wanted(request.arc)
 
     def adopted(self, event: Adopted) -> None:
-        """Let an ARC run on that an earlier RC manager granted its RCs.
+        """Adopt an ARC that an earlier RC manager granted its RCs.
 
-        The caller says that it happened when its RCs were connected, so the trace shows its slice as it was.
+        The caller dates the event to the connection of its RCs, so the trace shows its slice as it was.
         """
         request, rcs = event.request, tuple(event.epochs)
         if request.arc in self._state.arcs or any(rc not in self._state.rcs for rc in rcs):
@@ -90,7 +90,7 @@ class ArcEvents:
         self._state.request_again(arc, request)
 
     def wanted(self, name: str) -> None:
-        """An idle ARC wants time again."""
+        """Queue an idle ARC: it wants time again."""
         arc = self._state.arcs.get(name)
         if arc is None:
             return
@@ -101,7 +101,7 @@ class ArcEvents:
             self._want(arc)
 
     def _want(self, arc: ArcEntry) -> None:
-        """Queue an idle ARC, or have it wait for that if its owner asked and left too often."""
+        """Queue an idle ARC, later if its owner asked and left too often."""
         wait_s = self._damping.wait_s(arc.request.owner, self._transitions.now_s)
         if wait_s:
             self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
@@ -121,7 +121,7 @@ class ArcEvents:
             self._damping.left_in_vain(arc.request.owner, self._transitions.now_s)
 
     def idled(self, name: str) -> None:
-        """An ARC wants no time now; it keeps its request and gives its RCs back."""
+        """Revoke an ARC that wants no time now; it keeps its request."""
         arc = self._state.arcs.get(name)
         if arc is None:
             return
@@ -141,7 +141,7 @@ class ArcEvents:
                 self._transitions.revoke(arc, "self", "", Afterwards.IDLE)
 
     def departed(self, name: str, why: str) -> None:
-        """An ARC withdrew or died."""
+        """Remove an ARC that withdrew or died."""
         self._successors.pop(name, None)
         self._depart(name, why)
 
@@ -159,7 +159,7 @@ class ArcEvents:
             self._transitions.revoke(arc, why, "", Afterwards.GONE)
 
     def runtime_changed(self, event: RuntimeChanged) -> None:
-        """An ARC has other run times from its next slice on; times that cannot be planned change nothing."""
+        """Set other run times from the ARC's next slice on; times that cannot be planned change nothing."""
         arc, minimum_s = self._state.arcs.get(event.arc), event.minimum_runtime_s
         maximum_s = max(event.maximum_runtime_s, self._longest_s(minimum_s))
         if arc is None or (arc.minimum_s, arc.maximum_s) == (minimum_s, maximum_s):
@@ -171,7 +171,7 @@ class ArcEvents:
         self._transitions.trace.record(line, "from the next slice on")
 
     def extended(self, name: str, until_s: float) -> None:
-        """A running ARC goes on until then, at most until the end of its maximum run time."""
+        """Extend the slice of a running ARC, at most until the end of its maximum run time."""
         arc = self._state.arcs.get(name)
         if arc is None or arc.state is not RequestState.RUNNING:
             return
@@ -182,13 +182,13 @@ class ArcEvents:
     # Outcomes of context switches.
 
     def opened(self, name: str) -> None:
-        """The ARC's RCs have settled and its gate is open."""
+        """Begin the slice: the ARC's RCs have settled and its gate is open."""
         arc = self._state.arcs.get(name)
         if arc is not None and arc.state is RequestState.CONNECTING:
             self._transitions.grant(arc)
 
     def open_failed(self, name: str, rc: str) -> None:
-        """The ARC's RCs could not all be connected (``rc``: already counted as down), or its gate did not open."""
+        """Queue or idle an ARC whose RCs did not all connect (``rc`` counts as down), or whose gate stayed shut."""
         arc = self._state.arcs.get(name)
         if arc is None or arc.state is not RequestState.CONNECTING:
             return
@@ -201,7 +201,7 @@ class ArcEvents:
         self.freed(name)
 
     def freed(self, name: str) -> None:
-        """All RCs of the ARC are in their safe states."""
+        """Count the ARC's RCs as free: all are in their safe states."""
         arc = self._state.arcs.get(name)
         if arc is None or arc.state is not RequestState.REVOKING:
             return
@@ -219,7 +219,7 @@ class ArcEvents:
     # ARCs that could not open their gates.
 
     def retry(self) -> None:
-        """Let ARCs ask again whose time for that has come."""
+        """Queue the ARCs whose time to retry has come."""
         for arc in [*self._retrying.values()]:
             if arc.retry_s is None:
                 del self._retrying[arc.name]
@@ -228,7 +228,7 @@ class ArcEvents:
                 self._queue(arc)
 
     def next_retry_s(self) -> float | None:
-        """Return when the next ARC asks again; None if none does."""
+        """Return when the next ARC retries; None if none does."""
         return min((arc.retry_s for arc in self._retrying.values() if arc.retry_s is not None), default=None)
 
     # Bookkeeping.
@@ -261,7 +261,7 @@ class ArcEvents:
             self.requested(successor)
 
     def _successor_idles(self, name: str, *, idle: bool) -> None:
-        """Let the request that waits for the end of the old one of this name know, too."""
+        """Apply an event also to the request that waits for the end of the old one of this name."""
         if name in self._successors:
             event = self._successors[name]
             self._successors[name] = Requested(msgspec.structs.replace(event.request, idle=idle), event.rcs)

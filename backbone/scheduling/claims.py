@@ -1,4 +1,4 @@
-"""From a claim to the scheduling request: what an ARC asks of the RC manager on its owner's behalf.
+"""From a claim to the scheduling request that an ARC sends to the RC manager for its owner.
 
 Rule of this file: pure, so that a mission can be rehearsed with the very requests its ARCs will send.
 """
@@ -33,7 +33,7 @@ def scheduling_request(
     Args:
         sets: The sets of RCs that would do, best first: kind → name.
         path: Names and priorities from the mission's root, or of the console alone.
-        streams: What it sends through each RC it uses by streams.
+        streams: Kind of RC → the ARC's streams there.
         minimum_runtime_s: Shortest useful time, seconds.
         maximum_runtime_s: End of all extensions, seconds; 0: the minimum.
         streamed: Kinds of RC it uses by streams.

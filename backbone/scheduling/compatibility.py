@@ -1,7 +1,7 @@
 """Compatibility: which ARCs can hold their RCs together (rule 1).
 
-An exclusive RC has one holder; on a sharable one every stream of every holder meets its deadline. The answers are
-remembered: ``demand_changed`` and ``service_changed`` forget those that may be others now.
+An exclusive RC has one holder; on a sharable one every stream of every holder meets its deadline. Answers are cached;
+``demand_changed`` and ``service_changed`` drop the answers that may have changed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Compatibility:
     """Answers for the ARCs and RCs of one schedule.
 
     Attributes:
-        admission: How it is decided what a sharable RC can serve.
+        admission: Test of the demand that a sharable RC can serve.
     """
 
     def __init__(
@@ -29,7 +29,7 @@ class Compatibility:
 
         Args:
             users: RC → the active ARCs that use it.
-            admission: How it is decided what a sharable RC can serve.
+            admission: Test of the demand that a sharable RC can serve.
         """
         self._rcs = rcs
         self._users = users
@@ -39,7 +39,7 @@ class Compatibility:
         self._roomy: dict[str, bool] = {}
 
     def fits(self, arc: ArcEntry, others: Iterable[ArcEntry]) -> bool:
-        """Say whether the ARC can hold all its RCs together with these others."""
+        """Return whether the ARC can hold all its RCs together with these others."""
         beside = []
         for other in others:
             common = arc.touches & other.touches
@@ -50,43 +50,43 @@ class Compatibility:
         return all(self.can_share(rc, [arc, *(other for other in beside if rc in other.uses)]) for rc in arc.shares)
 
     def clash(self, arc: ArcEntry, other: ArcEntry) -> bool:
-        """Say whether the ARC cannot hold all its RCs together with this other one."""
+        """Return whether the ARC cannot hold all its RCs together with this other one."""
         return bool(arc.touches & other.excludes or arc.excludes & other.touches) or not self.fits(arc, (other,))
 
     def usable(self, arc: ArcEntry) -> bool:
-        """Say whether the ARC could run alone: its RCs are up and can serve it."""
+        """Return whether the ARC could run alone: its RCs are up and can serve it."""
         known = self._usable.get(arc)
         if known is None:
             known = self._usable[arc] = all(self._rcs[rc].up for rc in arc.uses) and self.fits(arc, ())
         return known
 
     def can_share(self, rc: str, users: Sequence[ArcEntry]) -> bool:
-        """Say whether the sharable RC can serve all of these."""
+        """Return whether the sharable RC can serve all of these."""
         return self.has_room_for_all(rc) or self._admissible(rc, users)
 
     def has_room_for_all(self, rc: str) -> bool:
-        """Say whether the whole active demand fits at once (rule 15): then no part of it need be looked at."""
+        """Return whether the whole active demand fits at once (rule 15): then every part of it does."""
         if rc not in self._roomy:
             users = [*self._users(rc)]
             self._roomy[rc] = all(rc in user.shares for user in users) and self._admissible(rc, users)
         return self._roomy[rc]
 
     def demand_changed(self, rcs: Iterable[str]) -> None:
-        """Forget whether these sharable RCs have room for all: other ARCs ask for them now."""
+        """Drop the answers of ``has_room_for_all`` about these sharable RCs: other ARCs ask for them now."""
         for rc in rcs:
             self._roomy.pop(rc, None)
             if len(self._admitted.get(rc, ())) > SETS_REMEMBERED:
                 del self._admitted[rc]
 
     def service_changed(self, rcs: Iterable[str]) -> None:
-        """Forget what these RCs can serve: their states, capacities or their users' priorities are others now."""
+        """Drop all answers about these RCs: their states, capacities or their users' priorities have changed."""
         for rc in rcs:
             self._roomy.pop(rc, None)
             self._admitted.pop(rc, None)
         self._usable.clear()
 
     def forget(self, arc: ArcEntry) -> None:
-        """Forget an ARC that is gone."""
+        """Drop the answers about an ARC that left."""
         self._usable.pop(arc, None)
 
     def _admissible(self, rc: str, users: Sequence[ArcEntry]) -> bool:

@@ -1,28 +1,28 @@
-"""Damping: an owner that asks and leaves, again and again, cannot keep others from running.
+"""Damping: an owner that repeatedly requests and withdraws cannot keep others from running.
 
-A higher request displaces others at once (rule 4). One that cut a slice short and leaves before it is granted has cost
-them their turn and gained nothing. After a few such in a row the owner's next request counts only after a wait, which
-doubles with each.
+A higher request preempts others at once (rule 4). A request that cut a slice short and is withdrawn before its grant
+has cost the others their turn and gained nothing. After a few of these in a row the owner's next request counts only
+after a wait, which doubles with each.
 
 Rule of this file: pure; time is an argument.
 """
 
 from __future__ import annotations
 
-FREE = 4  # chosen: so often may an operator think better of it
+FREE = 4  # chosen: so often may an operator have second thoughts
 MOST = 9  # chosen: from here on the wait is the longest
-FORGIVEN_S = 2.0  # chosen: one leave is forgotten after this time
-LONGEST_S = 30.0  # chosen: some slices of those that were displaced
+FORGIVEN_S = 2.0  # chosen: one withdrawal is forgotten after this time
+LONGEST_S = 30.0  # chosen: some slices of the preempted ARCs
 
 
 class Damping:
-    """Counts leaves before the grant, owner by owner."""
+    """Counts withdrawals before the grant, owner by owner."""
 
     def __init__(self) -> None:
         self._left: dict[str, tuple[float, float]] = {}
 
     def left_in_vain(self, owner: str, now_s: float) -> None:
-        """Count a request of this owner that cut a slice short and left before it was granted."""
+        """Count a request of this owner that cut a slice short and was withdrawn before its grant."""
         self._left[owner] = min(MOST, self._count(owner, now_s) + 1), now_s
 
     def wait_s(self, owner: str, now_s: float) -> float:

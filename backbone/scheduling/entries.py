@@ -1,6 +1,6 @@
 """Entries: the record of each RC and of each ARC in the schedule.
 
-Rule of this file: data and what is computed from it alone. Only ``ScheduleState`` writes it.
+Rule of this file: data, and values computed from it alone. Only ``ScheduleState`` writes it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class RcEntry:
         epoch: Largest epoch given so far, at the beginning of settling.
         granted_epoch: Largest epoch of a grant so far.
         failed: True if it went down; False if it only was not started yet.
-        fault: Why it is put aside while it answers; empty: it is not.
+        fault: Why it is put aside although it answers; empty: it is not.
         holders: ARCs that hold it, settling or not yet free of it, in the order in which they got it.
     """
 
@@ -52,11 +52,11 @@ class RcEntry:
 
 
 class Afterwards(Enum):
-    """What becomes of an ARC once its RCs are free."""
+    """State of an ARC once its RCs are free."""
 
     WAIT = "wait"  # it is in the queue again already
     IDLE = "idle"
-    WANT = "want"  # it said idle, and then that it wants time after all
+    WANT = "want"  # it set itself idle, and then wanted time again
     GONE = "gone"
 
 
@@ -66,7 +66,7 @@ class ArcEntry:
 
     Attributes:
         request: As last sent.
-        uses: RC → how it uses it; the alternative that was chosen.
+        uses: RC → its use; the chosen alternative.
         place_in_tree: Names from the root to its owner.
         path: The same with the present numbers.
         level: Its parent's path and its own number, the same object in all siblings of that number: they are equals.
@@ -81,23 +81,23 @@ class ArcEntry:
         stamp: When it became active or was last served, and which of several at that time it was.
         reservation: Set while RCs are being freed for it by force, or where equals reserve nothing from each other: it
             comes before all equals; smaller is earlier.
-        state: Where it is.
-        since_s: When it came to that state.
+        state: State of its request.
+        since_s: When it entered that state.
         began_s: When its RCs began to settle, while it holds them.
         end_s: End of its slice, while it runs.
         granted_s: When it was granted, while it runs.
         slice_s: When its present slice began, while it runs: at the grant, or later where it stayed connected.
         epochs: RC → epoch, while it holds them.
-        awaited: A look at it is on the agenda, because an ARC waits for the end of its slice.
-        look_s: When that look is: at the end of its slice, or later where the discipline lets it run on.
-        afterwards: What becomes of it once free, while it is being revoked.
-        has_forced: A holder lost its RCs in the middle of a slice for it, since it was queued.
-        retry_s: When it counts again, after it could not open or left too often; None: when it wants time.
+        awaited: True: a check of it is scheduled, because an ARC waits for the end of its slice.
+        look_s: Time of that check: the end of its slice, or later where the discipline lets it run on.
+        afterwards: Its state once its RCs are free, while it is being revoked.
+        has_forced: True: a holder was preempted in the middle of a slice for it, since it was queued.
+        retry_s: When it is queued again, after its gate stayed shut or it left too often; None: when it wants time.
         retry_why: Why not sooner.
-        had_s: Time it had, as the discipline ``time`` counts it; without the run that goes on.
+        had_s: Run time so far, as the discipline ``time`` counts it; without the present run.
         raised: Levels by which it rose because it waited long (aging).
         swapped_out: Why it lost its RCs last; empty: never.
-        swapped_out_by: Because of whom.
+        swapped_out_by: ARC or RC that caused this.
     """
 
     request: SchedulingRequest
@@ -140,22 +140,22 @@ class ArcEntry:
         return self.request.arc
 
     def goes_before(self, other: ArcEntry) -> bool:
-        """Say whether its owner is strictly higher than the other's."""
+        """Return whether its owner is strictly higher than the other's."""
         return self.level is not other.level and higher(self.path, other.path)
 
     @property
     def active(self) -> bool:
-        """It wants time, or still holds RCs."""
+        """Whether it wants time, or still holds RCs."""
         return self.state is not RequestState.IDLE
 
     @property
     def holds(self) -> bool:
-        """RCs are connected to it, settling for it, or not yet free of it."""
+        """Whether RCs are connected to it, settling for it, or not yet free of it."""
         return self.state in HOLDING
 
     @property
     def queued(self) -> bool:
-        """It has a place in the order: it waits, or will wait as soon as its RCs are free."""
+        """Whether it has a place in the order: it waits, or will wait as soon as its RCs are free."""
         return self.state is RequestState.WAITING or (
             self.state is RequestState.REVOKING and self.afterwards is Afterwards.WAIT
         )
@@ -166,5 +166,5 @@ class ArcEntry:
         return self.settle_s + self.minimum_s
 
     def served(self, now_s: float) -> bool:
-        """Say whether it runs and had its whole slice."""
+        """Return whether it runs and had its whole slice."""
         return self.state is RequestState.RUNNING and now_s >= self.end_s - INSTANT_S

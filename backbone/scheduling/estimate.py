@@ -44,7 +44,7 @@ def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot
         if not all_equal:
             above = [*(exclusive[rc] for rc in arc.uses), *(sharers[rc] for rc in alone if rc in sharers)]
             if any(one.largest(arc.path) > -math.inf for one in above):
-                start_s = math.inf  # once those above it run, they need not end
+                start_s = math.inf  # higher ARCs need not end once they run
             for rc in arc.uses:
                 (sharers if rc in arc.shares else exclusive)[rc].add(arc.path, start_s)
         slots.append(Slot(arc, start_s, [hold for hold in standing if hold[2] > now_s + INSTANT_S]))
@@ -57,7 +57,7 @@ def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot
 
 
 def _share(table: Table, arc: ArcEntry, rc: str) -> float:
-    """Return the part of what the RC can give that the ARC asks for, 0 to 1."""
+    """Return the ARC's demand as a part of the RC's capacity, 0 to 1."""
     demanded = sum(one.packet_time_s / one.period_s for one in arc.uses[rc].streams)
     return min(1.0, demanded / table.state.rcs[rc].capacity)
 

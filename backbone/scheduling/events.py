@@ -1,17 +1,17 @@
 """Events and instructions: the input and the output of the schedule manager.
 
 Rules of this file: plain frozen data; no bus, no clock. Times are mission seconds.
-An event says what *has happened*; an instruction is carried out in the order given, and its outcome
-comes back as an event.
+An event reports a fact of the past; instructions are carried out in the order given, and their outcomes
+come back as events.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from backbone.scheduling.requests import SchedulingRequest
+from backbone.scheduling.trace import Line
 
 
 # ---------------------------------------------------------------------- events
@@ -43,7 +43,7 @@ class RcWentDown:
     """The RC does not answer any more, or cannot be believed.
 
     Attributes:
-        fault: What it says that cannot be; empty: it does not answer.
+        fault: Its contradiction; empty: it does not answer.
     """
 
     rc: str
@@ -60,7 +60,7 @@ class RcCameBack:
 
 @dataclass(frozen=True, slots=True)
 class CapacityChanged:
-    """A sharable RC can give more or less of its time from now on."""
+    """The capacity of a sharable RC has changed."""
 
     rc: str
     capacity: float
@@ -68,7 +68,7 @@ class CapacityChanged:
 
 @dataclass(frozen=True, slots=True)
 class Requested:
-    """An ARC asks; the set of RCs is already chosen (``choose`` in the schedule manager)."""
+    """An ARC sent a request; the set of RCs is already chosen (``choose`` in the schedule manager)."""
 
     request: SchedulingRequest
     rcs: tuple[str, ...]
@@ -220,7 +220,7 @@ class RevokeArc:
     Attributes:
         epochs: RC → epoch it held.
         why: ``slice``, ``higher``, ``rc``, ``self``, ``owner``, ``dead``, ``capacity``, ``failed``.
-        by: ARC or RC because of which; empty for ``self``.
+        by: ARC or RC that caused it; empty for ``self``.
         deadline_s: Seconds its decision process has to stop cleanly; 0: none.
         expected_s: Predicted next grant; negative: none.
     """
@@ -249,7 +249,7 @@ class Record:
         cause: One line for people, of the rule that decided.
     """
 
-    line: Mapping[str, Any]
+    line: Line
     cause: str = ""
 
 

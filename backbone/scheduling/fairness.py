@@ -1,11 +1,12 @@
-"""Fairness: which of several equals comes first (rule 13).
+"""Fairness: the order among equals (rule 13).
 
-* ``turns``: the one that waits longest since it came or was last served. Each gets its own minimum run time in turn.
-* ``time``: the one that has had the least time. Each asks for one more minimum run time and has to have it by a
-  virtual deadline; of those that have not had more than the average of their rivals, the earliest deadline comes
-  first. An ARC that asks for short slices is served more often, not longer.
+* ``turns``: the ARC that waits longest since it became active or was last served comes first. Each gets its own minimum
+  run time in turn.
+* ``time``: the ARC with the least run time comes first. Each needs one more minimum run time by a virtual deadline; of
+  the ARCs that did not have more than the average of their rivals, the earliest deadline comes first. An ARC with short
+  slices is served more often, not longer.
 
-Rule of this file: pure; others say which ARCs are rivals, and what time it is.
+Rule of this file: pure; the rivals and the time are arguments.
 
 Source: IROS 2001, "RC manager" (turns). Stoica and Abdel-Wahab, "Earliest Eligible Virtual Deadline
 First", 1995 (time).
@@ -41,10 +42,10 @@ class Fairness(Protocol):
         """Count an ARC that became active."""
 
     def stopped(self, arc: ArcEntry, now_s: float) -> None:
-        """Count the time of an ARC that runs no longer."""
+        """Count the run time of an ARC that was revoked."""
 
     def runs_on(self, arc: ArcEntry, waiting: Iterable[ArcEntry], now_s: float) -> bool:
-        """Say whether an ARC whose slice is over gets one more at once, before these equals that wait for its RCs."""
+        """Return whether an ARC gets one more slice at once, before these equals that wait for its RCs."""
 
 
 class Turns:
@@ -79,7 +80,7 @@ class EqualTime:
 
         Args:
             rivals: ARC → its equals that cannot run beside it.
-            tolerance_s: By so much no timer is exact.
+            tolerance_s: Inaccuracy of timers.
         """
         self._rivals = rivals
         self._tolerance_s = tolerance_s
@@ -91,7 +92,7 @@ class EqualTime:
             return reserved
         had_s = _had_s(arc, now_s)
         late = not eligible(had_s, self._others_had_s(arc, now_s), self._tolerance_s)
-        if arc.state is RequestState.RUNNING:  # a rival with as much time, but for what timers miss, comes before it
+        if arc.state is RequestState.RUNNING:  # a rival with equal time, within the timers' accuracy, comes before it
             return (late, deadline_s(had_s, arc.minimum_s) + self._tolerance_s, now_s, 0)
         return (late, deadline_s(had_s, arc.minimum_s), *arc.stamp)
 
@@ -114,24 +115,24 @@ class EqualTime:
 
 
 def eligible(had_s: float, rivals_s: Iterable[float], tolerance_s: float = 0.0) -> bool:
-    """Say whether an ARC that had this much time may ask for more before its rivals.
+    """Return whether an ARC with this run time may get more before its rivals.
 
     Args:
         had_s: Time it had.
         rivals_s: Times its rivals had.
-        tolerance_s: By so much no timer is exact: an ARC that is ahead of the average by no more is not ahead.
+        tolerance_s: Inaccuracy of timers: an ARC that is ahead of the average by no more is not ahead.
     """
     return had_s <= fmean([had_s, *rivals_s]) + max(ROUNDING_S, tolerance_s)
 
 
 def joining_s(had_s: float, rivals_s: Iterable[float]) -> float:
-    """Return what an ARC that comes (again) counts as having had: no credit for the time it was away."""
+    """Return the run time that a new or returning ARC starts with: no credit for the time it was away."""
     others = [*rivals_s]
     return max(had_s, fmean(others)) if others else had_s
 
 
 def deadline_s(had_s: float, minimum_s: float) -> float:
-    """Return the virtual time by which it has to have had one more minimum run time."""
+    """Return the virtual deadline of its next minimum run time."""
     return had_s + minimum_s
 
 

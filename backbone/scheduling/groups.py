@@ -1,10 +1,10 @@
-"""Groups: which ARCs can have anything to do with each other.
+"""Groups: sets of ARCs that can affect each other.
 
 A group is a connected component of active ARCs that share any RC, sharable ones too: capacity
 couples them, and not pairwise (of three ARCs of 0.4 any two fit, three do not). Groups run in
 parallel and never change each other's times.
 
-``groups`` says what they are; ``Groups`` keeps them up to date while ARCs come and go.
+``groups`` computes them; ``Groups`` keeps them up to date while ARCs come and go.
 
 Source: RAM 2002, "ARCs that ask for independent sets of RCs are put into different groups".
 """
@@ -16,7 +16,7 @@ from typing import Generic, TypeVar
 
 A = TypeVar("A", bound=Hashable)
 
-SPLIT_SHARE = 8  # chosen: looking through a big group costs each of the ARCs that leave it a few steps
+SPLIT_SHARE = 8  # chosen: a search through a big group costs each ARC that leaves it a few steps
 
 
 def groups(uses: Mapping[str, Collection[str]]) -> list[list[str]]:
@@ -57,7 +57,7 @@ def groups(uses: Mapping[str, Collection[str]]) -> list[list[str]]:
 
 
 class Group(Generic[A]):
-    """ARCs that share RCs; a big one may fall apart a while before that is noticed."""
+    """ARCs that share RCs; a big group may have fallen apart for a while before ``Groups`` splits it."""
 
     __slots__ = ("_left", "arcs")
 
@@ -69,14 +69,14 @@ class Group(Generic[A]):
         return len(self.arcs)
 
     def leave(self, arc: A) -> int:
-        """Take the ARC out; return how many have left since the group was known to be one."""
+        """Remove the ARC; return how many have left since the last check that the group is one."""
         del self.arcs[arc]
         self._left += 1
         return self._left
 
 
 class Groups(Generic[A]):
-    """The groups of the ARCs that are there now.
+    """The groups of the present ARCs.
 
     Args:
         exact_up_to: Groups of at most this size are always exactly one group; bigger ones may be
@@ -93,19 +93,19 @@ class Groups(Generic[A]):
         return arc in self._of
 
     def of(self, arc: A) -> Group[A]:
-        """Return the group of an ARC that is there."""
+        """Return the group of a present ARC."""
         return self._of[arc]
 
     def users(self, rc: str) -> Collection[A]:
-        """Return the ARCs that use the RC, in the order in which they came."""
+        """Return the ARCs that use the RC, in the order of their arrival."""
         return self._users.get(rc, {})
 
     def all(self) -> list[Group[A]]:
-        """Return all groups, that of the ARC that came first first."""
+        """Return all groups, in the order of their first ARCs' arrivals."""
         return list(dict.fromkeys(self._of.values()))
 
     def add(self, arc: A, rcs: Collection[str]) -> None:
-        """Let the ARC come; it joins the groups of all who use its RCs."""
+        """Add the ARC; it joins the groups of all ARCs that use its RCs."""
         self._uses[arc] = rcs
         joined = Group({arc: None})
         for rc in rcs:
@@ -117,7 +117,7 @@ class Groups(Generic[A]):
         self._of[arc] = joined
 
     def remove(self, arc: A) -> None:
-        """Let the ARC go; its group may fall apart."""
+        """Remove the ARC; its group may fall apart."""
         for rc in self._uses.pop(arc):
             del self._users[rc][arc]
         group = self._of.pop(arc)

@@ -1,4 +1,4 @@
-"""Invariants: what holds after every decision; tests and simulations check them.
+"""Invariants that hold after every decision; tests and simulations check them.
 
 Rule of this file: it reads the schedule and changes nothing.
 """
@@ -12,7 +12,7 @@ from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.requests import RequestState
 
 Broken = tuple[str, Sequence[ArcEntry]]
-"""What should hold and does not, and the ARCs concerned."""
+"""A broken invariant, and the ARCs concerned."""
 
 
 def broken(schedule: MasterSchedule, now_s: float) -> Iterator[Broken]:

@@ -1,8 +1,8 @@
-"""Large group: in a group too large to be planned whole, each RC is reserved for the first in line at it only.
+"""Large group: in a group too large to be planned whole, each RC is reserved only for the first ARC in line.
 
-This is backfilling with a reservation for the first in line (see ``planner``), here at each RC: an ARC starts if it is
-done before those would start, and may overtake ARCs that stand further back. That takes a look at the ARC's own RCs
-instead of at the whole group.
+This is backfilling with a reservation for the first in line (see ``planner``), here at each RC: an ARC starts if its
+slice ends before the reserved starts, and may overtake ARCs further back. A decision examines the ARC's own RCs instead
+of the whole group.
 
 Source: decision 0011.
 """
@@ -19,17 +19,17 @@ from backbone.scheduling.priority import higher
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
-LOOK_AHEAD = 3  # chosen: how many first ones may wait for each other before the present holders alone tell
+LOOK_AHEAD = 3  # chosen: length of a chain of first ARCs that wait for each other; beyond it only holders count
 
 
 class LargeGroupPlanner:
-    """Looks at one ARC after the other, each beside those that want the same RCs."""
+    """Plans one ARC after the other, each beside the ARCs that want the same RCs."""
 
     is_exact = False
     reserves = False
 
     def __init__(self, table: Table, *, slack_s: float) -> None:
-        """Begin with no ARC to look at.
+        """Begin with no candidates.
 
         Args:
             slack_s: By how much two reservations may overlap.
@@ -42,9 +42,9 @@ class LargeGroupPlanner:
         self._firsts: dict[str, tuple[int, ArcEntry | None]] = {}
 
     def look_near(self, rc: str) -> None:
-        """Look anew at the ARCs that a change of this RC concerns.
+        """Make the ARCs that a change of this RC concerns candidates again.
 
-        Those are its users, and ARCs that may wait for one of its users at another RC.
+        These are its users, and ARCs that may wait for one of its users at another RC.
         """
         state = self._state
         users = state.users(rc)
@@ -55,7 +55,7 @@ class LargeGroupPlanner:
         self._candidates.update((arc, None) for arc in near if arc.state is RequestState.WAITING)
 
     def _may_hold_up(self, arc: ArcEntry, rc: str) -> bool:
-        """Say whether another ARC may wait at this free RC only because this one is first in line."""
+        """Return whether another ARC may wait at this free RC only because this one is first in line."""
         if self._state.is_held_alone(rc):
             return False
         first = self._first_at(rc)
@@ -73,7 +73,7 @@ class LargeGroupPlanner:
                 continue
             staying = [one for one in holders if table.stands_until_s(one, arc, now_s) > now_s + INSTANT_S]
             if not table.fits(arc, staying):
-                continue  # one by one they would let it in, but not together
+                continue  # each holder alone leaves it room, but all together do not
             in_the_way = table.in_the_way(arc, [], holders, now_s)
             turn = Turn(arc, in_the_way)
             if (in_the_way and not table.runs_on(turn)) or (not in_the_way and table.fits(arc, holders)):
@@ -81,9 +81,9 @@ class LargeGroupPlanner:
         return None
 
     def _takes_from_others(self, arc: ArcEntry, now_s: float) -> bool:
-        """Say whether, if it started now, it would take time from a higher one or from the first in line at an RC."""
+        """Return whether a start now would take time from a higher ARC or from the first in line at an RC."""
         table, end_s = self._table, self._must_be_done_s(arc, now_s)
-        self._reserved.clear()  # what it held was worked out for another one that asked
+        self._reserved.clear()  # its reservations were computed for another candidate
         crowd = [holder for holder in self._crowd(arc) if table.fits(arc, [holder])]
 
         def from_one(other: ArcEntry) -> bool:
@@ -92,7 +92,7 @@ class LargeGroupPlanner:
 
         higher_ones = [one for one in self._state.beside(arc) if one.goes_before(arc) and one.queued]
         at = {rc: self._first_at(rc) for rc in arc.uses}
-        # Equality is not transitive: two ARCs can each be first where both want to be. A lower one then waits.
+        # Equality is not transitive: two ARCs can each be first at a common RC. The lower one then waits.
         ahead = set() if any(map(table.usable, higher_ones)) else {rc for rc, first in at.items() if first is arc}
         firsts = [first for first in dict.fromkeys(at.values()) if first and ahead.isdisjoint(first.uses)]
         return any(from_one(other) for other in dict.fromkeys((*firsts, *higher_ones)))
@@ -102,13 +102,13 @@ class LargeGroupPlanner:
         return start_s + arc.length_s - min(self._slack_s, arc.minimum_s / 2) - INSTANT_S
 
     def _crowd(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return those that hold a sharable RC of the ARC."""
+        """Return the ARCs that hold a sharable RC of the ARC."""
         return [
             *dict.fromkeys(holder for rc in arc.shares for holder in self._state.rcs[rc].holders if holder is not arc)
         ]
 
     def _first_at(self, rc: str) -> ArcEntry | None:
-        """Return the first in order of those queued for the RC; None if there is none."""
+        """Return the first ARC in the order of the RC's queue; None if it is empty."""
         version = self._state.version_of(rc)
         known = self._firsts.get(rc)
         if known is None or known[0] != version:
@@ -117,11 +117,11 @@ class LargeGroupPlanner:
         return known[1]
 
     def _reserved_s(self, arc: ArcEntry, now_s: float, behind: tuple[ArcEntry, ...]) -> float:
-        """Return from when its RCs are reserved for the ARC: when its holders go and others first in line have run.
+        """Return from when its RCs are reserved for the ARC: when its holders end and other first ARCs have run.
 
         Args:
             now_s: From when on.
-            behind: Those that asked for this: they do not wait for themselves, though being equal is not transitive.
+            behind: ARCs on the chain so far: they do not wait for themselves, though being equal is not transitive.
         """
         known_s = self._reserved.get(arc)
         if known_s is not None:
@@ -129,12 +129,14 @@ class LargeGroupPlanner:
         table = self._table
         in_the_way = [holder for holder in self._state.holders(arc) if table.clash(arc, holder)]
         start_s = max([now_s, *(table.stands_until_s(holder, arc, now_s) for holder in in_the_way)])
-        if len(behind) > LOOK_AHEAD or arc.reservation is not None:  # RCs freed for it by force are its own
+        if len(behind) > LOOK_AHEAD:
             return start_s
         for rc in arc.uses if start_s < math.inf else ():
             first = self._first_at(rc)
             if first is None or first is arc or first in behind or not table.clash(arc, first):
                 continue
+            if arc.reservation is not None and not first.goes_before(arc):
+                continue  # RCs freed for it by force are its own; only a higher ARC may need them first
             first_s = self._reserved_s(first, now_s, (*behind, arc))
             if first_s < self._must_be_done_s(arc, start_s):
                 start_s = math.inf if first.goes_before(arc) else max(start_s, first_s + first.length_s)
@@ -142,7 +144,7 @@ class LargeGroupPlanner:
         return start_s
 
     def forgotten(self, group: Sequence[ArcEntry], now_s: float) -> ArcEntry | None:
-        """Return None: to look for a forgotten turn here would take a plan of the whole group."""
+        """Return None: the search for a forgotten turn here would take a plan of the whole group."""
         del group, now_s
         return None
 
@@ -175,6 +177,6 @@ class LargeGroupPlanner:
         return self._table.in_order([*before])
 
     def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return who is first in line at an RC of the ARC and is not the ARC itself."""
+        """Return the other ARCs that are first in line at an RC of the ARC."""
         firsts = dict.fromkeys(self._first_at(rc) for rc in arc.uses)
         return [first for first in firsts if first is not None and first is not arc]

@@ -1,7 +1,7 @@
-"""Master schedule: which planner plans which group, and the turns they find where something changed.
+"""Master schedule: assigns each group to a planner, and collects the planners' turns in groups that changed.
 
-A decision looks only at groups in which something has happened since the last one (rule 7: what happens in one group
-changes no time in another). A group of up to ``exact_up_to`` ARCs is planned whole, a larger one beside each RC.
+A decision examines only groups with an event since the last one (rule 7: an event in one group changes no time in
+another). A group of up to ``exact_up_to`` ARCs is planned whole, a larger one at each RC.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class MasterSchedule:
     """The plans for one state.
 
     Attributes:
-        table: What can be asked of it.
-        whole: Plans groups whole; also groups that are only supposed.
+        table: Questions about it.
+        whole: Plans groups whole; also hypothetical ones.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class MasterSchedule:
             strict: No ARC starts while a higher usable one of its group waits.
             tolerance_s: By how much two reservations may overlap.
             exact_up_to: Groups of at most this size are planned whole.
-            planner: Plans all groups instead; None: these two do.
+            planner: Plans all groups; None: the two planners of this package do.
         """
         self.state = state
         self.table = Table(state, strict=strict)
@@ -54,13 +54,13 @@ class MasterSchedule:
         self._exact_up_to = exact_up_to
 
     def planner_of(self, arc: ArcEntry) -> Planner:
-        """Return what plans the group of an active ARC."""
+        """Return the planner of an active ARC's group."""
         return self._small if len(self.state.groups.of(arc)) <= self._exact_up_to else self._large
 
     def due(self, now_s: float) -> Turn | None:
-        """Return an ARC whose time is now, and who must go for it; None if there is none.
+        """Return an ARC whose time is now, and the holders to revoke for it; None if there is none.
 
-        Looks where something changed since there was none; asked again after the turn was carried out.
+        Examines groups that changed since the last None; to be called again after the turn was carried out.
         """
         self._look_where_it_changed()
         return self._small.due(now_s) or self._large.due(now_s)
@@ -72,7 +72,7 @@ class MasterSchedule:
             planner.look_near(rc)
         if (
             self.table.strict and not self._large.is_exact and self._large in planners
-        ):  # the change may have held back any ARC of a large group
+        ):  # before the change any ARC of a large group may have been held back
             for rc in self.state.rcs.keys() - {*changed}:
                 self._large.look_near(rc)
 

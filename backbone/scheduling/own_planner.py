@@ -17,7 +17,7 @@ class PlannerType(Protocol):
         """Return a planner that has planned nothing yet.
 
         Args:
-            table: What it may ask of the schedule.
+            table: Questions about the schedule.
             slack_s: By how much two reservations may overlap.
         """
 

@@ -1,8 +1,8 @@
-"""Plan: when each queued ARC of a group can start, one after the other in their order (rule 3).
+"""Plan: the earliest start of each queued ARC of a group, one after the other in their order (rule 3).
 
-Each gets the earliest start at which it fits for its whole settling and minimum run time, given who
-holds its RCs and what is reserved for those before it. Places are found on demand: a question about the first in order
-does not pay for the last.
+Each gets the earliest start at which its whole settling and minimum run time fit, given the holders of its RCs and the
+reservations of the ARCs before it. Places are found on demand: a question about the first in order does not pay for the
+last.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from backbone.scheduling.priority import higher, rank
 from backbone.scheduling.table import Table
 
 _Reservation = tuple[float, int, float, ArcEntry]
-"""From when, whose place in the order, until when, and for whom."""
+"""Begin of a reservation, the ARC's place in the order, its end, and the ARC."""
 
 
 class Plan:
@@ -34,7 +34,7 @@ class Plan:
         handed_over: bool = False,
         among_equals: bool = True,
     ) -> None:
-        """Plan for these.
+        """Plan for these ARCs.
 
         Args:
             order: Queued ARCs of the group, in order.
@@ -42,7 +42,7 @@ class Plan:
             now_s: From when on.
             slack_s: By how much an ARC may overlap those before it, but not by more than half its slice.
             handed_over: Plan as if all RCs that are being freed were free already.
-            among_equals: False: what is reserved from later on binds those below, and equals only if it is reserved.
+            among_equals: False: a later start binds lower ARCs only, and equals if it belongs to a reservation.
         """
         self._table = table
         self._order = order
@@ -61,7 +61,7 @@ class Plan:
         return self._starts_s[arc]
 
     def starts_now(self, arc: ArcEntry) -> bool:
-        """Say whether an ARC of the order can start at once."""
+        """Return whether an ARC of the order can start at once."""
         return self.start_s(arc) <= self._now_s + INSTANT_S
 
     def slots(self) -> list[Slot]:
@@ -108,13 +108,13 @@ class Plan:
         return self._earliest_in_a_crowd_s(arc, start_s, length_s, self._against(arc, place))
 
     def _binds(self, begin_s: float, other: ArcEntry, arc: ArcEntry) -> bool:
-        """Say whether what is reserved for the other binds the ARC."""
+        """Return whether the reservation of the other binds the ARC."""
         if begin_s <= self._now_s + INSTANT_S or other.reservation is not None:
             return True
         return rank(other.path, arc.path) != 0
 
     def _against(self, arc: ArcEntry, place: int) -> list[Hold]:
-        """Return who shares an RC with the ARC and stands in its way, as it was when its place was found."""
+        """Return the ARCs at a common RC that keep the ARC from an earlier start, as of the search for its place."""
         touches, soon_s = arc.touches, self._now_s + INSTANT_S
         against: list[Hold] = []
         for holder in self._holders:
@@ -131,7 +131,7 @@ class Plan:
         return against
 
     def _earliest_in_a_crowd_s(self, arc: ArcEntry, from_s: float, length_s: float, against: Sequence[Hold]) -> float:
-        """Return the first time from which also the sharable RCs have room for the ARC's streams."""
+        """Return the first time at which the sharable RCs have room for the ARC's streams, too."""
         lasting = [
             (other, begin_s, math.inf if begin_s > -math.inf and higher(other.path, arc.path) else end_s)
             for other, begin_s, end_s in against

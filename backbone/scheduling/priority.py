@@ -1,7 +1,7 @@
-"""Who goes before whom: numbers count among siblings of the behavior tree only.
+"""Order of priorities: numbers count among siblings of the behavior tree only.
 
 ``higher`` is a partial order. Two ARCs neither of which is higher are *equals*, but being equal is
-not transitive, so there is no list of levels; everything that needs an order uses ``by_precedence``.
+not transitive, so there is no list of levels; ``by_precedence`` makes every order.
 
 Source: IROS 2001 and RAM 2002, "behavior manager": priorities are compared among siblings; for
 distant nodes walk up to the nearest ancestors with a common parent. Consoles are siblings of the
@@ -26,7 +26,7 @@ CONSOLE = "console "  # a legal node name holds no space: a console is never mis
 
 
 def higher(a: Path, b: Path) -> bool:
-    """Say whether ``a`` goes strictly before ``b``.
+    """Return whether ``a`` is strictly higher than ``b``.
 
     Example:
         >>> scout1, scout2 = (("m", 0), ("watch", 5), ("left", 9)), (("m", 0), ("home", 6))
@@ -39,7 +39,7 @@ def higher(a: Path, b: Path) -> bool:
 
 
 def rank(a: Path, b: Path) -> int:
-    """Return 1 if ``a`` goes strictly before ``b``, -1 if ``b`` goes before ``a``, 0 if neither does."""
+    """Return 1 if ``a`` is strictly higher than ``b``, -1 if ``b`` is higher than ``a``, 0 if neither is."""
     for node_a, node_b in zip(a, b, strict=False):
         if node_a is not node_b and node_a[0] != node_b[0]:
             return (node_a[1] > node_b[1]) - (node_a[1] < node_b[1])
@@ -47,10 +47,10 @@ def rank(a: Path, b: Path) -> int:
 
 
 def by_precedence(items: Sequence[T], path: Callable[[T], Path], key: Callable[[T], Any]) -> list[T]:
-    """Return the items in order: again and again the one of the smallest key that no remaining one is higher than.
+    """Return the items in order: each is the one of the smallest key among those without a higher remaining item.
 
     Sorting by (level, key) would be shorter and wrong: equality is not transitive, there are no levels.
-    Each branch of the tree has an order of its own; equal siblings' orders are merged by what each has first.
+    Each branch of the tree has an order of its own; equal siblings' orders are merged by their first items.
 
     Args:
         items: In any order.
@@ -84,6 +84,6 @@ def _in_order(keyed: list[_Keyed], depth: int) -> list[_Keyed]:
         for one in equals:
             branches.setdefault(one[2][depth][0], []).append(one)
         orders = [_in_order(branch, depth + 1) for branch in branches.values()]
-        # Not sorted each: merging takes the smaller of the first ones again and again, which is what is wanted.
+        # A sort would be wrong: the merge always takes the smaller of the first items, and keeps each branch's order.
         ordered += heapq.merge(*orders) if len(orders) > 1 else orders[0]
     return ordered

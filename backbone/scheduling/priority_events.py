@@ -1,4 +1,4 @@
-"""Priority events: the behavior tree, its numbers, and ARCs that rise because they wait long (rules 2 and 8)."""
+"""Priority events: changes of the behavior tree and its numbers, and aging (rules 2 and 8)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PriorityEvents:
         self._aging_s = rules.aging_s
 
     def place(self, request: SchedulingRequest) -> Place:
-        """Take note of the nodes of a request; return the names from the root to its owner."""
+        """Add the nodes of a request; return the names from the root to its owner."""
         names, renumbered = self._tree.place(request.path, console=request.console)
         if renumbered:
             self._renumber()
@@ -40,12 +40,12 @@ class PriorityEvents:
         return names
 
     def priority_changed(self, node: str, priority: int) -> None:
-        """A node or console has another number."""
+        """Set the number of a node or console."""
         self._tree.change(node, priority)
         self._changed()
 
     def node_moved(self, node: str, parent: str) -> None:
-        """A node stands below another parent, if it can."""
+        """Move a node below another parent, if possible."""
         if self._tree.obstacle(node, parent):
             return
         old, new = self._tree.move(node, parent)
@@ -53,7 +53,7 @@ class PriorityEvents:
         self._changed(lambda place: carried(place, old, new))
 
     def age(self) -> None:
-        """Raise ARCs that wait long; they keep their level until they were served or want no time any more."""
+        """Raise ARCs that wait long; they keep their level until they are served or idle."""
         if not self._aging_s:
             return
         for arc in self._state.arcs.values():

@@ -1,6 +1,6 @@
 """Priority tree: the places and numbers of the nodes of the behavior tree and of the consoles.
 
-Source: IROS 2001 and RAM 2002, "behavior manager". What follows from them is decided by ``priority.higher``.
+Source: IROS 2001 and RAM 2002, "behavior manager". ``priority.higher`` compares them.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from backbone.scheduling.requests import PathNode
 
 
 class PriorityTree:
-    """The places and numbers of all nodes and consoles that ever asked.
+    """The places and numbers of all nodes and consoles that ever sent a request.
 
-    A number or a place set by an operator holds until the operator sets another; a request's own
-    numbers and places hold for all other nodes. A request goes on naming the way its owner was
-    started with: the moves since then lead from there to where it is now.
+    A number or a place set by an operator stays until the operator sets another; a request's own
+    numbers and places count for all other nodes. A request goes on naming the path its owner was
+    started with: the moves since then lead from that path to the present one.
     """
 
     def __init__(self, mission: str, priority: int) -> None:
@@ -28,7 +28,7 @@ class PriorityTree:
         self._moves: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
 
     def place(self, nodes: Iterable[PathNode], *, console: bool) -> tuple[tuple[str, ...], bool]:
-        """Take note of the nodes on this way.
+        """Add the nodes on this path.
 
         Returns:
             Their names, root first, and whether a node known before has another number now.
@@ -49,7 +49,7 @@ class PriorityTree:
         return names, renumbered
 
     def path(self, names: tuple[str, ...]) -> Path:
-        """Return the way with its present numbers; what two ways have in common are the same objects."""
+        """Return the path with its present numbers; the common part of two paths consists of the same objects."""
         numbered = [
             (name, self._numbers[way] + self._raised.get(way, 0))
             for name, way in ((name, names[: depth + 1]) for depth, name in enumerate(names))
@@ -57,19 +57,19 @@ class PriorityTree:
         return tuple(self._shared.setdefault(node, node) for node in numbered)
 
     def nodes(self, names: tuple[str, ...]) -> list[PathNode]:
-        """Return the way as a request names it, with its numbers as they were set, without aging."""
+        """Return the path of a request, with its numbers as they were set, without aging."""
         return [
             PathNode(name.removeprefix(CONSOLE), self._numbers[names[: depth + 1]]) for depth, name in enumerate(names)
         ]
 
     def age(self, levels: Iterable[tuple[tuple[str, ...], int]]) -> bool:
-        """Raise nodes whose ARCs wait long by some levels, others by none any more; return whether that changed any.
+        """Raise nodes whose ARCs wait long by some levels, and no other ones; return whether that changed any.
 
-        A node rises with all above it, or it would rise among its siblings only. The mission's own node
-        does not: a console is not outwaited. Neither do consoles.
+        A node rises with all its ancestors, or it would rise among its siblings only. The mission's own node
+        does not rise: a long wait never outranks a console. Consoles do not rise either.
 
         Args:
-            levels: Ways of the nodes and by how much they rise; of several for one node the largest counts.
+            levels: Paths of the nodes, with the levels by which they rise; for one node the largest counts.
         """
         raised: dict[tuple[str, ...], int] = {}
         for names, by in levels:
@@ -81,7 +81,7 @@ class PriorityTree:
         return changed
 
     def change(self, node: str, priority: int) -> None:
-        """Give the node, or the console, of this name another number from now on."""
+        """Set the number of the node, or the console, of this name."""
         self._set[node] = priority
         for names in self._numbers:
             if names[-1].removeprefix(CONSOLE) == node:
@@ -107,12 +107,12 @@ class PriorityTree:
         return ""
 
     def move(self, node: str, parent: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Put the node of this name, with all below it, below the other one.
+        """Move the node of this name, with all below it, below the other one.
 
         Its number stays: it counts among its new siblings from now on.
 
         Returns:
-            The way to it as it was and as it is now.
+            Its old path and its new path.
 
         Raises:
             ValueError: There is an ``obstacle``.
@@ -132,7 +132,7 @@ class PriorityTree:
         return [way for way in self._numbers if way[-1] == node]
 
     def _moved(self, way: list[PathNode]) -> list[PathNode]:
-        """Return the way as it is after all moves; what is above a moved node has its present numbers."""
+        """Return the path after all moves; the nodes above a moved one have their present numbers."""
         names, own = tuple(node.name for node in way), len(way)
         for old, new in self._moves:
             if names[: len(old)] == old:
@@ -143,7 +143,7 @@ class PriorityTree:
 
 
 def carried(way: tuple[str, ...], old: tuple[str, ...], new: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the way after what stood at ``old`` was moved to ``new``.
+    """Return the path after the move of ``old`` to ``new``.
 
     Example:
         >>> carried(("m", "a", "n", "leaf"), ("m", "a", "n"), ("m", "b", "n"))

@@ -1,4 +1,4 @@
-"""RC events: what follows from news of RCs (rule 11).
+"""RC events: the effects of RCs' states on the schedule (rule 11).
 
 An ARC that lost an RC is revoked; the rest of the schedule goes on.
 """
@@ -21,7 +21,7 @@ class RcEvents:
         self._table = schedule.table
 
     def known(self, event: RcKnown) -> None:
-        """An RC exists; of one that is known this is news of how it is."""
+        """Add an RC, or take in the state of a known one."""
         if event.rc not in self._state.rcs:
             rc = self._state.add_rc(event)
             if rc.up:
@@ -34,7 +34,7 @@ class RcEvents:
         self.capacity_changed(event.rc, event.capacity)
 
     def went_down(self, name: str, lost_by: str = "", fault: str = "") -> None:
-        """The RC does not answer, or is put aside: its holders lose all their RCs, as ``lost_by`` did already."""
+        """Revoke the holders of an RC that does not answer or is put aside, as ``lost_by`` did already."""
         rc = self._state.rcs.get(name)
         if rc is None or not self._state.rc_down(rc, None if lost_by else fault):
             return
@@ -45,7 +45,7 @@ class RcEvents:
                 self._transitions.revoke(arc, "rc", name)
 
     def came_back(self, name: str, last_epoch: int) -> None:
-        """The RC answers, and holds no ARC."""
+        """Count the RC as up: it answers, and has no holder."""
         rc = self._state.rcs.get(name)
         if rc is None:
             return
@@ -58,7 +58,7 @@ class RcEvents:
         self._transitions.trace.introduce_rc(rc, self._transitions.now_s)
 
     def capacity_changed(self, name: str, capacity: float) -> None:
-        """The RC gives another share of its time; the last in order go until the rest fits."""
+        """Set the RC's capacity; revoke the last holders in order until the rest fits."""
         rc = self._state.rcs.get(name)
         if rc is None or rc.capacity == capacity or not 0 <= capacity <= 1:
             return

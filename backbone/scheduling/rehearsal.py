@@ -1,11 +1,11 @@
-"""Rehearsal: plays everybody around a schedule manager, so that a schedule can be seen before anything starts.
+"""Rehearsal: plays the components around a schedule manager, to show a schedule before the mission starts.
 
-RCs settle and disconnect in the times they declare, decision processes stop after a given pause, the
-alarm rings when asked for. No bus, no clock: time jumps from one event to the next.
+RCs settle and disconnect in the times they declare, decision processes stop after a given pause, timers
+fire when they are due. No bus, no clock: time jumps from one event to the next.
 
 Rules of this file:
 
-* It decides nothing: every run, wait and load is read from the trace the schedule manager tells.
+* It decides nothing: every run, wait and load is read from the schedule manager's trace.
 * The same events in the same order give the same trace.
 """
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, assert_never
@@ -32,19 +32,20 @@ from backbone.scheduling.events import (
     WakeAt,
     Woken,
 )
+from backbone.scheduling.trace import Line
 
-Line = Mapping[str, Any]
+MOST_AT_ONCE = 1000  # chosen: far above the two connections of one ARC that any schedule needs at one instant
 
 
 class Decides(Protocol):
-    """What is rehearsed: a schedule manager, or something around one."""
+    """The rehearsed object: a schedule manager, or a wrapper of one."""
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
-        """Take note of what happened and return what follows from it."""
+        """Take in an event and return the instructions."""
 
 
 def at_once(deadline_s: float) -> float:
-    """Return the pause of a decision process that stops the moment it is told."""
+    """Return the pause of a decision process that stops at once."""
     del deadline_s
     return 0.0
 
@@ -55,8 +56,8 @@ class Rehearsal:
     Attributes:
         now_s: Mission time of the last event.
         trace: All lines so far.
-        manager: Who decides; may be replaced by one that knows the same.
-        connected: ARCs that have RCs, settling or granted, in the order in which they got them, and when.
+        manager: The schedule manager; may be replaced by one with the same state.
+        connected: ARCs that have RCs, settling or granted, in the order of their connections, with the times.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class Rehearsal:
         """Begin at time 0 with no RCs and no ARCs.
 
         Args:
-            manager: Who decides.
+            manager: The schedule manager.
             opening_lines: Records with which the trace begins.
             pause_s: Deadline in seconds → seconds a decision process takes to stop.
         """
@@ -82,6 +83,7 @@ class Rehearsal:
         self._agenda: list[tuple[float, int, Event]] = []
         self._serial = itertools.count()
         self._opening: dict[str, Opened] = {}
+        self._at_once: Counter[str] = Counter()
         self._wake_s: float | None = None
 
     @classmethod
@@ -95,11 +97,11 @@ class Rehearsal:
         wake_s: float | None,
         pause_s: Callable[[float], float],
     ) -> Rehearsal:
-        """Go on from a schedule as it is.
+        """Go on from a present schedule.
 
         Args:
-            manager: Who decides; a copy that is not used otherwise.
-            under_way: Outcomes of the context switches that have begun, and when they come.
+            manager: A copy of the schedule manager for this rehearsal alone.
+            under_way: Outcomes of the context switches that have begun, with their times.
             release_s: RC → its release time.
             wake_s: When the manager asked to be woken.
             pause_s: Deadline in seconds → seconds a decision process takes to stop.
@@ -114,11 +116,15 @@ class Rehearsal:
         return rehearsal
 
     def at(self, time_s: float, event: Event) -> None:
-        """Let it happen at that time, after all that was arranged for the same time before."""
+        """Schedule the event at that time, after all earlier ones of the same time."""
         heapq.heappush(self._agenda, (time_s, next(self._serial), event))
 
     def tell(self, event: Event) -> None:
-        """Let it happen now."""
+        """Apply the event now.
+
+        Raises:
+            AssertionError: Time stands still: the manager connects one ARC ``MOST_AT_ONCE`` times at one instant.
+        """
         if isinstance(event, RcKnown):
             self._release_s[event.rc] = event.disconnect_s
         for instruction in self.manager.handle(event, self.now_s):
@@ -130,6 +136,7 @@ class Rehearsal:
                 case ConnectArc(arc=arc, settle_s=settle_s):
                     self._opening[arc] = Opened(arc)
                     self.connected[arc] = self.now_s
+                    self._require_progress(arc)
                     self.at(self.now_s + settle_s, self._opening[arc])
                 case RevokeArc(arc=arc, epochs=epochs, deadline_s=deadline_s):
                     self._opening.pop(arc, None)
@@ -142,17 +149,19 @@ class Rehearsal:
                     assert_never(instruction)
 
     def run(self, until_s: float) -> None:
-        """Let time pass; all that is due at the last instant has happened afterwards."""
+        """Let time pass; all events due by the last instant have happened afterwards."""
         while self.step(until_s):
             pass
         self.now_s = max(self.now_s, until_s)
 
     def step(self, until_s: float) -> bool:
-        """Let the next thing happen if it is due by then; return whether anything was."""
+        """Apply the next event if it is due by then; return whether one was."""
         next_s = self._next_s()
         if next_s is None or next_s > until_s:
             return False
-        self.now_s = max(self.now_s, next_s)
+        if next_s > self.now_s:
+            self.now_s = next_s
+            self._at_once.clear()
         if not self._agenda or self._agenda[0][0] > self.now_s:
             self._wake_s = None
             self.tell(Woken())
@@ -164,6 +173,12 @@ class Rehearsal:
             del self._opening[event.arc]
             self.tell(event)
         return True
+
+    def _require_progress(self, arc: str) -> None:
+        self._at_once[arc] += 1
+        if self._at_once[arc] == MOST_AT_ONCE:
+            last = "\n".join(str(dict(line)) for line in self.trace[-8:])
+            raise AssertionError(f"{arc} is connected {MOST_AT_ONCE} times at {self.now_s}; the last lines:\n{last}")
 
     def _next_s(self) -> float | None:
         agenda_s = self._agenda[0][0] if self._agenda else None
@@ -180,10 +195,10 @@ class Run:
         uses: RC → share of its time, 0 to 1; an exclusive use is 1.
         connect_s: When its RCs began to settle.
         grant_s: When it was granted; None: that never happened.
-        revoke_s: When it was told to go; the end of the trace if it was not.
+        revoke_s: When it was revoked; the end of the trace if it was not.
         free_s: When its RCs were free again; the end of the trace if they were not.
         why: Why it was revoked; empty: it was not.
-        by: Because of whom.
+        by: ARC or RC that caused this.
     """
 
     arc: str
@@ -202,16 +217,16 @@ class Run:
 
 
 class Timetable:
-    """What a trace says about who ran and who waited, up to a time.
+    """Runs and waits of a trace, up to a time.
 
     Attributes:
         end_s: The last moment that counts.
         runs: All runs in the order of their beginnings.
-        asked_s: ARC → when it asked first.
+        asked_s: ARC → time of its first request.
     """
 
     def __init__(self, lines: Iterable[Line], end_s: float) -> None:
-        """Read lines of which the first is not before 0 and the last is not after ``end_s``."""
+        """Read lines with times from 0 to ``end_s``."""
         self.end_s = end_s
         self.runs: list[Run] = []
         self.asked_s: dict[str, float] = {}
@@ -229,12 +244,12 @@ class Timetable:
         return [run for run in self.runs if run.arc == arc]
 
     def worst_wait_s(self, arc: str) -> float:
-        """Return the longest time this ARC wanted its RCs and did not have them; a wait that goes on counts."""
+        """Return the longest wait of this ARC; a wait that goes on counts."""
         since_s = self._waiting_since_s.get(arc)
         return max(self._worst_wait_s.get(arc, 0.0), 0.0 if since_s is None else self.end_s - since_s)
 
     def waits_at_end(self, arc: str) -> bool:
-        """Say whether it wants its RCs and does not have them when the trace ends."""
+        """Return whether the ARC waits when the trace ends."""
         return arc in self._waiting_since_s
 
     def utilization(self) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What an ARC asks for, what it gets, and why it may be refused."""
+"""Messages of requests: an ARC's demand, the RC manager's answer, and the refusals."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class PathNode(Message, frozen=True):
 
 
 class SchedulingRequest(Message, frozen=True):
-    """Give my ARC run time (RAM 2002, "The RC Scheduler").
+    """An ARC's request for run time (RAM 2002, "The RC Scheduler").
 
     Attributes:
         path: From the mission's root (or the console itself) to the decision process.
@@ -88,7 +88,7 @@ class SchedulingRequest(Message, frozen=True):
 
 
 class RequestState(StrEnum):
-    """Where a request is."""
+    """State of a request."""
 
     IDLE = "idle"
     WAITING = "waiting"
@@ -104,7 +104,7 @@ class Scheduled(Message, frozen=True):
         rcs: The RCs chosen of the alternatives.
         state: Running soon (connecting) or waiting.
         position: Place among the waiting of its group, 1 is next; 0 if it need not wait.
-        blockers: ARCs that stand directly in its way; ``why`` tells all that would have to go.
+        blockers: ARCs that block it directly; ``why`` names all that would have to be revoked.
         expected_start_s: Mission time of the predicted grant; negative: none can be predicted.
     """
 
@@ -128,10 +128,10 @@ class Lease(Message, frozen=True):
     """One renewed hold.
 
     Attributes:
-        arc: Who holds it.
+        arc: Its holder.
         epoch: Of the connection.
-        rank: Place by user priority among those who hold a sharable RC now, 0 first; negative: as it was. It changes
-            when others come and go, and with every change of priority.
+        rank: Place by user priority among the present holders of a sharable RC, 0 first; negative: unchanged. It
+            changes when others come and go, and with every change of priority.
     """
 
     rc: Mention
@@ -176,7 +176,7 @@ class UnknownRequest(SchedulingRefusal):
 
 
 class NotMovable(SchedulingRefusal):
-    """The node cannot stand below that parent; nothing changed."""
+    """The node cannot be moved below that parent; nothing changed."""
 
     code = "scheduling.not_movable"
     remedy = "Name a node and a parent by the names of the priority paths that 'scout-backbone status' shows."

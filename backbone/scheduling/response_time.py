@@ -1,4 +1,4 @@
-"""Response-time analysis: which streams a sharable RC can serve together, each packet by its deadline.
+"""Response-time analysis: the streams that a sharable RC can serve together, each packet by its deadline.
 
 A sharable RC sends one packet at a time and never breaks one off. Among waiting packets the one of
 the highest user priority goes first, then the one of the shorter period (rate monotonic), then the
@@ -10,11 +10,11 @@ Rules of this file:
 
 * Times are whole microseconds, so that no answer depends on rounding. Fractions appear only as bounds
   on a result, wide enough for their own rounding, that spare the exact search.
-* What cannot be analyzed within ``MAX_ROUNDS`` is refused: never optimistic.
+* A demand that cannot be analyzed within ``MAX_ROUNDS`` is refused: never optimistic.
 
 The bounds: of n packets released every T with jitter J, at least (w + J)/T and at most 1 more fall into
 a time w. So the beginning of the q-th packet lies between the solutions of two linear equations, and as
-the load is at most 1 the upper bound of its response falls with q: if it is in time, so are all that follow.
+the load is at most 1 the upper bound of its response falls with q: if it is in time, so are all later packets.
 
 Source: RAM 2002, "Sharable Resources"; Davis, Burns, Bril, Lukkien, "Controller Area Network (CAN)
 schedulability analysis: refuted, revisited and revised", Real-Time Systems 35, 2007; Audsley, "Optimal
@@ -32,7 +32,7 @@ from backbone.scheduling.requests import Usage
 
 Analysis = Literal["exact", "sum"]
 
-MAX_ROUNDS = 100_000  # chosen: what is not found by then is a load within a millionth of all the RC can give
+MAX_ROUNDS = 100_000  # chosen: a longer search means a load within a millionth of the RC's capacity
 ROUNDING = 1e-9  # chosen: three shares of 0.1 fit a capacity of 0.3
 FLOAT_MARGIN = 1e-9  # chosen: a million times the rounding of a sum of a thousand shares
 LEAST_IDLE = 1e-4  # chosen: closer to a full load the linear bounds divide by too little to be of use
@@ -66,12 +66,12 @@ def utilization(streams: Sequence[Stream]) -> float:
 
 
 def exceeds(capacity: float, streams: Sequence[Stream]) -> bool:
-    """Say whether they need more of the RC's time together than it may give, in any order."""
+    """Return whether their common demand exceeds the RC's capacity, in any order."""
     return utilization(streams) > capacity + ROUNDING
 
 
 def admissible(streams: Sequence[Stream], capacity: float, analysis: Analysis = "exact") -> bool:
-    """Say whether the RC can serve all of them.
+    """Return whether the RC can serve all of them.
 
     Args:
         streams: Highest priority first.
@@ -96,10 +96,10 @@ def worst_response_us(streams: Sequence[Stream], place: int) -> int | None:
 
     Args:
         streams: Highest priority first.
-        place: Index of the stream asked about.
+        place: Index of the stream.
 
     Returns:
-        The response time that does occur in the worst case; None: it has no bound.
+        The response time of the worst case; None: it has no bound.
     """
     above = _Load()
     for one in streams[:place]:
@@ -110,11 +110,11 @@ def worst_response_us(streams: Sequence[Stream], place: int) -> int | None:
 def feasible_order(
     streams: Sequence[Stream], capacity: float, before: Callable[[int, int], bool] = lambda _a, _b: False
 ) -> list[int] | None:
-    """Return an order in which every packet is done by its deadline, if there is any.
+    """Return an order in which every packet is done by its deadline, if there is one.
 
-    The lowest place is given first, to any stream that is in time there; who takes it never spoils the
-    rest, because a stream's response depends on which streams are above it, not on their order. Of several
-    the one of the longest deadline takes it, so the order is deadline monotonic wherever that will do.
+    The lowest place is assigned first, to any stream that is in time there; the choice never spoils the
+    rest, because a stream's response depends on the set of streams above it, not on their order. Of several
+    streams the one of the longest deadline takes it, so the order is deadline monotonic where that suffices.
 
     Args:
         streams: In any order.
@@ -123,13 +123,13 @@ def feasible_order(
             A strict partial order.
 
     Returns:
-        Numbers of the streams, highest first; None: no order would do.
+        Numbers of the streams, highest first; None: there is no such order.
     """
     if utilization(streams) > capacity + ROUNDING:
         return None
     remaining = sorted(range(len(streams)), key=lambda number: streams[number].deadline_us)
     order: list[int] = []
-    longest_us = 1  # of those below
+    longest_us = 1  # of the lower streams
     while remaining:
         lowest = next(_fit_below_all(streams, remaining, longest_us - 1, before), None)
         if lowest is None:
@@ -141,7 +141,7 @@ def feasible_order(
 
 
 def remedy(streams: Sequence[tuple[str, Stream]], capacity: float) -> str:
-    """Return what would make streams fit that do not in their given order; empty: only less demand would.
+    """Return a remedy for streams that do not fit in their given order; empty: only less demand would help.
 
     Args:
         streams: Names for people and streams whose user priorities are free to choose.
@@ -155,7 +155,7 @@ def remedy(streams: Sequence[tuple[str, Stream]], capacity: float) -> str:
 
 
 class _Load:
-    """Streams above another; those that are alike count as one with a longer packet."""
+    """Streams above another one; equal streams count as one with a longer packet."""
 
     def __init__(self) -> None:
         self._packets_us: dict[tuple[int, int], int] = {}
@@ -191,7 +191,7 @@ def _blockings_us(streams: Sequence[Stream]) -> list[int]:
 def _fit_below_all(
     streams: Sequence[Stream], remaining: Sequence[int], blocking: int, before: Callable[[int, int], bool]
 ) -> Iterator[int]:
-    """Yield those that may be, and are in time, below all the others that remain; longest deadline first."""
+    """Yield the streams that may have the lowest remaining place and are in time there; longest deadline first."""
     for number in reversed(remaining):
         others = [other for other in remaining if other != number]
         if any(before(number, other) for other in others):
@@ -209,10 +209,10 @@ def _in_time(one: Stream, above: _Load, blocking: int) -> bool:
 
 
 def _worst_us(one: Stream, above: _Load, blocking: int, *, enough_us: int) -> int | None:
-    """Return the worst response of the stream, microseconds, or ``enough_us`` if it is not above that.
+    """Return the worst response of the stream, microseconds, or ``enough_us`` if it is not longer.
 
-    Every packet of the busy period is looked at that begins when all higher streams are released at once,
-    one tick after the longest lower packet began.
+    The analysis covers every packet of the busy period that begins when all higher streams are released at
+    once, one tick after the longest lower packet began.
     """
     if not _has_end(one, above, blocking):
         return None
@@ -227,7 +227,7 @@ def _worst_us(one: Stream, above: _Load, blocking: int, *, enough_us: int) -> in
     rounds = iter(range(MAX_ROUNDS))
     kinds = above.kinds()
     worst = begin = nth = 0
-    packets = 1  # in the busy period, which is as long as it takes to find out only if the first does not decide
+    packets = 1  # in the busy period, whose length is computed only if the first packet does not decide
     while nth < packets:
         own = blocking + nth * one.packet_us
         begin = max(begin, own)
@@ -253,9 +253,9 @@ def _worst_us(one: Stream, above: _Load, blocking: int, *, enough_us: int) -> in
 
 
 def _has_end(one: Stream, above: _Load, blocking: int) -> bool:
-    """Say whether the RC is ever done with these streams once it began to be busy.
+    """Return whether the busy period of these streams ever ends.
 
-    At full load it is only if nothing ever comes late: what was late once stays late.
+    At full load it ends only without jitter: a late packet delays all later ones for ever.
     """
     roughly = above.share + one.packet_us / one.period_us
     if roughly < 1 - FLOAT_MARGIN:
@@ -267,7 +267,7 @@ def _has_end(one: Stream, above: _Load, blocking: int) -> bool:
 
 
 def _busy_period_us(one: Stream, above: _Load, blocking: int, rounds: Iterator[int]) -> int | None:
-    """Return how long the RC can be busy with these streams without a pause; None: it takes too long to tell."""
+    """Return the longest busy period of these streams; None: the search takes too long."""
     kinds = [*above.kinds(), (one.period_us, one.jitter_us, one.packet_us)]
     share = one.packet_us / one.period_us
     busy, idle = blocking + one.packet_us, 1.0 - above.share - share

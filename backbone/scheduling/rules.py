@@ -1,4 +1,4 @@
-"""The rules of a mission that the RC manager decides by, where more than one is right.
+"""The scheduling rules that a mission chooses, where more than one is right.
 
 Rule of this file: plain data with its ranges, so that a mission file is checked by the very types the
 RC manager starts with.
@@ -21,7 +21,7 @@ LONGEST_S = 86_400.0  # chosen: a day, as for all other times of a mission file
 
 
 class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """With which rules the RC manager decides; the descriptions are also what ``check`` tells people.
+    """Rules of the RC manager; ``check`` prints their descriptions.
 
     Raises:
         ValueError: A rule is not known, or a time is below 0.
@@ -30,7 +30,8 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     policy: Annotated[
         Policy,
         Meta(
-            description="no_delay: lower ones fill gaps that cost nobody; strict: none starts while a higher one waits"
+            description="no_delay: lower ARCs fill gaps without delaying others; "
+            "strict: no ARC starts while a higher one waits"
         ),
     ] = "no_delay"
     discipline: Annotated[
@@ -38,14 +39,14 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     ] = "turns"
     admission: Annotated[
         Analysis,
-        Meta(description="exact: a sharable resource serves what is always in time; sum: what adds up to its capacity"),
+        Meta(description="exact: a sharable resource serves streams that are always in time; sum: up to its capacity"),
     ] = "exact"
     aging_s: Annotated[
         float,
         Meta(
             ge=0,
             le=LONGEST_S,
-            description="who waits rises one level each time this many seconds have passed; 0: never",
+            description="a waiting ARC rises one level each time this many seconds have passed; 0: never",
         ),
     ] = 0.0
     grid_s: Annotated[
@@ -59,12 +60,12 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         str,
         Meta(
             pattern=r"^([A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*)?$",
-            description="class path of a planner of your own, as package.module:Class; empty: those of the RC manager",
+            description="class path of a planner of your own, as package.module:Class; empty: the RC manager's own",
         ),
     ] = ""
 
     def slice_end_s(self, granted_s: float, minimum_s: float) -> float:
-        """Return when a slice that is granted at this time ends, unless it is ended or extended.
+        """Return the end of a slice granted at this time, unless it is preempted or extended.
 
         Example:
             >>> SchedulingRules().slice_end_s(1.5, 5.0), SchedulingRules(grid_s=4.0).slice_end_s(1.5, 5.0)
@@ -84,7 +85,7 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 def values_of(rule: str) -> tuple[str, ...]:
-    """Return the words a rule may be; none if it is a time.
+    """Return the legal words of a rule; none if it is a time.
 
     Example:
         >>> values_of("policy"), values_of("grid_s")

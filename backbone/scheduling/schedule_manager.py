@@ -1,13 +1,13 @@
 """Schedule manager: carries the master schedule out, one context switch after the other.
 
-Events go in, instructions come out. The caller owns the clock and the bus: it reports what happened and when, carries
-the instructions out, and reports the outcome. A decision has three steps: *apply* the event to the state, *plan* whose
-turn it is, *switch* to it; the last two again until it is no ARC's turn.
+Events go in, instructions come out. The caller owns the clock and the bus: it reports events with their times, carries
+the instructions out, and reports their outcomes. A decision has three steps: *apply* the event to the state, *plan* the
+next turn, *switch* to it; the last two repeat until no ARC's time has come.
 
 Rules of this file (numbers as in docs and ``why``):
 
-* 4  What was freed by force goes to the ARC it was freed for: it has a reservation, and comes before its equals.
-* 5  A slice ends only if an ARC that is entitled can use the RCs.
+* 4  Preempted RCs go to the ARC that preempted them: it has a reservation, and comes before its equals.
+* 5  A slice ends only if an entitled ARC can use the RCs.
 * 6  revoke → free → connect → grant. An ARC connects only when all its RCs are free.
 
 Source: RAM 2002, "The RC Scheduler", last paragraph.
@@ -15,13 +15,11 @@ Source: RAM 2002, "The RC Scheduler", last paragraph.
 
 from __future__ import annotations
 
-import copy
-import math
 from typing import assert_never
 
 from backbone.scheduling.alternatives import choose
 from backbone.scheduling.arc_events import ArcEvents
-from backbone.scheduling.entries import CONNECTED, ArcEntry
+from backbone.scheduling.entries import CONNECTED
 from backbone.scheduling.events import (
     Adopted,
     CapacityChanged,
@@ -44,8 +42,6 @@ from backbone.scheduling.events import (
     Wanted,
     Woken,
 )
-from backbone.scheduling.explain.attributes import attributes
-from backbone.scheduling.explain.explanation import Explanation
 from backbone.scheduling.invariants import broken
 from backbone.scheduling.master_schedule import EXACT_UP_TO, MasterSchedule
 from backbone.scheduling.own_planner import PlannerType
@@ -54,26 +50,21 @@ from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
-from backbone.scheduling.rehearsal import Rehearsal
-from backbone.scheduling.requests import (
-    Lease,
-    NotMovable,
-    RequestState,
-    Scheduled,
-    SchedulingRequest,
-    UnknownRequest,
-)
+from backbone.scheduling.requests import Lease, NotMovable, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.transitions import Transitions
-from backbone.scheduling.views import Attributes, Schedule, Why
-
-FORESEEN_S = 300.0  # chosen: a start later than in five minutes is no answer to an operator
-FORESEEN_LINES = 1000  # chosen: some two hundred slices; measured: 32 ARCs take 80 ms
 
 
 class ScheduleManager:
-    """Who holds which RC now and next."""
+    """Decides on the present and next holders of every RC.
+
+    Attributes:
+        rules: Its rules.
+        master_schedule: The plans and the state; only this manager changes them.
+        tree: The behavior tree with its priorities.
+        wake_s: Mission time at which it asked to be woken; None: it did not.
+    """
 
     def __init__(
         self,
@@ -89,48 +80,52 @@ class ScheduleManager:
         """Begin with no RCs and no ARCs.
 
         Args:
-            rules: With which rules to decide.
+            rules: Rules of the decisions.
             tolerance_s: Reaction and timer tolerance of this run.
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
             goes_on: True if the trace goes on after that of an earlier RC manager.
             planner: Plans all groups; None: those of this package do.
         """
+        self.rules = rules
         self._state = ScheduleState(
             discipline=rules.discipline, admission=rules.admission, tolerance_s=tolerance_s, exact_up_to=exact_up_to
         )
-        self._schedule = MasterSchedule(
+        self.master_schedule = MasterSchedule(
             self._state,
             strict=rules.policy == "strict",
             tolerance_s=tolerance_s,
             exact_up_to=exact_up_to,
             planner=planner,
         )
-        self._tree = PriorityTree(mission, mission_priority)
-        self._transitions = Transitions(self._schedule, rules, tolerance_s=tolerance_s, goes_on=goes_on)
-        self._priorities = PriorityEvents(self._transitions, self._schedule, self._tree, rules)
-        self._arcs = ArcEvents(self._transitions, self._schedule, self._tree, self._priorities, rules)
-        self._rcs = RcEvents(self._transitions, self._schedule)
-        self._explanation = Explanation(self._schedule, rules, self._granted_s)
-        self._grace_s = rules.grace_s
-        self._wake_s: float | None = None
+        self.tree = PriorityTree(mission, mission_priority)
+        self._transitions = Transitions(self.master_schedule, rules, tolerance_s=tolerance_s, goes_on=goes_on)
+        self._priorities = PriorityEvents(self._transitions, self.master_schedule, self.tree, rules)
+        self._arcs = ArcEvents(self._transitions, self.master_schedule, self.tree, self._priorities, rules)
+        self._rcs = RcEvents(self._transitions, self.master_schedule)
+        self.wake_s: float | None = None
+
+    @property
+    def decided_s(self) -> float:
+        """Mission time of the last decision."""
+        return self._transitions.now_s
 
     # Events in, instructions out: apply, plan, switch.
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
-        """Take note of what happened and decide what follows from it.
+        """Apply an event and decide.
 
-        An event about an ARC or RC that is not known, or one that came too late to matter, changes nothing.
+        An event about an unknown ARC or RC, or an outdated event, changes nothing.
 
         Returns:
-            Instructions in the order in which they must be carried out.
+            Instructions, to be carried out in this order.
         """
         self._transitions.begin(now_s)
         self._apply(event)
         self._arcs.retry()
         self._state.end_slices(self._transitions.now_s)
         self._priorities.age()
-        while turn := self._schedule.due(self._transitions.now_s):
+        while turn := self.master_schedule.due(self._transitions.now_s):
             self._switch(turn)
             self._priorities.age()
         self._transitions.renew_slices()
@@ -179,14 +174,14 @@ class ScheduleManager:
                 assert_never(event)
 
     def _switch(self, turn: Turn) -> None:
-        """Connect the ARC whose turn it is, or first revoke who is in its way."""
+        """Connect the ARC whose turn it is, or first revoke the holders of its RCs."""
         if not turn.in_the_way:
             self._transitions.connect(turn.arc)
             return
         for holder in in_order_of_revocation(turn):
             overridden = higher(turn.arc.path, holder.path)
             forced = overridden and not holder.served(self._transitions.now_s)
-            if forced or not self._schedule.planner_of(turn.arc).reserves:
+            if forced or not self.master_schedule.planner_of(turn.arc).reserves:
                 self._state.reserve(turn.arc, forced=forced)
             if overridden:
                 self._transitions.revoke(holder, "higher", turn.arc.name)
@@ -194,12 +189,12 @@ class ScheduleManager:
                 self._transitions.end_slice(holder, turn.arc)
 
     def _set_alarm(self, *, rang: bool) -> None:
-        """Ask to be woken when the next decision can be due without an event."""
+        """Instruct the caller to wake the manager when the next decision can be due without an event."""
         slice_end_s = self._state.end_slices(self._transitions.now_s)
         times_s = [self._arcs.next_retry_s(), slice_end_s, self._priorities.next_aging_s()]
         wake_s = min((time_s for time_s in times_s if time_s is not None), default=None)
-        if rang or wake_s != self._wake_s:
-            self._wake_s = wake_s
+        if rang or wake_s != self.wake_s:
+            self.wake_s = wake_s
             self._transitions.wake_at(wake_s)
 
     # Views.
@@ -208,40 +203,12 @@ class ScheduleManager:
         """Return the set of RCs this request should wait for; nothing changes.
 
         Raises:
-            MissingRuntime: It does not say for how long it must run at least.
+            MissingRuntime: The request has no valid minimum run time.
             UnknownRc: All alternatives name RCs that do not exist.
             CapacityExceeded: It could not run even alone; facts ``demanded``, ``used`` and ``free``.
-            SchedulingRefusal: It asks for nothing, or for streams that make no sense.
+            SchedulingRefusal: The request has no RC, or a stream with impossible times.
         """
         return choose(self._state, request)
-
-    def scheduled(self, arc: str, now_s: float) -> Scheduled:
-        """Return where the request of this ARC is.
-
-        Raises:
-            UnknownRequest: It has none.
-        """
-        return self._explanation.scheduled(self._known(arc), max(now_s, self._transitions.now_s))
-
-    def schedule(self, now_s: float) -> Schedule:
-        """Return who holds what, who waits for whom, and until when."""
-        return self._explanation.schedule(max(now_s, self._transitions.now_s))
-
-    def why(self, name: str, now_s: float) -> Why:
-        """Return why an ARC, an owner (name or address) or an RC is as it is.
-
-        Raises:
-            UnknownRequest: There is none of this name.
-        """
-        return self._explanation.why(name, max(now_s, self._transitions.now_s))
-
-    def attributes(self, name: str) -> Attributes:
-        """Return what an ARC, an owner (name or address), or all at and below a node ask for.
-
-        Raises:
-            UnknownRequest: There is none of this name.
-        """
-        return attributes(self._state.arcs.values(), name, self._tree.nodes)
 
     def require_movable(self, node: str, parent: str) -> None:
         """Return if the node of the behavior tree can be moved below this parent; nothing changes.
@@ -249,7 +216,7 @@ class ScheduleManager:
         Raises:
             NotMovable: It cannot.
         """
-        obstacle = self._tree.obstacle(node, parent)
+        obstacle = self.tree.obstacle(node, parent)
         if obstacle:
             raise NotMovable(f"{node} cannot be moved below {parent}: {obstacle}", node=node, parent=parent)
 
@@ -275,49 +242,12 @@ class ScheduleManager:
         """Make sure that the invariants of the schedule hold.
 
         Raises:
-            AssertionError: One does not; with the story of the ARCs concerned.
+            AssertionError: An invariant is broken; with the story of the ARCs concerned.
         """
-        for invariant, whom in broken(self._schedule, self._transitions.now_s):
+        for invariant, whom in broken(self.master_schedule, self._transitions.now_s):
             story = self._transitions.trace.story_of({arc.name for arc in whom})
             raise AssertionError("\n".join([f"broken at {self._transitions.now_s}: {invariant}", *map(str, story)]))
         for rc in self._state.rcs.values():
             if self._transitions.trace.says_up(rc.name) not in (None, rc.up):
                 lines = map(str, self._transitions.trace.story_of({rc.name}))
                 raise AssertionError("\n".join([f"{rc.name} is {'up' if rc.up else 'down'}, not by the trace", *lines]))
-
-    def _granted_s(self, arc: ArcEntry, now_s: float) -> float:
-        """Return when a waiting ARC is granted if nothing else happens, by playing a copy of this schedule forward.
-
-        Infinite: not within ``FORESEEN_S``.
-        """
-        rehearsal = self._going_on(now_s)
-        seen = 0
-        while rehearsal.step(now_s + FORESEEN_S) and len(rehearsal.trace) < FORESEEN_LINES:
-            for line in rehearsal.trace[seen:]:
-                if line["ev"] == "grant" and line["arc"] == arc.name:
-                    return rehearsal.now_s
-            seen = len(rehearsal.trace)
-        return math.inf
-
-    def _going_on(self, now_s: float) -> Rehearsal:
-        """Return a rehearsal of what comes; of the time to stop cleanly half is expected to be taken."""
-        under_way: list[tuple[float, Opened | Freed]] = []
-        for arc in self._state.arcs.values():
-            if arc.state is RequestState.CONNECTING:
-                under_way.append((max(now_s, arc.began_s + arc.settle_s), Opened(arc.name)))
-            elif arc.state is RequestState.REVOKING:
-                pause_s = self._grace_s / 2 if arc.swapped_out == "slice" and not arc.request.stops_at_once else 0.0
-                under_way.append((max(now_s, arc.since_s + pause_s + arc.release_s), Freed(arc.name)))
-        return Rehearsal.going_on(
-            copy.deepcopy(self),
-            now_s,
-            under_way=sorted(under_way, key=lambda item: item[0]),
-            release_s={rc.name: rc.disconnect_s for rc in self._state.rcs.values()},
-            wake_s=self._wake_s,
-            pause_s=lambda deadline_s: deadline_s / 2,
-        )
-
-    def _known(self, arc: str) -> ArcEntry:
-        if arc not in self._state.arcs:
-            raise UnknownRequest(f"no request of {arc!r} is known", name=arc)
-        return self._state.arcs[arc]

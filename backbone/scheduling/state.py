@@ -1,4 +1,4 @@
-"""State: the RCs, the ARCs and their slices. All that changes in a schedule changes here, by transitions with names.
+"""State: the RCs, the ARCs and their slices. Every change of a schedule is a named transition of this file.
 
 The life of an ARC:
 
@@ -8,10 +8,10 @@ The life of an ARC:
 * ``revoke``: CONNECTING, RUNNING → REVOKING
 * ``free``: REVOKING → WAITING or IDLE
 * ``rest``: WAITING → IDLE
-* ``forget``: IDLE, WAITING, REVOKING → it is not known any more
+* ``forget``: IDLE, WAITING, REVOKING → removed
 
-Rules of this file: no decision, no message. Every transition notes the RCs that it concerns, so that the planners look
-at those only, and raises ``version``: what was worked out for an earlier one does not count any more.
+Rules of this file: no decision, no message. Every transition notes the RCs that it concerns, so that the planners
+examine those only, and raises ``version``: results for an earlier version are outdated.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from backbone.scheduling.response_time import Analysis, stream
 
 
 class ScheduleState:
-    """What is so now.
+    """The present state.
 
     Attributes:
-        arcs: All ARCs that asked, by name, in the order of their requests.
+        arcs: All ARCs with a request, by name, in the order of their requests.
         groups: The groups of the active ARCs.
         compatibility: Which ARCs can hold their RCs together.
-        fairness: Which of several equals comes first.
+        fairness: The order among equals.
         now_s: Time of the last transition.
         version: Grows with every transition.
     """
@@ -46,8 +46,8 @@ class ScheduleState:
         """Begin with no RCs and no ARCs.
 
         Args:
-            discipline: Which of several equals comes first.
-            admission: How it is decided what a sharable RC can serve.
+            discipline: The order among equals.
+            admission: Test of the demand that a sharable RC can serve.
             tolerance_s: Reaction and timer tolerance of this run.
             exact_up_to: Groups of at most this size are always exactly one group.
         """
@@ -68,10 +68,10 @@ class ScheduleState:
         self._pushes = itertools.count()
         self._stamps = itertools.count(1)
 
-    # What changed since it was looked at.
+    # Changes since the last decision.
 
     def take_changed(self) -> list[str]:
-        """Return the RCs that transitions concerned since this was asked last, first concerned first."""
+        """Return the RCs that transitions concerned since the last call, first concerned first."""
         changed = [*self._changed]
         self._changed.clear()
         return changed
@@ -87,7 +87,7 @@ class ScheduleState:
         self.version += 1
 
     def _service_changed(self, rcs: Collection[str]) -> None:
-        """Have what these RCs can serve worked out anew, and with it who is first in line anywhere."""
+        """Drop the cached answers about these RCs, and with them the first ARCs in line everywhere."""
         self.compatibility.service_changed(rcs)
         self._service_version += 1
         self._concerns(rcs)
@@ -130,7 +130,7 @@ class ScheduleState:
         return True
 
     def set_capacity(self, rc: RcEntry, capacity: float) -> None:
-        """Let the RC give this share of its time."""
+        """Set the RC's capacity."""
         rc.capacity = capacity
         self._service_changed([rc.name])
 
@@ -148,11 +148,11 @@ class ScheduleState:
         """Take in an ARC, idle, and return its entry.
 
         Args:
-            request: What it asks for.
+            request: Its request.
             uses: The RCs chosen for it, all of them known.
             place: Names from the root to its owner.
             path: The same with their numbers.
-            longest_s: Its slices may last so long even if it asks for less.
+            longest_s: Longest time of its slices, also for a shorter request.
         """
         rcs = [self.rcs[rc] for rc in uses]
         shares = tuple(rc.name for rc in rcs if rc.sharable and uses[rc.name].streams)
@@ -176,48 +176,48 @@ class ScheduleState:
         return arc
 
     def request_again(self, arc: ArcEntry, request: SchedulingRequest) -> None:
-        """Keep the ARC's last words."""
+        """Keep the ARC's newest request."""
         arc.request = request
 
     def set_run_times(self, arc: ArcEntry, minimum_s: float, maximum_s: float) -> None:
-        """Let its slices have these lengths from the next one on."""
+        """Set the lengths of its slices from the next one on."""
         arc.minimum_s, arc.maximum_s = minimum_s, maximum_s
         self._concerns(arc.uses)
 
     def forget(self, arc: ArcEntry) -> None:
-        """Take out an ARC; it holds nothing afterwards."""
+        """Remove an ARC; it holds nothing afterwards."""
         self._enter(arc, RequestState.IDLE, arc.since_s)
         self.compatibility.forget(arc)
         del self.arcs[arc.name]
 
     def set_paths(self, paths: Iterable[tuple[ArcEntry, tuple[str, ...], Path]]) -> None:
-        """Give ARCs these places in the tree, with these numbers."""
+        """Set these places of ARCs in the tree, with these numbers."""
         for arc, place, path in paths:
             arc.place_in_tree, arc.path, arc.level = place, path, self._level_of(path)
         self._service_changed([*self.rcs])
 
     def raise_to(self, arc: ArcEntry, levels: int) -> None:
-        """Count by how many levels the ARC rose because it waits long."""
+        """Set the levels by which the ARC rose because it waits long."""
         arc.raised = levels
 
     # The life of an ARC.
 
     def queue(self, arc: ArcEntry, now_s: float) -> None:
-        """Let it wait, behind all equals that are there."""
+        """Queue the ARC behind all present equals."""
         arc.stamp = self._stamp(now_s)
         arc.reservation = arc.retry_s = None
         arc.has_forced = False
         self._enter(arc, RequestState.WAITING, now_s)
 
     def reserve(self, arc: ArcEntry, *, forced: bool) -> None:
-        """Let an ARC that waits come before all equals until it is connected; note if others were forced to go."""
+        """Place a waiting ARC before all equals until it is connected; note if others were preempted for it."""
         arc.has_forced |= forced
         if arc.reservation is None:
             arc.reservation = next(self._stamps)
             self._concerns(arc.uses)
 
     def connect(self, arc: ArcEntry, now_s: float) -> None:
-        """Give it its RCs, each under a new epoch; they begin to settle."""
+        """Connect its RCs, each under a new epoch; they begin to settle."""
         for rc in arc.uses:
             self.rcs[rc].epoch += 1
         arc.epochs = {rc: self.rcs[rc].epoch for rc in arc.uses}
@@ -237,7 +237,7 @@ class ScheduleState:
         return newest
 
     def adopt(self, arc: ArcEntry, epochs: Mapping[str, int], granted_s: float, now_s: float) -> None:
-        """Let an ARC that waits run on in a slice that an earlier RC manager began."""
+        """Adopt a slice that an earlier RC manager began, for a waiting ARC."""
         arc.epochs = dict(epochs)
         for rc, epoch in epochs.items():
             entry = self.rcs[rc]
@@ -249,14 +249,14 @@ class ScheduleState:
         self.end_at(arc, granted_s + arc.minimum_s)
 
     def begin_slice(self, arc: ArcEntry, now_s: float, end_s: float) -> None:
-        """Let an ARC that was served stay connected for one more slice; its next place is behind its equals."""
+        """Begin one more slice of a served ARC that stays connected; its next place is behind its equals."""
         arc.stamp = self._stamp(now_s)
         arc.slice_s = now_s
         arc.turns += 1
         self.end_at(arc, end_s)
 
     def end_at(self, arc: ArcEntry, end_s: float) -> None:
-        """Let the slice of a running ARC end then."""
+        """Set the end of a running ARC's slice."""
         arc.end_s, arc.look_s, arc.awaited = end_s, end_s, False
         self._held_alone |= arc.excludes
         if self._is_waited_for(arc):
@@ -264,7 +264,7 @@ class ScheduleState:
         self._concerns(arc.uses)
 
     def revoke(self, arc: ArcEntry, now_s: float, why: str, by: str, afterwards: Afterwards) -> None:
-        """Take its RCs back; one that was served has its next place behind its equals."""
+        """Revoke its RCs; a served ARC has its next place behind its equals."""
         if arc.served(now_s):
             arc.stamp = self._stamp(now_s)
         arc.swapped_out, arc.swapped_out_by = why, by
@@ -272,22 +272,22 @@ class ScheduleState:
         self._enter(arc, RequestState.REVOKING, now_s)
 
     def set_afterwards(self, arc: ArcEntry, afterwards: Afterwards) -> None:
-        """Let something else become of an ARC once its RCs are free."""
+        """Set the state of an ARC once its RCs are free."""
         arc.afterwards = afterwards
         self._concerns(arc.uses)
 
     def free(self, arc: ArcEntry, now_s: float, state: RequestState) -> None:
-        """Let it wait, or be idle, without RCs."""
+        """Count its RCs as free: it waits or is idle."""
         arc.epochs = {}
         self._enter(arc, state, now_s)
 
     def rest(self, arc: ArcEntry, now_s: float) -> None:
-        """Let an ARC that waits be idle."""
+        """Idle a waiting ARC."""
         arc.reservation = None
         self._enter(arc, RequestState.IDLE, now_s)
 
     def retry_at(self, arc: ArcEntry, time_s: float | None, why: str = "") -> None:
-        """Let an idle ARC want time again then; None: when it says so."""
+        """Set when an idle ARC wants time again; None: at its own request."""
         arc.retry_s, arc.retry_why = time_s, why
 
     def _enter(self, arc: ArcEntry, state: RequestState, now_s: float) -> None:
@@ -321,7 +321,7 @@ class ScheduleState:
     # Ends of slices.
 
     def end_slices(self, now_s: float) -> float | None:
-        """Look at slices that are over where an ARC waits for their end; return when the next look is due."""
+        """Check the ended slices for whose end an ARC waits; return when the next check is due."""
         self.now_s = now_s
         self.version += 1  # time alone changes plans
         while self._ends:
@@ -342,7 +342,7 @@ class ScheduleState:
         return None
 
     def runs_on(self, arc: ArcEntry) -> bool:
-        """Say whether the discipline prefers an ARC whose slice is over to the equals that wait for its RCs."""
+        """Return whether the discipline prefers an ARC whose slice is over to the equals that wait for its RCs."""
         waiting = [other for other in self.beside(arc) if other.state is RequestState.WAITING]
         return self.fairness.runs_on(arc, filter(self.compatibility.usable, waiting), self.now_s)
 
@@ -354,7 +354,7 @@ class ScheduleState:
             arc.awaited = True
             heapq.heappush(self._ends, (arc.look_s, next(self._pushes), arc))
 
-    # What can be read off it.
+    # Questions.
 
     def users(self, rc: str) -> Collection[ArcEntry]:
         """Return the active ARCs that use the RC, in the order in which they became active."""
@@ -380,11 +380,11 @@ class ScheduleState:
         return [*holders]
 
     def is_held_alone(self, rc: str) -> bool:
-        """Say whether an ARC holds the RC alone, and its slice is not over."""
+        """Return whether an ARC holds the RC alone, and its slice is not over."""
         return bool(self._held_alone & self._bits[rc])
 
     def is_kept_out(self, arc: ArcEntry) -> bool:
-        """Say whether another ARC holds an RC of this one alone, and its slice is not over."""
+        """Return whether another ARC holds an RC of this one alone, and its slice is not over."""
         return bool(self._held_alone & arc.touches)
 
     def group_of(self, arc: ArcEntry) -> Sequence[ArcEntry]:

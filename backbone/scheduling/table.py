@@ -1,12 +1,12 @@
-"""Table: what can be asked of a schedule as it is: who fits beside whom, who comes first, who stands in whose way.
+"""Table: questions about the present schedule: compatible ARCs, their order, and blockers.
 
-When the time of an ARC comes is worked out by the planners.
+The planners find the time of an ARC.
 
 Rules of this file (numbers as in docs and ``why``):
 
 * 1  All or nothing: one holder of an exclusive RC; every stream of every holder meets its deadline.
 * 2  Order: oldest stamp first, but no ARC before one that is higher.
-* 4  Lower-priority holders never delay a higher-priority ARC: they stand in its way only until now.
+* 4  Lower-priority holders never delay a higher-priority ARC: they block it only until now.
 
 Source: IROS 2001, "RC manager"; RAM 2002, "The RC Scheduler", last paragraphs.
 """
@@ -54,7 +54,7 @@ class Table:
         """Return ARCs of one group in the order of rule 2; ARCs with a reservation sort first."""
         ordered = by_precedence(arcs, lambda arc: arc.path, self._seniority)
         for reserved in [arc for arc in ordered if arc.reservation is not None]:
-            # A higher one that cannot run at all keeps no ARC from what was freed for it.
+            # A higher ARC that cannot run at all does not keep an ARC from the RCs freed for it.
             if not any(self.usable(other) and other.goes_before(reserved) for other in arcs):
                 ordered.remove(reserved)
                 ordered.insert(0, reserved)
@@ -68,7 +68,7 @@ class Table:
         return next(arc for arc in by_age if not any(other.goes_before(arc) for other in arcs))
 
     def must_let_higher_go_first(self, arc: ArcEntry) -> bool:
-        """Say whether the policy ``strict`` holds the ARC back: a higher usable one of its group waits."""
+        """Return whether the policy ``strict`` holds the ARC back: a higher usable one of its group waits."""
         return self.strict and any(
             other.state is RequestState.WAITING and other.goes_before(arc) and self.usable(other)
             for other in self.state.groups.of(arc).arcs
@@ -77,10 +77,10 @@ class Table:
     def _seniority(self, arc: ArcEntry) -> Seniority:
         return self.state.fairness.seniority(arc, self.state.now_s)
 
-    # Who stands in the way (rule 4).
+    # Blockers (rule 4).
 
     def stands_until_s(self, holder: ArcEntry, arc: ArcEntry, now_s: float) -> float:
-        """Return until when the holder stands in the way of the ARC."""
+        """Return until when the holder blocks the ARC."""
         if holder.state is RequestState.REVOKING:
             return self.free_s(holder, now_s)
         before = 0 if holder.level is arc.level else rank(holder.path, arc.path)
@@ -95,11 +95,11 @@ class Table:
         return max(now_s + SOON_S, revoked.since_s + revoked.release_s)
 
     def is_overdue(self, arc: ArcEntry, now_s: float) -> bool:
-        """Say whether the RCs of the ARC should have been free by now."""
+        """Return whether the RCs of the ARC should have been free by now."""
         return arc.state is RequestState.REVOKING and now_s > arc.since_s + arc.release_s
 
     def could_start(self, arc: ArcEntry, holders: Iterable[ArcEntry], now_s: float) -> bool:
-        """Say whether none of these that it cannot share with holds an RC of it for longer than until now."""
+        """Return whether no incompatible ARC of these holds an RC of it for longer than until now."""
         touches, soon_s = arc.touches, now_s + INSTANT_S
         for holder in holders:
             if (
@@ -112,20 +112,20 @@ class Table:
         return True
 
     def runs_on(self, turn: Turn) -> bool:
-        """Say whether the discipline prefers one of the equals in the way to the ARC whose turn it would be."""
+        """Return whether the discipline prefers one of the blocking equals to the ARC whose turn it would be."""
         equals = [holder for holder in turn.in_the_way if not rank(holder.path, turn.arc.path)]
         return any(self.state.runs_on(holder) for holder in equals)
 
     def in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float
     ) -> list[ArcEntry]:
-        """Return the holders that must go so that the ARC can start, no more than necessary.
+        """Return the holders to revoke so that the ARC can start, no more than necessary.
 
         Lower ones go first, the last in order first; then equals whose slices are over, the one granted first first
         (rule 5): so each of several equals on a sharable RC stays for the same number of slices.
 
-        Those who only wait for RCs that are being freed (``pending``) count as if they had started:
-        else the room made here is theirs in a moment and both would displace each other again and again.
+        ARCs that only wait for RCs that are being freed (``pending``) count as started: else they would get the
+        room made here a moment later, and both would displace each other again and again.
         """
         holders = [holder for holder in group if holder.state in CONNECTED and holder.touches & arc.touches]
         movable = [holder for holder in holders if self.stands_until_s(holder, arc, now_s) <= now_s + INSTANT_S]

@@ -1,4 +1,4 @@
-"""The lines of the schedule trace: what an independent judge needs to replay every decision.
+"""The lines of the schedule trace, from which an independent judge can replay every decision.
 
 Rule of this file: one function per kind of line, fields and order as the trace format fixes them.
 Times are mission seconds, written in full so that a replay finds the very same decision times.
@@ -72,7 +72,7 @@ def request(
     uses: Mapping[str, RcUse],
     idle: bool,
 ) -> Line:
-    """Return the line of an ARC that asks; ``owner`` is a node's id, or from ``console_owner``."""
+    """Return the line of a request; ``owner`` is a node's id, or from ``console_owner``."""
     line = {
         "ev": "request",
         "t": now_s,
@@ -86,7 +86,7 @@ def request(
 
 
 def console_owner(name: str, priority: int) -> Line:
-    """Return how the trace names a console as owner."""
+    """Return the name of a console as owner in the trace."""
     return {"ui": priority, "id": name}
 
 
@@ -96,7 +96,7 @@ def runtime(now_s: float, arc: str, minimum_s: float, maximum_s: float) -> Line:
 
 
 def extend(now_s: float, arc: str, until_s: float) -> Line:
-    """Return the line of a running slice that was made longer."""
+    """Return the line of an extended slice."""
     return {"ev": "extend", "t": now_s, "arc": arc, "until": until_s}
 
 
@@ -115,7 +115,7 @@ def grant(now_s: float, arc: str, epochs: Mapping[str, int]) -> Line:
 
 
 def revoke(now_s: float, arc: str, why: str, by: str) -> Line:
-    """Return the line of an ARC that must go."""
+    """Return the line of a revocation."""
     line = {"ev": "revoke", "t": now_s, "arc": arc, "why": why}
     return {**line, "by": by} if by else line
 

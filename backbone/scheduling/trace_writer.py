@@ -16,20 +16,20 @@ from backbone.scheduling.priority import CONSOLE, Path
 from backbone.scheduling.priority_tree import carried
 from backbone.scheduling.requests import RcUse
 
-STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken promise
+STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken invariant
 
 
 class TraceWriter:
-    """Hands out each line, and remembers the last ones."""
+    """Emits each line, and keeps the last ones."""
 
-    def __init__(self, tell: Callable[[Record], None], *, goes_on: bool = False) -> None:
+    def __init__(self, emit: Callable[[Record], None], *, goes_on: bool = False) -> None:
         """Begin with nothing introduced.
 
         Args:
-            tell: Takes each line, in order.
-            goes_on: True if the lines follow those of an earlier RC manager, by which an RC may be down.
+            emit: Called with each line, in order.
+            goes_on: True if the lines follow an earlier RC manager's, by which an RC may be down.
         """
-        self._tell, self._goes_on = tell, goes_on
+        self._emit, self._goes_on = emit, goes_on
         self._is_up: dict[str, bool] = {}
         self._nodes: dict[tuple[str, ...], tuple[str | None, int]] = {}
         self._ids: dict[tuple[str, ...], str] = {}
@@ -40,22 +40,22 @@ class TraceWriter:
         if line["ev"] == "rc_state":
             self._is_up[line["id"]] = line["state"] == "up"
         self._story.append(line)
-        self._tell(Record(line, cause))
+        self._emit(Record(line, cause))
 
     def story_of(self, names: Collection[str]) -> list[trace.Line]:
         """Return the last lines about these ARCs or RCs; about all if there are none."""
         return [line for line in self._story if not names or line.get("arc", line.get("id")) in names]
 
     def has_introduced(self, rc: str) -> bool:
-        """Say whether the RC was introduced."""
+        """Return whether the RC was introduced."""
         return rc in self._is_up
 
     def says_up(self, rc: str) -> bool | None:
-        """Return whether the RC is up by the lines so far; None if no line was about it."""
+        """Return whether the RC is up by the lines so far; None without such a line."""
         return self._is_up.get(rc)
 
     def introduce_rc(self, rc: RcEntry, now_s: float) -> None:
-        """Introduce an RC that was not: when it is up for the first time, or asked for before."""
+        """Introduce a new RC: when it is up for the first time, or requested before."""
         if rc.name in self._is_up:
             return
         self._is_up[rc.name] = True
@@ -75,7 +75,7 @@ class TraceWriter:
             self.record(trace.rc_state(now_s, rc.name, up=True), "it answers this RC manager")
 
     def introduce_nodes(self, path: Path, now_s: float) -> None:
-        """Introduce new nodes, new numbers and new parents on this way, parents first."""
+        """Introduce new nodes, new numbers and new parents on this path, parents first."""
         way: tuple[str, ...] = ()
         for name, number in path:
             parent = self._id(way) if way else None
@@ -83,21 +83,21 @@ class TraceWriter:
             told = self._nodes.get(way)
             self._nodes[way] = (parent, number)
             if told == (parent, number) or (told is None and name.startswith(CONSOLE)):
-                continue  # the request tells a console's first number
+                continue  # the request's line has a console's first number
             why = "its parent" if told is not None and told[0] != parent else "its number among its siblings"
             self.record(trace.node(now_s, self._id(way), parent, number), why)
 
     def nodes(self) -> list[tuple[str, ...]]:
-        """Return the ways to all nodes that were introduced."""
+        """Return the paths of all introduced nodes."""
         return [*self._nodes]
 
     def nodes_moved(self, old: tuple[str, ...], new: tuple[str, ...]) -> None:
-        """Keep the id of each node at and below ``old``, which is now at ``new``: lines go on naming it so."""
+        """Keep the id of each node at and below ``old``, which is now at ``new``: lines go on with the old ids."""
         self._ids = {carried(way, old, new): self._id(way) for way in self._nodes}
         self._nodes = {carried(way, old, new): told for way, told in self._nodes.items()}
 
     def record_request(self, arc: ArcEntry, now_s: float, *, idle: bool) -> None:
-        """Write what the ARC asks for, and if it wants no time yet; its owner's node was introduced."""
+        """Write the ARC's request, and a line if it is idle; its owner's node was introduced."""
         name, number = arc.path[-1]
         owner = (
             trace.console_owner(name.removeprefix(CONSOLE), number)

@@ -1,6 +1,6 @@
 """Transitions: each step of an ARC's life with its line in the trace and its instruction to the loop.
 
-``ScheduleState`` says what is so afterwards; here the world hears of it, in the order of the decisions.
+``ScheduleState`` has the new state; this file emits lines and instructions, in the order of the decisions.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ _CAUSES: Mapping[str, str] = {
 
 
 class Transitions:
-    """Changes the state and keeps what follows for the loop.
+    """Changes the state and collects the instructions for the loop.
 
     Attributes:
         trace: Writes the lines.
-        instructions: What follows from the decision so far, in order.
+        instructions: The decision's instructions so far, in order.
     """
 
     def __init__(self, schedule: MasterSchedule, rules: SchedulingRules, *, tolerance_s: float, goes_on: bool) -> None:
@@ -47,7 +47,7 @@ class Transitions:
 
         Args:
             schedule: The plans and the state.
-            rules: With which it is decided.
+            rules: Rules of the decisions.
             tolerance_s: Reaction and timer tolerance of this run.
             goes_on: True if the trace goes on after that of an earlier RC manager.
         """
@@ -68,11 +68,11 @@ class Transitions:
         self._ended = []
 
     def instruct(self, instruction: Instruction) -> None:
-        """Have this carried out after all before."""
+        """Add an instruction after all earlier ones."""
         self.instructions.append(instruction)
 
     def wake_at(self, time_s: float | None) -> None:
-        """Have the next decision made then if no event comes before."""
+        """Schedule the next decision for then if no event comes before."""
         self.instruct(WakeAt(time_s))
 
     # The life of an ARC.
@@ -80,7 +80,7 @@ class Transitions:
     def connect(self, arc: ArcEntry) -> None:
         """Connect an ARC whose RCs are all free."""
         self.state.connect(arc, self.now_s)
-        if any(len(self.state.rcs[rc].holders) > 1 for rc in arc.shares):  # the others' ranks may be others now
+        if any(len(self.state.rcs[rc].holders) > 1 for rc in arc.shares):  # the other holders' ranks may change
             self.instruct(RenewLeases())
         self.trace.record(
             trace.connect(self.now_s, arc.name, arc.epochs), "it is next, and all its RCs are free (rule 3)"
@@ -98,45 +98,45 @@ class Transitions:
         return {rc: place(rc) for rc in arc.uses if self.state.rcs[rc].sharable}
 
     def grant(self, arc: ArcEntry) -> None:
-        """Let the slice of an ARC begin whose RCs have settled."""
+        """Grant an ARC whose RCs have settled: its slice begins."""
         newest = self.state.grant(arc, self.now_s, self._slice_end_s(arc))
         self.trace.record(trace.grant(self.now_s, arc.name, newest), "its RCs have settled")
         self._record_grid(arc)
 
     def adopt(self, arc: ArcEntry, epochs: Mapping[str, int], granted_s: float) -> None:
-        """Let an ARC run on in the slice an earlier RC manager began; the trace shows it at its true times."""
+        """Adopt the slice that an earlier RC manager began; the trace shows it at its true times."""
         why = "it held its RCs when this RC manager started"
         self.trace.record(trace.connect(self.now_s, arc.name, epochs), why)
         self.trace.record(trace.grant(granted_s, arc.name, epochs), why)
         self.state.adopt(arc, epochs, granted_s, self.now_s)
 
     def extend(self, arc: ArcEntry, until_s: float) -> None:
-        """Let the slice of a running ARC end later."""
+        """Extend the slice of a running ARC."""
         self.state.end_at(arc, until_s)
         self.trace.record(trace.extend(self.now_s, arc.name, until_s), "it asked to go on (rule 14)")
 
     def revoke(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
-        """Take all its RCs from an ARC that is connected."""
+        """Revoke all RCs of a connected ARC."""
         deadline_s = self._rules.grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
         self.lose(arc, why, by, afterwards)
         self.instruct(RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, NOT_EXPECTED_S))
 
     def lose(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
-        """Count its RCs as being disconnected; that is under way already."""
+        """Count the ARC's RCs as being disconnected: that is under way already."""
         self.trace.record(trace.revoke(self.now_s, arc.name, why, by), because(why, by))
         self.state.revoke(arc, self.now_s, why, by, afterwards)
 
     def free(self, arc: ArcEntry, state: RequestState) -> None:
-        """Let an ARC whose RCs are in their safe states wait or be idle."""
+        """Queue or idle an ARC whose RCs are in their safe states."""
         self.state.free(arc, self.now_s, state)
 
     def end_slice(self, arc: ArcEntry, by: ArcEntry) -> None:
-        """Take all its RCs from an ARC that was served, for an equal."""
+        """Revoke all RCs of a served ARC, for an equal."""
         self._ended += [(arc, rc) for rc in arc.shares if rc in by.shares]
         self.revoke(arc, "slice", by.name)
 
     def renew_slices(self) -> None:
-        """Let served equals that stay on a sharable RC begin a new slice where another's was ended for it (rule 5)."""
+        """Begin a new slice of served equals that stay on a sharable RC where another slice was ended (rule 5)."""
         for ended, rc in self._ended:
             for arc in [*self.state.rcs[rc].holders]:
                 if rc in arc.shares and arc.served(self.now_s) and not rank(arc.path, ended.path):
@@ -154,7 +154,7 @@ class Transitions:
             self.trace.record(trace.extend(self.now_s, arc.name, arc.end_s), cause)
 
     def queue(self, arc: ArcEntry) -> None:
-        """Let it wait as one that just came; the trace shows it if its group is too large to be planned whole."""
+        """Queue it behind its equals; the trace has a line if its group is too large to be planned whole."""
         self.state.queue(arc, self.now_s)
         if not self._relaxed and not self._schedule.planner_of(arc).is_exact:
             self._relaxed = True
@@ -172,7 +172,7 @@ class Transitions:
         )
 
     def expect(self) -> None:
-        """Add to the instructions when ARCs that lose their RCs can expect them back."""
+        """Add the predicted next grants of revoked ARCs to the instructions."""
         for place, instruction in enumerate(self.instructions):
             if not isinstance(instruction, RevokeArc):
                 continue

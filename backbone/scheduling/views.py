@@ -1,4 +1,4 @@
-"""What the scheduler says of itself: the schedule, the reasons, what counts for each request."""
+"""Views of the scheduler: the schedule, the reasons, and the attributes of each request."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class RcView(Message, frozen=True):
     Attributes:
         state: ``up`` or ``down``.
         capacity: Share of its time it can give.
-        holders: Who holds it, with epoch and since when.
+        holders: Its holders, with epochs and begins.
         last_epoch: Largest epoch given so far.
         next: ARCs that get it, in the order of their predicted starts.
         until_s: Mission time at which the slice of each holder ends; negative: it is being disconnected.
@@ -38,16 +38,16 @@ class RequestView(Message, frozen=True):
     """One request in the master schedule.
 
     Attributes:
-        state: Where it is.
+        state: State of the request.
         since_s: Mission time at which it entered that state.
         until_s: End of its slice; negative if it holds nothing.
         expected_start_s: Predicted grant; negative if it runs or none can be predicted.
         because: One line: why it runs or waits.
-        blockers: ARCs that stand directly in its way; ``why`` tells all that would have to go.
+        blockers: ARCs that block it directly; ``why`` names all that would have to be revoked.
         minimum_runtime_s: As asked for.
         priority: Its priority path, for people: ``mission:10/surveillance:5/watch-scout1:3``.
         rule: Rule of SCHEDULING.md that decides it.
-        would_change: What would end this, for people.
+        would_change: The event that would end this, for people.
         raised: Levels by which it rose because it waits long.
     """
 
@@ -81,13 +81,13 @@ class Why(Message, frozen=True):
     """Answer to ``AskWhy``.
 
     Attributes:
-        name: What was asked about.
-        state: Where it is.
+        name: Name in the question.
+        state: Its state.
         lines: The reasons for people, most important first.
         rule: Rule of SCHEDULING.md that decides it.
-        blockers: ARCs because of which; of a waiting one: without them it starts as soon as its RCs are up and free.
+        blockers: ARCs that cause this; without them a waiting ARC starts as soon as its RCs are up and free.
         expected_start_s: Predicted grant; negative if none.
-        would_change: What would end the wait, for people.
+        would_change: The event that would end the wait, for people.
     """
 
     name: Mention
@@ -100,11 +100,11 @@ class Why(Message, frozen=True):
 
 
 class RequestAttributes(Message, frozen=True):
-    """What one ARC asks for, as it counts now.
+    """The request of one ARC, as it counts now.
 
     Attributes:
-        state: Where the request is.
-        uses: RC → how it is used.
+        state: State of the request.
+        uses: RC → its use.
         minimum_runtime_s: Shortest slice.
         maximum_runtime_s: End of all extensions.
         path: Names and priorities from the mission's root to the decision process, or of the console alone.

@@ -1,4 +1,4 @@
-"""Whole group: each queued ARC of a group has a start reserved, so that none is overtaken to its cost (rule 3).
+"""Whole group: each queued ARC of a group has a reserved start, so that backfilling never delays it (rule 3).
 
 This is conservative backfilling (see ``planner``), with priorities and with sets of RCs instead of one number of
 processors. It costs a plan of the whole group whenever something in it changed.
@@ -6,7 +6,7 @@ processors. It costs a plan of the whole group whenever something in it changed.
 Rules of this file (numbers as in docs and ``why``):
 
 * 3  Plan: earliest start at which an ARC fits whole; a later start is reserved.
-* 4  Holders that are lower, or equal and served, go for whom it is time.
+* 4  Lower holders, and served equal ones, are revoked for the ARC whose time has come.
 * 8  Under ``strict`` no ARC starts while a higher usable one of its group waits.
 
 Source: IROS 2001, "RC manager"; RAM 2002, "The RC Scheduler", last paragraphs.
@@ -33,7 +33,7 @@ class WholeGroupPlanner:
     is_exact = True
 
     def __init__(self, table: Table, *, slack_s: float) -> None:
-        """Begin with nowhere to look.
+        """Begin with no groups to examine.
 
         Args:
             slack_s: By how much two reservations may overlap. Hand-over takes time: without it an ARC never fits a
@@ -49,15 +49,15 @@ class WholeGroupPlanner:
 
     @property
     def reserves(self) -> bool:
-        """A later start binds equals, but under the discipline ``time``."""
+        """Whether a later start binds equals: not under the discipline ``time``."""
         return self._among_equals
 
     def look_near(self, rc: str) -> None:
-        """Look anew at the group that uses the RC."""
+        """Examine the group that uses the RC in the next decision."""
         self._near[rc] = None
 
     def due(self, now_s: float) -> Turn | None:
-        """Return an ARC whose time is now, and who must go for it; None if there is none in the groups looked at."""
+        """Return an ARC whose time is now, and the holders to revoke for it; None if no examined group has one."""
         while self._near:
             rc = next(iter(self._near))
             users = self._state.users(rc)
@@ -76,7 +76,7 @@ class WholeGroupPlanner:
         """Return an ARC of the group whose time is now.
 
         Where RCs are freed late, or an ARC runs on beyond its slice under the discipline ``time``, plans change as
-        time passes; such a group is looked at when they are free, or when that ARC's next look is due.
+        time passes; such a group is examined when they are free, or when that ARC's next check is due.
         """
         runs_on = not self._among_equals and any(arc.served(now_s) for arc in group)
         if runs_on or any(self._table.is_overdue(arc, now_s) for arc in group):
@@ -93,7 +93,7 @@ class WholeGroupPlanner:
             return None
         plans = self._plans_of(group, now_s)
         last = max(place for place, arc in enumerate(plans.order) if arc in possible)
-        queued = plans.order[: last + 1]  # who comes after them changes nothing for them
+        queued = plans.order[: last + 1]  # later ARCs change nothing for these
         if self._among_equals:
             return self._due_of(queued, possible, plans, now_s)
         while queued:
@@ -122,10 +122,10 @@ class WholeGroupPlanner:
     def _due_of(
         self, queued: Sequence[ArcEntry], possible: Collection[ArcEntry], plans: _Plans, now_s: float
     ) -> Turn | None:
-        """Return whose time is now of these, given in order.
+        """Return the ARC whose time is now of these, given in order.
 
-        A slice is ended only for an ARC that fits without forgiveness, however early the hand-overs under way may
-        end: else it might be ended for a gap that closes meanwhile.
+        A slice is ended only for an ARC that fits without tolerance, for any end of the hand-overs under way: else
+        it might be ended for a gap that closes meanwhile.
         """
         now = plans.now
         if not any(now.starts_now(arc) for arc in queued if arc in possible):
@@ -147,7 +147,7 @@ class WholeGroupPlanner:
         return None
 
     def _in_turn(self, turn: Turn, group: Group[ArcEntry], now_s: float) -> bool:
-        """Say whether the turn would be right also if equals took turns.
+        """Return whether the turn would be right also if equals took turns.
 
         RCs come free as whole sets: an ARC that had least time, but would not get all its RCs so, ends no slice. Nor
         does it start in a gap that ARCs higher than it will need.
@@ -169,7 +169,7 @@ class WholeGroupPlanner:
         return True
 
     def _needs_more(self, arc: ArcEntry, keepers: Sequence[ArcEntry], due: Sequence[ArcEntry]) -> bool:
-        """Say whether the ARC does not fit beside those that hold RCs, or not beside them and others that are due."""
+        """Return whether the ARC does not fit beside the holders, or not beside them and other ARCs that are due."""
         others = [other for other in due if other is not arc]
         return not (self._table.fits(arc, keepers) and self._table.fits(arc, [*keepers, *others]))
 
@@ -181,7 +181,7 @@ class WholeGroupPlanner:
         """Return the place of every queued ARC of the group, in order.
 
         Args:
-            group: Active ARCs; all of a group, or without some of them, to see what would be.
+            group: Active ARCs; all of a group, or a hypothetical part of it.
             now_s: From when on.
             handed_over: Plan as if all RCs that are being freed were free already.
             slack_s: By how much an ARC may overlap those before it, but not by more than half its slice;
@@ -201,7 +201,7 @@ class WholeGroupPlanner:
         return self.plan(self._state.group_of(arc), now_s)
 
     def start_s(self, arc: ArcEntry, now_s: float) -> float:
-        """Return when the RCs of a queued ARC will begin to settle, as the decision being made sees it."""
+        """Return when the RCs of a queued ARC will begin to settle, as of the present decision."""
         return self._plans_of(self._state.groups.of(arc), now_s).now.start_s(arc)
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:
@@ -210,7 +210,7 @@ class WholeGroupPlanner:
         return order[: order.index(arc)]
 
     def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return none: every queued ARC has a start reserved."""
+        """Return none: every queued ARC has a reserved start."""
         del arc
         return []
 
@@ -234,7 +234,7 @@ def _in_turns(group: Group[ArcEntry]) -> list[ArcEntry]:
 
 
 class _Plans:
-    """The plans a decision about one group looks at, each made when it is first needed."""
+    """The plans of a decision about one group, each made when it is first needed."""
 
     def __init__(
         self,
@@ -257,7 +257,7 @@ class _Plans:
 
     @functools.cached_property
     def now(self) -> Plan:
-        """The plan as things are, with the tolerance of this run."""
+        """The plan of the present state, with the tolerance of this run."""
         return self._make(slack_s=self._slack_s)
 
     @functools.cached_property
@@ -267,7 +267,7 @@ class _Plans:
 
     @functools.cached_property
     def certain(self) -> Plan:
-        """The same, as if all that is being freed were free already."""
+        """The same, as if all RCs that are being freed were free already."""
         if not any(arc.state is RequestState.REVOKING for arc in self.group):
             return self.exact
         return self._make(slack_s=0.0, handed_over=True)

@@ -123,7 +123,7 @@ async def _picture_of_up(bus: ZenohBus, clock: MissionClock) -> str:
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory(prefix="scout-pictures-") as folder:
         os.environ["XDG_RUNTIME_DIR"] = folder
-        command = [sys.executable, "-m", "backbone.cli"]
+        command = [sys.executable, "-m", "backbone.command_line.cli"]
         subprocess.run([*command, "up", str(MISSION_XML), "--detach"], check=True)  # noqa: S603
         try:
             asyncio.run(main())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, ClassVar, TypeVar
+from typing import ClassVar, TypeVar
 
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.naming import Subsystem, address
@@ -77,7 +77,7 @@ class Driver(Behavior[D]):
         return Position(pose.x_m, pose.y_m, pose.heading_rad)
 
     async def start(self) -> None:
-        """Fail at once without an ARC; see ``Behavior.start``."""
+        """Fail at once without an ARC; see ``BehaviorHooks.start``."""
         if self.parameters.arc is None:
             self.give_up(NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}"))
 
@@ -107,6 +107,6 @@ class Driver(Behavior[D]):
 
     def give_up(self, refusal: Refusal) -> None:
         """Fail; the parent gets the refusal's code, detail and remedy."""
-        why: dict[str, Any] = {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}
+        why: dict[str, object] = {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}
         self.report(f"gives up: {refusal.detail}")
         self.finish(BehaviorStatus.FAILURE, why)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -90,7 +90,7 @@ class Servo(Driver[S]):
         self._phase = TrackingPhase.ACQUIRING
 
     async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002  any robot with a camera
-        """Acquire the target again; see ``Behavior.resumed``."""
+        """Acquire the target again; see ``BehaviorHooks.resumed``."""
         self.look_anew()
 
     def see(self, frame: Frame) -> None:
@@ -158,7 +158,7 @@ class Servo(Driver[S]):
     def arrived(self) -> None:
         """Succeed; the report contains the robot's pose before the target."""
         pose = self.step.pose if self.step is not None else None
-        at: dict[str, Any] = {"approaches": self._servo.approaches}
+        at: dict[str, object] = {"approaches": self._servo.approaches}
         if pose is not None:
             at |= {"ahead_m": pose.ahead_m, "left_m": pose.left_m, "heading_rad": pose.heading_rad}
         self.finish(BehaviorStatus.SUCCESS, at)

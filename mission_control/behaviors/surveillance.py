@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -47,7 +46,7 @@ class Surveillance(Behavior[SurveillanceParameters]):
             self.bus.subscribe(watcher, Conversation.EVENTS, MotionSeen, self._heard)
         self._say()
 
-    async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> Decision:
+    async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:
         """Start a failed watcher again ``retries`` times, then continue without it."""
         if status is BehaviorStatus.FAILURE:
             self._failures[child] += 1
@@ -59,7 +58,7 @@ class Surveillance(Behavior[SurveillanceParameters]):
         """Return the base's counters and the events by robot."""
         return {**super().statistics(), **{f"events_{robot}": count for robot, count in self._events.items()}}
 
-    def _heard(self, envelope: Envelope[Any]) -> None:
+    def _heard(self, envelope: Envelope[MotionSeen]) -> None:
         self._last = envelope.body
         self._events[envelope.body.robot] += 1
         self.tell_parent({"events": dict(self._events), "last_event_s": envelope.body.at_s})

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from random import Random
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -145,7 +145,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         except (Refusal, LinkError) as error:  # the next slice is as long as this one
             self.story.note(self.arc.arc, f"its run time was not changed: {error}")
 
-    def _found(self) -> dict[str, Any]:
+    def _found(self) -> dict[str, object]:
         return {"robot": self._robot, "events": self._events, "last_event_s": self._last_told_s}
 
     def _seen(self) -> str:

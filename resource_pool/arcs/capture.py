@@ -6,13 +6,12 @@ Source: RAM 2002, "Examples of ARCs and RCs".
 from __future__ import annotations
 
 import asyncio
-import types
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import AskRequest, CloseGate, OpenGate, TakePath
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arcs.video_drive import VideoDriveArc
 from resource_pool.messages import Accepted, ArcQuestion, NotFromYou, NothingHeard, Tune
 
@@ -21,16 +20,14 @@ class CaptureArc(VideoDriveArc):
     """A robot, its radio and video frequency, and a framegrabber tuned to it; frames go out under its address."""
 
     roles: ClassVar[Sequence[str]] = ("scout", "command_radio", "video_frequency", "framegrabber")
-    accepts: ClassVar[types.UnionType | type[Any] | None] = (
-        OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
-    )
+    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the transmitter on and tune, at the same time."""
         tune = Tune(self.name, epochs[self.rc("framegrabber")], self.rc("video_frequency"), self.rc("scout"))
         await asyncio.gather(super().prepare(epochs), self.tell_rc("framegrabber", tune))
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the framegrabber, too: switch on a transmitter that it does not receive."""
         match asked.body:
             case NothingHeard(rc=rc, epoch=epoch):

@@ -28,6 +28,13 @@ class UnknownDriver(Refusal):
     remedy = "Name a built-in driver, or a class as package.module:Class."
 
 
+class HardwareFault(Refusal):
+    """The hardware did not obey; the RC reports itself down."""
+
+    code = "rc.hardware"
+    remedy = "Check cable, power and driver of the resource."
+
+
 @dataclass(frozen=True)
 class DriverSite:
     """A driver's interface to its RC.

@@ -11,8 +11,8 @@ from backbone.component.asking import ask_until_answered
 from backbone.errors import LinkError
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from resource_pool.drivers.interface import DriverSite
-from resource_pool.messages import AskWorld, HardwareFault, RadioPacket, WorldModel
+from resource_pool.drivers.interface import DriverSite, HardwareFault
+from resource_pool.drivers.world_messages import AskWorld, RadioPacket, WorldModel
 from scout_model import radio_link
 from scout_model.errors import MalformedPacket
 from scout_model.scout import clip_wheel_speed

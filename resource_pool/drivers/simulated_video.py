@@ -27,7 +27,7 @@ from backbone.waiting import end_tasks
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import meet_world, world_of
-from resource_pool.messages import WorldModel, WorldState
+from resource_pool.drivers.world_messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, prepare, probe, probe_once
 
 CAMERAS_KEPT = 2  # chosen: one experiment, or two by turns; 20 MB each
@@ -100,8 +100,8 @@ class SimulatedFramegrabber:
             await asyncio.get_running_loop().run_in_executor(self._thread, self._studio.close)
         self._thread.shutdown()
 
-    def _world_moved(self, envelope: Envelope[Any]) -> None:
-        state: WorldState = envelope.body
+    def _world_moved(self, envelope: Envelope[WorldState]) -> None:
+        state = envelope.body
         if self._deliver is None or self._is_drawing or state.at_s < self._next_s - EARLY_S:
             return
         in_time = state.at_s < self._next_s + self._pause_s

@@ -18,7 +18,6 @@ import logging
 import math
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -27,13 +26,11 @@ from backbone.naming import Subsystem, address, component_of
 from backbone.rc_manager.messages import StaleEpoch
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import RadioDriver
+from resource_pool.drivers.interface import HardwareFault, RadioDriver
 from resource_pool.holds import Hold
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     DEFAULT_DRIVE_USAGE,
-    GivenBeforeStop,
-    HardwareFault,
     ImpossibleUse,
     LoadPacket,
     NoTurnSoon,
@@ -41,6 +38,7 @@ from resource_pool.messages import (
 )
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
 from resource_pool.resource_controller import RcParameters, ResourceController
+from resource_pool.stop_messages import GivenBeforeStop
 
 log = logging.getLogger(__name__)
 
@@ -114,9 +112,11 @@ class CommandRadio(ResourceController[RcParameters]):
                 await self._transmit(self._owed[0])
                 self._owed.popleft()
 
-    async def command(self, asked: Envelope[Any]) -> Message:
+    async def command(self, asked: Envelope[Message]) -> Message:
         """Load a packet, or send it once and soon."""
-        order: LoadPacket = asked.body
+        order = asked.body
+        if not isinstance(order, LoadPacket):
+            return await super().command(asked)
         self.admit(order.arc, order.epoch)
         now_s = self.clock.now_s()
         packet = Packet(
@@ -149,10 +149,14 @@ class CommandRadio(ResourceController[RcParameters]):
         if hold is not None:
             self._schedule.rank(arc, hold.rank)
 
-    def may_command(self, source: str, hold: Hold, order: LoadPacket) -> bool:
+    def may_command(self, source: str, hold: Hold, order: Message) -> bool:
         """Return whether the source is a robot that is connected to the same ARC as the radio."""
         robot = component_of(source)
-        return source == address(Subsystem.RESOURCE_POOL, robot) and hold.companions.get(robot) == order.robot_epoch
+        return (
+            isinstance(order, LoadPacket)
+            and source == address(Subsystem.RESOURCE_POOL, robot)
+            and hold.companions.get(robot) == order.robot_epoch
+        )
 
     def statistics(self) -> dict[str, float]:
         """Count packets and overruns, in all and of the ARCs now connected, and measure packet times."""

@@ -13,7 +13,7 @@ import logging
 import math
 from collections import Counter
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -82,9 +82,11 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         """Stop the delivery of pictures."""
         self._driver.stop()
 
-    async def command(self, asked: Envelope[Any]) -> Message:
+    async def command(self, asked: Envelope[Message]) -> Message:
         """Tune and begin to deliver."""
-        order: Tune = asked.body
+        order = asked.body
+        if not isinstance(order, Tune):
+            return await super().command(asked)
         hold = self.admit(order.arc, order.epoch)
         known = self.parameters.links.get("video_frequency", [])
         if order.frequency not in known:

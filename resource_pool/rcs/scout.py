@@ -29,23 +29,18 @@ from resource_pool.holds import Hold
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     Applied,
-    AskStop,
     CommandScout,
     Drive,
-    EmergencyQuestion,
-    EmergencyStop,
-    GivenBeforeStop,
     Halt,
     Jump,
-    LiftStop,
     LoadPacket,
     NotFromYou,
     PacketLoaded,
-    StopState,
     SwitchTransmitter,
 )
 from resource_pool.resource_controller import RcParameters, ResourceController
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import AskStop, EmergencyQuestion, EmergencyStop, GivenBeforeStop, LiftStop, StopState
 
 log = logging.getLogger(__name__)
 
@@ -115,7 +110,7 @@ class Scout(ResourceController[ScoutParameters]):
         """Send no further command; the radio sends the safe packet at its own disconnection."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer operators, too, who need no grant to stop the robot."""
         match asked.body:
             case AskStop():
@@ -134,9 +129,11 @@ class Scout(ResourceController[ScoutParameters]):
             case _:
                 return await super().answer(asked)
 
-    async def command(self, asked: Envelope[Any]) -> Message:
+    async def command(self, asked: Envelope[Message]) -> Message:
         """Drive, halt, jump, or switch the transmitter."""
-        order: CommandScout = asked.body
+        order = asked.body
+        if not isinstance(order, CommandScout):
+            return await super().command(asked)
         if isinstance(order.command, Drive) and not _is_finite(order.command):
             raise NotFinite(
                 f"{self.name}: wheel speeds {order.command.left_rad_s} and {order.command.right_rad_s} rad/s"

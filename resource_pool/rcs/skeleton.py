@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
@@ -53,9 +51,11 @@ class Lamp(ResourceController[RcParameters]):
         """Go dark."""
         await self._driver.set_brightness(0.0)
 
-    async def command(self, asked: Envelope[Any]) -> Message:
+    async def command(self, asked: Envelope[Message]) -> Message:
         """Shine."""
-        order: Shine = asked.body
+        order = asked.body
+        if not isinstance(order, Shine):
+            return await super().command(asked)
         self.admit(order.arc, order.epoch)
         await self._driver.set_brightness(share := min(1.0, max(0.0, order.brightness)))
         return Applied(self.name, order.epoch, self.clock.now_s(), "shine", {"brightness": share})

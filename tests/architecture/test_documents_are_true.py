@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 LINK = re.compile(r"\[(?P<text>[^\]]*)\]\((?P<target>[^)\s]+)\)")
 NAME = re.compile(r"`([A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)?)`")
 
@@ -22,6 +22,22 @@ def links(document: Path) -> list[tuple[str, Path]]:
         if target and "://" not in target and not target.startswith("mailto:"):
             found.append((match["text"], (document.parent / target).resolve()))
     return found
+
+
+def anchors(document: Path) -> list[tuple[Path, str]]:
+    """Return file and heading of every link to a heading of this project."""
+    found = []
+    for match in LINK.finditer(document.read_text()):
+        target, _, anchor = match["target"].partition("#")
+        if anchor and "://" not in target:
+            found.append(((document.parent / target).resolve() if target else document, anchor))
+    return found
+
+
+def slugs(document: Path) -> set[str]:
+    """Return the headings of a document as links spell them."""
+    titles = re.findall(r"^#+ (.+)$", document.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
 def names_of(module: Path) -> set[str]:
@@ -44,6 +60,33 @@ def names_of(module: Path) -> set[str]:
 def test_every_link_leads_to_a_file_of_the_project(document: Path) -> None:
     missing = [str(target) for _, target in links(document) if not target.exists()]
     assert not missing
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_link_to_a_heading_leads_to_one(document: Path) -> None:
+    assert [anchor for target, anchor in anchors(document) if anchor not in slugs(target)] == []
+
+
+def test_the_questions_people_ask_first_are_answered_two_clicks_from_the_readme() -> None:
+    assert (ROOT / "docs/README.md", "the-questions-people-ask-first") in anchors(ROOT / "README.md")
+    section = (ROOT / "docs/README.md").read_text().partition("## The questions people ask first")[2]
+    rows = [row for row in section.partition("\n## ")[0].splitlines() if "?" in row]
+    answers = {(row.split("|")[1].strip()): [target for _, target in LINK.findall(row)] for row in rows}
+    assert {question: [target.partition("#")[0] for target in targets] for question, targets in answers.items()} == {
+        "How do I write an RC and its ARC?": ["how-to/write-a-driver.md"] * 2,  # test_skeletons.py plays it
+        "Why does my request wait?": ["explanation/why-do-i-wait.md"],  # test_wait_examples.py plays it
+        "What does this word mean?": ["reference/glossary.md"],  # test_glossary.py compares it
+        "Where is the decision made?": ["tour.md"],  # the test of the tour below
+        "How do I run one test?": ["../CONTRIBUTING.md"],  # the test below
+    }
+
+
+def test_the_command_that_runs_one_test_runs_one() -> None:
+    section = (ROOT / "CONTRIBUTING.md").read_text().partition("## Run one test")[2]
+    command = re.search(r"`\.venv/bin/pytest (?P<file>\S+\.py) -k (?P<word>\w+)`", section)
+    assert command
+    tests = re.findall(r"^def (test_\w+)", (ROOT / command["file"]).read_text(), re.MULTILINE)
+    assert [name for name in tests if command["word"] in name]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))

@@ -23,9 +23,10 @@ PLANTED = [
     ("layers", "scout_model/planted.py", "import backbone.wire"),
     ("layers", "ui_console/planted.py", "import mission_control.behaviors"),
     ("one-door", "mission_control/behaviors/planted.py", "from resource_pool import messages"),
-    ("one-door", "mission_control/planted.py", "import resource_pool.rcs"),
+    ("one-door", "mission_control/vision/planted.py", "import resource_pool.rcs"),
     ("one-door", "ui_console/planted.py", "from resource_pool.messages import Frame"),
-    ("one-door", "mission_control/planted.py", "import scout_model.description"),
+    ("one-door", "mission_control/behaviors/planted.py", "import scout_model.description"),
+    ("laboratory", "mission_control/behaviors/planted.py", "import mission_control.laboratory.simulation.laws"),
     ("core-services", "backbone/placer/planted.py", "from backbone.nameserver import service"),
     ("core-services", "backbone/rc_manager/planted.py", "import backbone.creator"),
     ("scheduling", "backbone/scheduling/planted.py", "import backbone.rc_manager.service"),
@@ -68,8 +69,32 @@ def test_the_walls_stand(edges: set[walls.Import]) -> None:
     assert walls.broken(CONTRACTS, edges) == {}
 
 
+def folder_of(module: str) -> str:
+    return ".".join(MODULES[module].relative_to(TOP).parts[:-1])
+
+
+def test_no_folder_and_no_file_imports_what_imports_it(edges: set[walls.Import]) -> None:
+    own = {(importer, imported) for importer, imported in edges if imported in MODULES}
+    assert walls.circle(own, folder_of) == []
+    assert walls.circle(own, lambda module: module) == []
+
+
+def test_a_planted_circle_is_found(edges: set[walls.Import]) -> None:
+    back = ("backbone.errors", "backbone.launcher.endings")
+    own = {(importer, imported) for importer, imported in edges if imported in MODULES} | {back}
+    assert walls.circle(own, folder_of)
+    assert walls.circle(own, lambda module: module)
+
+
 def test_every_wall_has_a_planted_violation() -> None:
     assert {wall for wall, _file, _line in PLANTED} == {contract["id"] for contract in CONTRACTS}
+
+
+@pytest.mark.parametrize("wall", ["one-door", "laboratory"])
+def test_every_room_of_mission_control_but_the_laboratory_is_behind_the_wall(wall: str) -> None:
+    rooms = {".".join(name.split(".")[:2]) for name in MODULES if name.startswith("mission_control.")}
+    [contract] = (contract for contract in CONTRACTS if contract["id"] == wall)
+    assert set(contract["source_modules"]) - {"ui_console"} == rooms - {"mission_control.laboratory"}
 
 
 @pytest.mark.parametrize(("wall", "file", "line"), PLANTED)
@@ -84,9 +109,10 @@ def test_a_planted_violation_is_found(
 @pytest.mark.parametrize(
     ("file", "line"),
     [
-        ("mission_control/planted.py", "from resource_pool import arc_client"),
+        ("mission_control/behaviors/planted.py", "from resource_pool import arc_client"),
+        ("mission_control/laboratory/planted.py", "import resource_pool.rcs"),
         ("mission_control/vision/planted.py", "import cv2"),
-        ("backbone/placer/planted.py", "from backbone.nameserver.messages import Register"),
+        ("backbone/placer/planted.py", "from backbone.nameserver.messages import Resolve"),
         ("resource_pool/planted.py", "import scout_model.description, backbone.wire"),
         ("ui_console/planted.py", "import textual, typer, rich.table"),
     ],
@@ -140,6 +166,16 @@ def test_only_the_clock_sleeps() -> None:
                 ) if not (isinstance(argument, ast.Constant) and argument.value == 0):
                     sleepers.add(name)
     assert sleepers == {"backbone.bus.clock"}
+
+
+def test_any_is_rare() -> None:
+    """``Any`` turns the type checker off; it is for struct fields and libraries whose values really are of any kind."""
+    texts = [file.read_text() for file in MODULES.values()]
+    trees = [ast.parse(text) for text in texts if "import Any" in text or ", Any" in text]
+    names = [node.id for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Name)]
+    count = names.count("Any")
+    lines = sum(text.count("\n") for text in texts)
+    assert count <= 2 * lines / 1000, f"{count} in {lines} lines"
 
 
 def test_each_refusal_has_a_code_of_its_own() -> None:

@@ -105,6 +105,34 @@ def test_together(number):
 """
 
 
+IN_TURN = """
+from pathlib import Path
+import pytest
+
+def note(name):
+    with Path("log").open("a") as log:
+        log.write(f"{name} ")
+
+def test_without_processes():
+    note("without")
+
+@pytest.mark.processes
+def test_with_processes():
+    note("with")
+
+@pytest.mark.processes
+@pytest.mark.alone
+def test_alone():
+    note("alone")
+"""
+
+
+@pytest.mark.parametrize(("options", "order"), [(("-n", "1"), "alone with without"), ((), "without with alone")])
+def test_with_workers_tests_that_are_alone_come_first(tmp_path: Path, options: tuple[str, ...], order: str) -> None:
+    assert "3 passed" in run(tmp_path, *options, suite=IN_TURN)
+    assert (tmp_path / "log").read_text().strip() == order
+
+
 def test_no_test_with_processes_runs_beside_one_that_is_alone(tmp_path: Path) -> None:
     assert "14 passed" in run(tmp_path, "-n", "3", suite=TOGETHER)
     busy: list[str] = []

@@ -10,8 +10,8 @@ import pytest
 from typer.models import OptionInfo
 from typer.testing import CliRunner
 
-from backbone.cli import app as backbone_app
-from mission_control.experiments.cli import app as experiment_app
+from backbone.command_line.cli import app as backbone_app
+from mission_control.laboratory.experiments.cli import app as experiment_app
 from ui_console.cli import app as console_app
 
 MISSION_XML = str(Path(__file__).parents[2] / "mission.xml")

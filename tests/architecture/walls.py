@@ -7,9 +7,10 @@ the same contracts.
 from __future__ import annotations
 
 import ast
+import graphlib
 import re
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,24 @@ def broken(agreed: list[dict[str, Any]], edges: set[Import]) -> dict[str, list[I
     """Return for each broken contract, by id, the direct imports that break it."""
     wrong = {contract["id"]: sorted(_breaking(contract, edges)) for contract in agreed}
     return {name: found for name, found in wrong.items() if found}
+
+
+def circle(edges: set[Import], room_of: Callable[[str], str]) -> list[str]:
+    """Return one circle of rooms that import each other; none if there is none.
+
+    Args:
+        edges: Imports between modules.
+        room_of: Module → its room.
+    """
+    graph: dict[str, set[str]] = {}
+    for importer, imported in edges:
+        if room_of(importer) != room_of(imported):
+            graph.setdefault(room_of(importer), set()).add(room_of(imported))
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as found:
+        return list(found.args[1])
+    return []
 
 
 def _breaking(contract: dict[str, Any], edges: set[Import]) -> Iterator[Import]:

@@ -7,6 +7,7 @@ import socket
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 
 from backbone.authentication import (
     LONGEST_SOCKET_PATH,
@@ -39,13 +40,6 @@ def folder_of_length(base: Path, length: int) -> Path:
     folder.mkdir()
     assert len(os.fsencode(folder / SOCKET_NAME)) == length
     return folder
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def test_the_longest_socket_path_is_the_systems_and_one_byte_more_is_refused(short_path: Path) -> None:
@@ -90,7 +84,7 @@ def test_a_file_that_holds_no_secret_is_refused_by_its_name(tmp_path: Path, cont
 async def test_a_hub_admits_clients_with_its_secret_at_both_endpoints(
     short_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("backbone.bus.zenoh_bus.OPEN_TIMEOUT_MS", 300)
+    monkeypatch.setattr("backbone.bus.zenoh_settings.OPEN_TIMEOUT_MS", 300)
     secret = new_secret()
     file = keep_secret(short_path, secret)
     endpoints = [socket_endpoint(short_path), tcp_endpoint("127.0.0.1", free_port())]

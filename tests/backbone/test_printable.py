@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.component.messages import Absence, ComponentState, LifeState
-from backbone.printable import MOST_CHARACTERS, printable, printable_all, printable_lines
+from backbone.printable import printable_all
+from backbone.printable_text import MOST_CHARACTERS, printable, printable_lines
 
 HOSTILE = [
     "\x1b]0;owned\x07",

@@ -1,4 +1,4 @@
-"""Laws of the wire: what is written is read again; whatever else arrives is refused, by class."""
+"""Laws of the wire: a written message is read again; all other bytes are refused, by class."""
 
 from __future__ import annotations
 

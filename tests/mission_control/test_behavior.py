@@ -21,8 +21,8 @@ from mission_control.behavior import Behavior, NotAChild
 from mission_control.behavior_tree import Decision
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
 from resource_pool.arc_client import EmergencyStopped, Frame, Noted, NotMyArc, Resumed, StopState
-from resource_pool.messages import AskStop
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import AskStop
 
 ARC = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
 Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]

@@ -27,7 +27,8 @@ from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, Refused, write
-from resource_pool.messages import AskStop, CommandScout, Drive, LiftStop, StopState
+from resource_pool.messages import CommandScout, Drive
+from resource_pool.stop_messages import AskStop, LiftStop, StopState
 
 PLACER = "backbone/placer"
 GUESSES: list[dict[str, str]] = [
@@ -187,7 +188,7 @@ class Attacker:
 
 
 def main() -> None:
-    """Attack as told."""
+    """Carry out the ordered attacks."""
     given = json.load(sys.stdin)
     os.setgroups([])
     os.setresgid(given["uid"], given["uid"], given["uid"])

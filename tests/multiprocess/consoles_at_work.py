@@ -16,7 +16,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.naming import Subsystem
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted, said
 from ui_console.session.teleoperation import Teleoperation
 
@@ -66,7 +66,7 @@ class Console:
     def since(self, mark: int, kind: type[Any]) -> list[Any]:
         return [one for one in map(said, self.events[mark:]) if isinstance(one, kind)]
 
-    async def take_and_drive(self, drive: Drive) -> float:
+    async def take_and_drive(self, drive: DriveWish) -> float:
         """Return how long it took from the wish to the first command applied."""
         console = self.component
         assert console is not None

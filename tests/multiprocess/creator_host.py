@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import socket
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -15,7 +14,9 @@ from typing import Any
 import msgspec
 import psutil
 import uvloop
+from free_ports import free_endpoint
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
@@ -36,7 +37,6 @@ from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
-from backbone.placer.messages import ADDRESS as PLACER
 
 CREATOR = "backbone/creator-lab"
 KINDS = ("Quiet", "Parent", "Stubborn", "Late", "Broken", "Stumbling", "Leaver", "Missing")
@@ -100,13 +100,6 @@ def left_of(processes: list[psutil.Process], within_s: float) -> list[psutil.Pro
     return [each for each in psutil.wait_procs(processes, timeout=within_s)[1] if each.status() != "zombie"]
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
 @asynccontextmanager
 async def creator_host(directory: Path) -> AsyncIterator[CreatorHost]:
     """Give a host whose creator is ready; everything of it is ended afterwards."""
@@ -118,7 +111,7 @@ async def creator_host(directory: Path) -> AsyncIterator[CreatorHost]:
         "nameserver",
         "backbone.nameserver.service:Nameserver",
         "lab",
-        f"tcp/127.0.0.1:{free_port()}",
+        free_endpoint(),
         clock.origin_monotonic_s,
         1.0,
         run_directory=str(directory),

@@ -7,6 +7,7 @@ each host a folder of its own, and finds a host's processes by their namespace.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import shutil
 import signal
@@ -19,6 +20,7 @@ import psutil
 import pytest
 
 SUBNET = "10.99.7"
+_networks = itertools.count()
 IP = shutil.which("ip") or "/usr/sbin/ip"
 
 
@@ -98,17 +100,18 @@ def hosts_on_a_switch(folder: Path, *names: str) -> Iterator[dict[str, NetworkHo
         pytest.skip("only root makes network namespaces")
     if not Path(IP).exists():
         pytest.skip("no 'ip' on this machine: apt-get install iproute2")
-    switch = f"scout-{os.getpid()}-switch"
+    network = f"scout-{os.getpid()}-{next(_networks)}"  # a process may have several networks at a time
+    switch = f"{network}-switch"
     hosts = {}
     made = []
     try:
         for name in ("switch", *names):
-            _make_or_skip("netns", "add", f"scout-{os.getpid()}-{name}")
-            made.append(f"scout-{os.getpid()}-{name}")
+            _make_or_skip("netns", "add", f"{network}-{name}")
+            made.append(f"{network}-{name}")
         _make_or_skip("-n", switch, "link", "add", "bridge", "type", "bridge")
         _ip("-n", switch, "link", "set", "bridge", "up")
         for number, name in enumerate(names, start=1):
-            host = NetworkHost(name, f"scout-{os.getpid()}-{name}", f"{SUBNET}.{number}", folder / name, switch)
+            host = NetworkHost(name, f"{network}-{name}", f"{SUBNET}.{number}", folder / name, switch)
             host.folder.mkdir()
             _plug_in(host)
             hosts[name] = host

@@ -23,7 +23,7 @@ class Parent(Component[NoParameters]):
 
 
 class Stubborn(Component[NoParameters]):
-    """Hangs as soon as it is told to drain, and ignores SIGTERM."""
+    """Hangs as soon as it has to drain, and ignores SIGTERM."""
 
     async def drain(self) -> None:
         _hang()

@@ -7,6 +7,7 @@ import re
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from running_mission import BIN, RunningMission
 
@@ -31,17 +32,20 @@ class Served:
 @contextlib.contextmanager
 def serving(mission: RunningMission, port: int = 0) -> Iterator[Served]:
     """Serve the mission's console until the block ends."""
-    process = subprocess.Popen(
-        [str(BIN / "scout-console"), "serve", "--port", str(port), "--mission", mission.name],
-        env=mission.environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
+    said = Path(mission.environment["XDG_RUNTIME_DIR"]) / f"serve-{port}.log"
+    with said.open("w") as errors:
+        process = subprocess.Popen(
+            [str(BIN / "scout-console"), "serve", "--port", str(port), "--mission", mission.name],
+            env=mission.environment,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+        )
     try:
         assert process.stdout is not None
-        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#token=(\S+)\n", process.stdout.readline())
-        assert found is not None
+        line = process.stdout.readline()
+        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#token=(\S+)\n", line)
+        assert found is not None, f"{line!r}\n{said.read_text()}"
         yield Served(mission, int(found[1]), found[2], process)
     finally:
         if process.poll() is None:

@@ -19,7 +19,7 @@ from running_mission import MARK, RunningMission, mission_up
 from three_hosts import NAME, mission_on_three_hosts
 
 from backbone.bus.interface import Bus
-from resource_pool.messages import AskStop, EmergencyStop, StopState
+from resource_pool.stop_messages import AskStop, EmergencyStop, StopState
 
 pytestmark = [
     pytest.mark.processes,
@@ -125,8 +125,8 @@ async def test_the_missions_own_account_starts_no_class_and_opens_no_file_throug
         assert mission.launcher.wait(30) == 0, mission.story()
 
 
-def test_no_attack_without_the_secret_changes_a_mission_on_three_machines(victim: Path, tmp_path: Path) -> None:
-    with mission_on_three_hosts(tmp_path) as mission:
+def test_no_attack_without_the_secret_changes_a_mission_on_three_machines(victim: Path, short_path: Path) -> None:
+    with mission_on_three_hosts(short_path) as mission:
         base = mission.hosts["base"]
         assert base.listens_at() == [f"{base.address}:7447"]
         folder = base.runtime_folder / "scout-backbone" / NAME

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import socket
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -14,6 +13,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from free_ports import free_endpoint
 from plain_component import Stumble
 
 from backbone.bus.clock import MissionClock
@@ -31,10 +31,10 @@ DEADLINE_S = 20.0
 PLAIN = "resource_pool/plain"
 BECOME = """
 import sys, msgspec
-from backbone.bus import zenoh_bus
+from backbone.bus import zenoh_settings
 from backbone.component.launch import Launch
 from backbone.component.process import run_process
-zenoh_bus.OPEN_TIMEOUT_MS = 2000
+zenoh_settings.OPEN_TIMEOUT_MS = 2000
 sys.exit(run_process(msgspec.msgpack.decode(bytes.fromhex(sys.argv[1]), type=Launch)))
 """
 
@@ -67,9 +67,7 @@ async def within(work: Any, what: str) -> Any:
 
 @asynccontextmanager
 async def process_of(*, hub_is_up: bool = True, **changed: Any) -> AsyncIterator[Watched]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     clock = MissionClock.started_now()
     listening = endpoint if hub_is_up else "tcp/127.0.0.1:0"
     hub = ZenohBus.open("process", "backbone/hub", clock, hub_config([listening]))

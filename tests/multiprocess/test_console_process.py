@@ -7,7 +7,6 @@ import json
 import os
 import pty
 import signal
-import socket
 import sys
 import termios
 from collections.abc import AsyncIterator, Callable
@@ -17,6 +16,7 @@ from typing import Any
 
 import pytest
 from fake_resource_pool import FakeArc, FakePlacer
+from free_ports import free_endpoint
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
@@ -48,9 +48,7 @@ async def placer_behind_a_hub(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, beside: Callable[..., Any]
 ) -> AsyncIterator[FakePlacer]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    endpoint = free_endpoint()
     clock = MissionClock.started_now()
     launch = Launch(
         MISSION,

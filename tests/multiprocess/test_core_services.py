@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -15,25 +14,19 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from free_ports import free_endpoint
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import LifeState
+from backbone.component.messages import LifeState, NameTaken
 from backbone.component.process import EXIT_REFUSED
 from backbone.keys import Conversation
-from backbone.nameserver.messages import (
-    ADDRESS,
-    RECONNECT_S,
-    Appeared,
-    Components,
-    Disappeared,
-    ListComponents,
-    NameTaken,
-)
+from backbone.nameserver.messages import RECONNECT_S, Appeared, Components, Disappeared, ListComponents
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem
 
@@ -67,9 +60,7 @@ class Probe(Component[NoParameters]):
 
 @pytest.fixture
 def endpoint() -> str:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    return free_endpoint()
 
 
 def launch(endpoint: str, name: str, subsystem: Subsystem, class_path: str, run_directory: Path) -> Launch:
@@ -107,7 +98,7 @@ async def asker(endpoint: str) -> AsyncIterator[Bus]:
 
 async def listing(bus: Bus) -> Components:
     clock = MissionClock.started_now()
-    return await ask_until_answered(bus, clock, ADDRESS, ListComponents(), Components, each_s=2.0, within_s=WITHIN_S)
+    return await ask_until_answered(bus, clock, NAMESERVER, ListComponents(), Components, each_s=2.0, within_s=WITHIN_S)
 
 
 async def until(bus: Bus, holds: Callable[[Components], bool], what: str) -> Components:
@@ -174,7 +165,7 @@ async def test_a_killed_process_is_missed_within_a_moment_ready_or_not(endpoint:
     gone: list[str] = []
     async with asyncio.timeout(3 * WITHIN_S), live(Nameserver, hub), asker(endpoint) as bus:
         bus.subscribe(
-            ADDRESS,
+            NAMESERVER,
             Conversation.EVENTS,
             Appeared | Disappeared,
             lambda heard: gone.append(heard.body.address) if isinstance(heard.body, Disappeared) else None,

@@ -1,4 +1,4 @@
-"""``up --detach`` ends with the launcher's own verdict, whatever its process still does."""
+"""``up --detach`` ends with the launcher's own verdict, while its process goes on."""
 
 from __future__ import annotations
 

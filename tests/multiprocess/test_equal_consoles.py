@@ -10,10 +10,10 @@ from running_mission import RunningMission, mission_up
 
 from backbone.component.messages import AskStory, Story
 from backbone.keys import Conversation
-from backbone.operators import OperatorActed, OperatorAction
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from resource_pool.arc_client import Suspended
 from ui_console.model.consent import Sought
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 from ui_console.model.events import ConsentHeard, GivenBack, Granted, said
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
@@ -37,7 +37,7 @@ async def test_who_holds_a_robot_lets_an_equal_who_asks_have_it_before_the_slice
         async with consoles_at_work(mission, bus, "scout3", people, minimum_runtime_s=60.0) as (anna, ben):
             assert anna.component is not None
             assert ben.component is not None
-            await anna.take_and_drive(Drive(4.0, 4.0))
+            await anna.take_and_drive(DriveWish(4.0, 4.0))
             mark = len(ben.events)
             ben.component.take()
             ben.component.begin_ask_consent("mine is stuck")
@@ -57,7 +57,7 @@ async def test_who_holds_a_robot_lets_an_equal_who_asks_have_it_before_the_slice
             assert (await ben.hears(mark, ConsentHeard)).is_given
             assert (await anna.hears(anna_mark, GivenBack)).reason == "ben may have it"
             assert not anna.since(anna_mark, Suspended)
-            assert await ben.component.do(Drive(-4.0, -4.0))
+            assert await ben.component.do(DriveWish(-4.0, -4.0))
             print(f"granted {1e3 * (granted.at_s - decided_s):.0f} ms after the yes")
             assert granted.at_s - decided_s < SLICE_S, "long before the slice of 60 s is over"
             story = await bus.ask("ui_console/ben", AskStory("scout3"), Story, within_s=2)
@@ -76,7 +76,7 @@ async def test_equals_who_ask_for_nothing_but_the_robot_take_turns(mission: Runn
     async with mission.bus("ui_console/onlooker") as bus:
         people = [("cleo", 100), ("dan", 100)]
         async with consoles_at_work(mission, bus, "scout3", people, minimum_runtime_s=1.0) as (cleo, dan):
-            await cleo.take_and_drive(Drive(4.0, 4.0))
+            await cleo.take_and_drive(DriveWish(4.0, 4.0))
             assert dan.component is not None
             dan.component.take()
             mark = len(cleo.events)

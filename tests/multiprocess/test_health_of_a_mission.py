@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator
 import pytest
 from running_mission import RunningMission, mission_up
 
+from backbone.addresses import LAUNCHER
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.keys import Conversation
-from backbone.naming import LAUNCHER
 from backbone.picture.health import MissionHealth
 from resource_pool.arc_client import ask_stop, lift_stop, stop_robot
 

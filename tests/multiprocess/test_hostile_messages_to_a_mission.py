@@ -119,7 +119,7 @@ def publish_beyond_ranges(session: zenoh.Session, mission: RunningMission, addre
 
 
 def wait_for_grant(trace: Path, from_s: float, within_s: float) -> bool:
-    """Say whether an ARC was granted its RCs after this mission time, waiting for it for so many seconds."""
+    """Return whether an ARC was granted its RCs after this mission time, after a wait of so many seconds at most."""
     deadline = time.monotonic() + within_s
     while time.monotonic() < deadline:
         if any(line["ev"] == "grant" and line["t"] > from_s for line in lines_of(trace)):

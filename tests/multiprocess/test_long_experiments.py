@@ -26,6 +26,7 @@ from lxml import etree
 from running_mission import MISSION_XML, RunningMission, mission_up, runtime_directory
 
 from backbone import run_files
+from backbone.addresses import NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -34,20 +35,17 @@ from backbone.component.messages import AskStatistics, AskStory, Statistics, Sto
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.reader import read_mission
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
 from backbone.naming import Subsystem
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, Start, Started, StopComponent
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskRc, AskSchedule, AskWhy, RcState
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope
 from resource_pool.arc_client import Suspended
-from resource_pool.messages import RadioPacket
+from resource_pool.drivers.world_messages import RadioPacket
 from scout_model import radio_link
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, said
 from ui_console.session.teleoperation import Teleoperation
 
@@ -105,7 +103,7 @@ def contested(trace: Sequence[Line], arcs: set[str]) -> list[Slice]:
 
 
 def gaps(slices: Sequence[Slice]) -> list[float]:
-    """Return for each hand-over the time in which nobody held anything, settling included."""
+    """Return for each hand-over the time in which no ARC held anything, settling included."""
     return [later.granted_s - earlier.revoked_s for earlier, later in pairwise(slices) if earlier.arc != later.arc]
 
 
@@ -323,7 +321,7 @@ NETWORK_ID = 3
 
 
 class Observed:
-    """What the mission tells unasked while its RC manager falls again and again."""
+    """The mission's publications while its RC manager falls repeatedly."""
 
     def __init__(self, bus: Bus, clock: MissionClock) -> None:
         self._clock = clock
@@ -423,7 +421,7 @@ async def console(
 
 @dataclass
 class Driven:
-    """What the driving console was told was applied."""
+    """The commands that were reported as applied to the driving console."""
 
     over: asyncio.Event = field(default_factory=asyncio.Event)
     granted: asyncio.Event = field(default_factory=asyncio.Event)
@@ -437,7 +435,7 @@ class Driven:
             if self.over.is_set():
                 break
             speed_rad_s = 1.0 + (number % 4000) * 0.001
-            self.refused += not await teleoperation.do(Drive(speed_rad_s, -speed_rad_s))
+            self.refused += not await teleoperation.do(DriveWish(speed_rad_s, -speed_rad_s))
             await clock.sleep_s(COMMAND_EVERY_S)
         await teleoperation.give_back()
 
@@ -513,7 +511,7 @@ async def kill_once(bus: Bus, clock: MissionClock, seen: Observed, fallen: Falle
 
 
 def require_that_all_told_was_sent(events: Sequence[ConsoleEvent], seen: Observed) -> int:
-    """Every command of which the console was told that it was applied went over the radio; return how many."""
+    """Assert that every command reported to the console as applied went over the radio; return how many."""
     applied = [event for event in events if isinstance(event, CommandApplied)]
     for event in applied:
         payload = radio_link.encode_drive(event.values["left_rad_s"], event.values["right_rad_s"])

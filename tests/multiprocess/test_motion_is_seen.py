@@ -20,7 +20,8 @@ from backbone.keys import Conversation
 from backbone.mission.reader import read_mission
 from backbone.wire import Envelope
 from mission_control.messages import MotionSeen
-from resource_pool.messages import AskPose, Frame, Pose, WorldState
+from resource_pool.drivers.world_messages import AskPose, Pose, WorldState
+from resource_pool.messages import Frame
 from scout_model.description import ScoutPlace, Target, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, HORIZONTAL_VIEW_RAD, PIONEER_RADIUS_M
 from scout_model.targets import where
@@ -75,7 +76,7 @@ def the_world() -> WorldDescription:
 
 
 def is_in_view(scout: ScoutPlace, target: Target, world_s: float) -> bool:
-    """Say whether any of the target could be in the Scout's picture, furniture forgotten."""
+    """Return whether any part of the target could be in the Scout's picture, without regard to furniture."""
     at = where(target, world_s)
     distance_m = math.hypot(at.x_m - scout.x_m, at.y_m - scout.y_m)
     direction_rad = math.atan2(at.y_m - scout.y_m, at.x_m - scout.x_m)

@@ -1,4 +1,4 @@
-"""A zygote imports beforehand what it is told, and stays able to fork whatever those modules do."""
+"""A zygote imports the ordered modules beforehand, and can fork after any import."""
 
 from __future__ import annotations
 

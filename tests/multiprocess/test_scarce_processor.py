@@ -1,4 +1,4 @@
-"""A mission on one core, and beside busy neighbors: slow, and nobody is called dead who lives."""
+"""A mission on one core, and beside busy neighbors: slow, and no living process counts as dead."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HEALTHY_WITHIN_S = 30.0
 
 @contextlib.contextmanager
 def one_core() -> Iterator[None]:
-    """Have everything that is started meanwhile run on one core."""
+    """Run everything that is started meanwhile on one core."""
     allowed = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(allowed)})
     try:

@@ -22,7 +22,7 @@ LINES = [{"at_s": at_s, "left_rad_s": 3, "right_rad_s": 3} for at_s in range(600
 
 
 class Listener:
-    """Keeps what a script is told."""
+    """Keeps the events of a script."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self.heard: list[dict[str, Any]] = []
@@ -66,5 +66,5 @@ def test_a_script_that_was_paused_hears_once_that_its_robot_is_lost_and_moves_no
         words = Counter(one["event"] for one in listener.heard[paused_at:granted_at])
         assert words["no_answer"] <= 1, words
         [lost] = [one for one in listener.heard if one["event"] == "suspended"]
-        assert (lost["reason"], lost["why"]) == ("lost", "what held it for this console has ended")
+        assert (lost["reason"], lost["why"]) == ("lost", "the ARC that held it for this console has ended")
         assert "applied" not in [one["event"] for one in listener.heard[granted_at:]]

@@ -14,15 +14,15 @@ from running_mission import BIN, RunningMission, mission_up
 
 from backbone.bus.interface import Bus
 from resource_pool.arc_client import StopState, ask_stop, watch_stops
-from resource_pool.messages import AskPose, Pose
+from resource_pool.drivers.world_messages import AskPose, Pose
 from ui_console.model.consent import Sought
-from ui_console.model.driving import KEYS_LET_GO_S, Drive
+from ui_console.model.driving import KEYS_LET_GO_S, DriveWish
 from ui_console.model.events import Granted
 from ui_console.session.teleoperation import Teleoperation
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
-TURN = Drive(3.0, -3.0)  # on the spot, so that no wall is in the way
+TURN = DriveWish(3.0, -3.0)  # on the spot, so that no wall is in the way
 REPEAT_S = 0.05
 STANDS_WITHIN_S = 0.5  # the bound
 STILL_RAD = 0.02  # while it stands it may rock a little

@@ -7,19 +7,21 @@ import os
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from namespaces import hosts_on_a_switch
 from three_hosts import NAME, Copies, ThreeHosts, machines, mission_on_three_hosts
 
+from backbone.addresses import LAUNCHER
 from backbone.authentication import secret_of, socket_endpoint
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskState, ComponentState
 from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
-from backbone.naming import LAUNCHER
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 
@@ -28,23 +30,84 @@ SEEN_TWICE_S = 0.5  # the watch looks at one machine after the other: what moved
 GONE_WITHIN_S = 5.0
 
 
-def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_leaves_nothing(tmp_path: Path) -> None:
-    with mission_on_three_hosts(tmp_path) as mission:
-        there = mission.components()
-        assert (there["scout1"]["host"], there["scout2"]["host"]) == ("near", "far")
-        assert any("✓ host near" in line for line in mission.up.lines), mission.story()
-        for host in mission.hosts.values():
-            secret = (mission.hosts["near"].folder / "secret").read_text().partition(":")[2].strip()
-            for process in host.processes():
-                assert secret not in " ".join(process.cmdline())
-            for log in host.runtime_folder.glob("scout-backbone/*/log/*.log"):
-                assert secret not in log.read_text()
-        assert secret not in str(mission.components())
-        assert secret not in "\n".join(mission.up.lines)
+@pytest.fixture(scope="module")
+def mission() -> Iterator[ThreeHosts]:
+    """Give one mission for all tests after which it is whole; in the end it leaves nothing."""
+    with tempfile.TemporaryDirectory(prefix="s-") as folder, mission_on_three_hosts(Path(folder)) as whole:
+        yield whole
 
 
-def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwhile(tmp_path: Path) -> None:
-    with machines(tmp_path) as mission:
+@pytest.mark.alone
+def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_keeps_its_secret(mission: ThreeHosts) -> None:
+    there = mission.components()
+    assert (there["scout1"]["host"], there["scout2"]["host"]) == ("near", "far")
+    assert any("✓ host near" in line for line in mission.up.lines), mission.story()
+    for host in mission.hosts.values():
+        secret = (mission.hosts["near"].folder / "secret").read_text().partition(":")[2].strip()
+        for process in host.processes():
+            assert secret not in " ".join(process.cmdline())
+        for log in host.runtime_folder.glob("scout-backbone/*/log/*.log"):
+            assert secret not in log.read_text()
+    assert secret not in str(mission.components())
+    assert secret not in "\n".join(mission.up.lines)
+
+
+@pytest.mark.alone
+def test_a_hub_that_is_killed_is_back_before_anything_ends_on_the_other_hosts(mission: ThreeHosts) -> None:
+    before = {name: c["pid"] for name, c in mission.components().items() if c["host"] == "far"}
+    hub = mission.components()["nameserver"]["pid"]
+    os.kill(hub, signal.SIGKILL)
+    took_s = mission.wait("all is there again", mission.is_whole, 10.0)
+    print(f"hub killed: whole after {took_s:.1f} s")
+    there = mission.components()
+    assert there["nameserver"]["pid"] != hub
+    assert {name: there[name]["pid"] for name in before if name in there} == before, mission.story()
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize(
+    "cut_s",
+    [
+        0.5,
+        2.5,
+        4.0,
+        5.0,
+        pytest.param(30.0, marks=pytest.mark.slow),
+        pytest.param(60.0, marks=pytest.mark.slow),
+    ],
+)
+def test_a_link_cut_heals(mission: ThreeHosts, cut_s: float) -> None:
+    with Copies(mission.hosts) as copies:
+        far = mission.hosts["far"]
+        far.cut()
+        time.sleep(cut_s)
+        if cut_s > CUT_OFF_ENDS_WITHIN_S:
+            offer = mission.offers["far"].process.pid
+            assert {p.pid for p in far.processes()} == {offer}, "what ran on the machine that was cut off still runs"
+        far.heal()
+        took_s = mission.wait("the mission is whole again", mission.is_whole, 60.0)
+        print(f"cut of {cut_s} s: whole {took_s:.1f} s after healing, copies {dict(copies.longest_s)}")
+        assert took_s < HEALED_WITHIN_S, mission.story()
+        time.sleep(2.0)
+        assert all(longest_s < SEEN_TWICE_S for longest_s in copies.longest_s.values()), copies.longest_s
+        assert mission.is_whole(), mission.story()
+
+
+@pytest.mark.alone
+@pytest.mark.parametrize("away_s", [1.0, pytest.param(20.0, marks=pytest.mark.slow)])
+def test_a_host_that_dies_and_is_back_gets_its_components_again(mission: ThreeHosts, away_s: float) -> None:
+    with Copies(mission.hosts) as copies:
+        mission.hosts["far"].die()
+        time.sleep(away_s)
+        mission.type_what_up_prints("far")
+        took_s = mission.wait("the mission is whole again", mission.is_whole, 60.0)
+        print(f"dead for {away_s} s: whole {took_s:.1f} s after it is back, copies {dict(copies.longest_s)}")
+        assert took_s < HEALED_WITHIN_S, mission.story()
+        assert mission.components()["scout2"]["host"] == "far"
+
+
+def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwhile(short_path: Path) -> None:
+    with machines(short_path) as mission:
         mission.type_what_up_prints("near")
         mission.wait("near is there", lambda: any("✓ host near" in line for line in mission.up.lines), 30.0)
         state = asyncio.run(state_of_the_launcher(mission))
@@ -61,20 +124,8 @@ def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwh
         mission.wait("nothing is left", lambda: not mission.left(), GONE_WITHIN_S)
 
 
-def test_a_hub_that_is_killed_is_back_before_anything_ends_on_the_other_hosts(tmp_path: Path) -> None:
-    with mission_on_three_hosts(tmp_path) as mission:
-        before = {name: c["pid"] for name, c in mission.components().items() if c["host"] == "far"}
-        hub = mission.components()["nameserver"]["pid"]
-        os.kill(hub, signal.SIGKILL)
-        took_s = mission.wait("all is there again", mission.is_whole, 10.0)
-        print(f"hub killed: whole after {took_s:.1f} s")
-        there = mission.components()
-        assert there["nameserver"]["pid"] != hub
-        assert {name: there[name]["pid"] for name in before if name in there} == before, mission.story()
-
-
-def test_ctrl_c_ends_an_offer_at_any_time(tmp_path: Path) -> None:
-    with machines(tmp_path) as mission:
+def test_ctrl_c_ends_an_offer_at_any_time(short_path: Path) -> None:
+    with machines(short_path) as mission:
         mission.type_what_up_prints("near")
         base = mission.hosts["base"]
         mission.type_what_up_prints("far")
@@ -91,8 +142,8 @@ def test_ctrl_c_ends_an_offer_at_any_time(tmp_path: Path) -> None:
             mission.type_what_up_prints("far")
 
 
-def test_a_host_without_the_secret_stays_outside_and_says_so(tmp_path: Path) -> None:
-    with machines(tmp_path) as mission:
+def test_a_host_without_the_secret_stays_outside_and_says_so(short_path: Path) -> None:
+    with machines(short_path) as mission:
         mission.type_what_up_prints("near")
         (mission.hosts["far"].folder / "wrong").write_text("scout:c0ffee\n")
         for more in ([], ["--secret-file", "wrong"]):
@@ -105,8 +156,9 @@ def test_a_host_without_the_secret_stays_outside_and_says_so(tmp_path: Path) -> 
             assert offer.process.wait(8) == 0
 
 
-def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_by_its_secret(tmp_path: Path) -> None:
-    with mission_on_three_hosts(tmp_path) as mission:
+@pytest.mark.alone
+def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_by_its_secret(short_path: Path) -> None:
+    with mission_on_three_hosts(short_path) as mission:
         mission.hosts["base"].die()
         near, far = mission.hosts["near"], mission.hosts["far"]
         offers = {offer.process.pid for offer in mission.offers.values()}
@@ -123,10 +175,10 @@ def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_b
         mission.wait("all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), 60.0)
 
 
-def test_two_copies_on_two_machines_are_seen(tmp_path: Path) -> None:
+def test_two_copies_on_two_machines_are_seen(short_path: Path) -> None:
     """The watch over copies, which finds none elsewhere, finds those that are there."""
-    with hosts_on_a_switch(tmp_path, "near", "far") as hosts:
-        copy = tmp_path / "watcher"
+    with hosts_on_a_switch(short_path, "near", "far") as hosts:
+        copy = short_path / "watcher"
         shutil.copy(shutil.which("sleep") or "", copy)
         with Copies(hosts) as copies:
             sleeping = [host.start([str(copy), "1"], dict(os.environ)) for host in hosts.values()]
@@ -147,48 +199,8 @@ async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
         await bus.close()
 
 
-@pytest.mark.parametrize(
-    "cut_s",
-    [
-        0.5,
-        2.5,
-        4.0,
-        5.0,
-        pytest.param(30.0, marks=pytest.mark.slow),
-        pytest.param(60.0, marks=pytest.mark.slow),
-    ],
-)
-def test_a_link_cut_heals(tmp_path: Path, cut_s: float) -> None:
-    with mission_on_three_hosts(tmp_path) as mission, Copies(mission.hosts) as copies:
-        far = mission.hosts["far"]
-        far.cut()
-        time.sleep(cut_s)
-        if cut_s > CUT_OFF_ENDS_WITHIN_S:
-            offer = mission.offers["far"].process.pid
-            assert {p.pid for p in far.processes()} == {offer}, "what ran on the machine that was cut off still runs"
-        far.heal()
-        took_s = mission.wait("the mission is whole again", mission.is_whole, 60.0)
-        print(f"cut of {cut_s} s: whole {took_s:.1f} s after healing, copies {dict(copies.longest_s)}")
-        assert took_s < HEALED_WITHIN_S, mission.story()
-        time.sleep(2.0)
-        assert all(longest_s < SEEN_TWICE_S for longest_s in copies.longest_s.values()), copies.longest_s
-        assert mission.is_whole(), mission.story()
-
-
-@pytest.mark.parametrize("away_s", [1.0, pytest.param(20.0, marks=pytest.mark.slow)])
-def test_a_host_that_dies_and_is_back_gets_its_components_again(tmp_path: Path, away_s: float) -> None:
-    with mission_on_three_hosts(tmp_path) as mission, Copies(mission.hosts) as copies:
-        mission.hosts["far"].die()
-        time.sleep(away_s)
-        mission.type_what_up_prints("far")
-        took_s = mission.wait("the mission is whole again", mission.is_whole, 60.0)
-        print(f"dead for {away_s} s: whole {took_s:.1f} s after it is back, copies {dict(copies.longest_s)}")
-        assert took_s < HEALED_WITHIN_S, mission.story()
-        assert mission.components()["scout2"]["host"] == "far"
-
-
-def test_a_detached_up_waits_too_and_returns_when_all_is_ready(tmp_path: Path) -> None:
-    with machines(tmp_path, "--detach") as mission:
+def test_a_detached_up_waits_too_and_returns_when_all_is_ready(short_path: Path) -> None:
+    with machines(short_path, "--detach") as mission:
         for host in ("near", "far"):
             assert mission.up.process.poll() is None
             mission.type_what_up_prints(host)

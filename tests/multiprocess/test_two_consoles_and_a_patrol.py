@@ -21,7 +21,7 @@ from backbone.keys import Conversation
 from backbone.wire import Envelope
 from mission_control.messages import WaypointReached
 from resource_pool.arc_client import Suspended
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
@@ -139,7 +139,7 @@ async def at_random(mission: RunningMission, cycles: int, seed: int) -> Measured
         before = await counted(bus, PATROL)
         for cycle in range(cycles):
             first = dice.choice([low, high])
-            drive = Drive(dice.uniform(-6, 6), dice.uniform(-6, 6))
+            drive = DriveWish(dice.uniform(-6, 6), dice.uniform(-6, 6))
             asked_s = first.clock.now_s()
             took.driven.append(await first.take_and_drive(drive))
             _at_s, why = await watch.says("suspended", asked_s)
@@ -150,7 +150,7 @@ async def at_random(mission: RunningMission, cycles: int, seed: int) -> Measured
                 took.driven.append(await high.take_and_drive(drive))
                 assert (await low.hears(mark, Suspended)).by == "console-high-drive"
                 assert low.component is not None
-                assert not await low.component.do(Drive(6, 6)), "commands of who lost the robot are refused"
+                assert not await low.component.do(DriveWish(6, 6)), "commands of who lost the robot are refused"
                 await high.give_back(for_good=dice.random() < FOR_GOOD)
             began_s = await first.give_back(for_good=dice.random() < FOR_GOOD)
             again_s, _said = await watch.says("patrols", began_s)

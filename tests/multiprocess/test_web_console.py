@@ -8,7 +8,6 @@ import json
 import math
 import os
 import re
-import socket
 import stat
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -16,17 +15,18 @@ from typing import Any
 
 import pytest
 import web_browser
+from free_ports import free_port
 from running_mission import MISSION_XML, mission_up
 from served_page import Served, serving
 from web_browser import Cable, Finger, assert_no_sideways_scroll
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
-from resource_pool.messages import AskPose, Pose
+from resource_pool.drivers.world_messages import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
@@ -175,7 +175,7 @@ async def test_two_equal_operators_have_the_robot_in_turns(served: Served) -> No
 
 
 async def holds(bus: Bus, behavior: str) -> bool:
-    """Say whether this behavior has scout1."""
+    """Return whether this behavior has scout1."""
     schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=5.0)
     return any(holder.arc.startswith(behavior) for rc in schedule.rcs if rc.rc == "scout1" for holder in rc.holders)
 
@@ -374,9 +374,7 @@ async def test_a_stranger_is_asked_for_the_token_and_told_that_it_is_wrong(serve
 async def test_when_the_server_was_killed_and_is_started_again_open_pages_come_back_by_themselves(
     served: Served,
 ) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     async with contextlib.AsyncExitStack() as open_page:
         with serving(served.mission, port) as first:
             kept = served.mission.directory / f"web-{port}.json"

@@ -1,4 +1,4 @@
-"""Five tasks of an operator at a tablet, by the guide alone: what is touched is found by its words, and counted.
+"""Five tasks of an operator at a tablet, by the guide alone: each touch finds its target by its words, and is counted.
 
 The guide says how many touches each takes; a touch is a tap, a hold, or a drag of one finger. Choosing from a list
 takes two.
@@ -38,7 +38,7 @@ def touches_of(task: str) -> int:
 
 
 class Person:
-    """Somebody with fingers, who reads.
+    """A person who reads and touches.
 
     Attributes:
         touches: How often the screen was touched.
@@ -78,7 +78,7 @@ class Person:
 
 @asynccontextmanager
 async def person(served: Served, size: str = "tablet") -> AsyncIterator[Person]:
-    """Have somebody come whose name is that of the device."""
+    """Let a person come whose name is that of the device."""
     address = f"http://127.0.0.1:{served.port}/#token={served.token}"
     async with web_browser.page_at(size, address, shows=".robot[data-robot=scout1]") as page:
         yield Person(page)

@@ -1,4 +1,4 @@
-"""What operators do to a running mission is told to everybody, once, with the user's name."""
+"""Every action of an operator on a running mission is published once, with the user's name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from running_mission import RunningMission, mission_up
 
 from backbone.keys import Conversation
-from backbone.operators import OperatorActed, OperatorAction, login_name
+from backbone.mission_log.operators import OperatorActed, OperatorAction, login_name
 from backbone.wire import Envelope
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]

@@ -71,6 +71,7 @@ class ThreeHosts:
         file: The mission file.
         offers: The commands typed on near and far.
         names: What the mission consists of when it is whole.
+        missing: What was not there when that was last asked.
         talks: Every command that was typed and let run.
         up: The command typed on base.
     """
@@ -80,12 +81,13 @@ class ThreeHosts:
     file: Path
     offers: dict[str, Talk] = field(default_factory=dict)
     names: frozenset[str] = frozenset()
+    missing: list[str] = field(default_factory=list)
     talks: list[Talk] = field(default_factory=list)
     up: Talk = field(init=False)
 
     def story(self) -> str:
         """Return what all commands said, and the ends of all logs, for failure messages."""
-        parts = ["--- up", *self.up.lines[-40:]]
+        parts = [f"--- missing: {', '.join(self.missing)}", "--- up", *self.up.lines[-40:]]
         for name, offer in self.offers.items():
             parts += [f"--- offer {name}", *offer.lines[-20:]]
         for host in self.hosts.values():
@@ -98,7 +100,8 @@ class ThreeHosts:
         """Return after how many seconds it held."""
         began_s = time.monotonic()
         while not holds():
-            assert time.monotonic() < began_s + within_s, f"not within {within_s} s: {what}\n{self.story()}"
+            if time.monotonic() > began_s + within_s:
+                pytest.fail(f"not within {within_s} s: {what}; not ready: {self.lacks()}\n{self.story()}")
             time.sleep(SAMPLE_EACH_S)
         return time.monotonic() - began_s
 
@@ -115,10 +118,15 @@ class ThreeHosts:
         done = self.type_on_base("scout-backbone", "status", "--json", "--mission", NAME)
         return {c["name"]: c for c in json.loads(done.stdout)["components"]} if done.returncode == 0 else {}
 
+    def lacks(self) -> dict[str, str]:
+        """Return the components of the mission that are not ready, and the state of each."""
+        there = self.components()
+        states = {name: there[name]["state"] if name in there else "absent" for name in self.names}
+        return {name: state for name, state in states.items() if state != "ready"}
+
     def is_whole(self) -> bool:
         """Say whether every component of the mission is there and ready."""
-        there = self.components()
-        return all(name in there and there[name]["state"] == "ready" for name in self.names)
+        return not self.lacks()
 
     def go_on_with(self, host: str, command: list[str]) -> Talk:
         """Type a command on that machine and let it run."""

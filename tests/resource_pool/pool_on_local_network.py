@@ -10,6 +10,7 @@ from typing import Any, ClassVar, TypeVar
 
 import msgspec
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus
 from backbone.bus.local_bus import LocalNetwork
@@ -18,7 +19,6 @@ from backbone.component.launch import Launch
 from backbone.dependency_database.messages import Resource
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.service import RcManager
 from backbone.scheduling.requests import PathNode
 from backbone.wire import Envelope, Message
@@ -26,22 +26,16 @@ from resource_pool.aggregate_resource_controller import AggregateResourceControl
 from resource_pool.arc_client import ArcClient, claim_parameters
 from resource_pool.arcs.capture import CaptureArc
 from resource_pool.arcs.drive import DriveArc
+from resource_pool.arcs.skeleton import LitDriveArc
 from resource_pool.arcs.video_drive import VideoDriveArc
-from resource_pool.drivers.interface import DriverSite, Picture
+from resource_pool.drivers.interface import DriverSite, HardwareFault, Picture
 from resource_pool.drivers.simulated import SimulatedRadio
-from resource_pool.messages import (
-    ArcNotice,
-    AskBeat,
-    AskPose,
-    HardwareFault,
-    Pose,
-    Resumed,
-    Suspended,
-    Suspending,
-)
+from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.messages import ArcNotice, AskBeat, Resumed, Suspended, Suspending
 from resource_pool.rcs.command_radio import CommandRadio
 from resource_pool.rcs.framegrabber import Framegrabber
 from resource_pool.rcs.scout import Scout
+from resource_pool.rcs.skeleton import Lamp
 from resource_pool.rcs.video_frequency import VideoFrequency
 from resource_pool.simulated_world import SimulatedWorld
 from scout_model.description import ScoutPlace, WorldDescription
@@ -58,17 +52,20 @@ HARDWARE = [
     Resource("radio", "command_radio", sharable=True, driver=f"{HERE}:WiretappedRadio"),
     Resource("video", "video_frequency", connect_s=0.1),
     Resource("grabber", "framegrabber", driver=f"{HERE}:HandOperatedGrabber", links={"video_frequency": ["video"]}),
+    Resource("lamp1", "lamp", driver="resource_pool.rcs.skeleton:PaintedLamp", parameters={"color": "green"}),
 ]
 RC_CLASSES: dict[str, type[Component[Any]]] = {
     "scout": Scout,
     "command_radio": CommandRadio,
     "video_frequency": VideoFrequency,
     "framegrabber": Framegrabber,
+    "lamp": Lamp,
 }
 ARC_CLASSES: dict[str, type[AggregateResourceController]] = {
     "drive": DriveArc,
     "video_drive": VideoDriveArc,
     "capture": CaptureArc,
+    "lit_drive": LitDriveArc,
 }
 
 
@@ -148,7 +145,7 @@ class HandOperatedGrabber:
 
 
 class Owner(Component[Any]):
-    """A decision process that keeps what it was told."""
+    """A decision process that keeps its notices."""
 
     accepts = ArcNotice
 
@@ -246,7 +243,7 @@ class Pool:
         return await self.start(Owner, name, None, Subsystem.MISSION_CONTROL)
 
     async def arc(self, owner: Owner, kind: str, scout: str, **more: Any) -> ArcClient:
-        """Have an ARC for this robot started and return the owner's hold on it."""
+        """Start an ARC for this robot and return the owner's hold on it."""
         name = f"{owner.name}-{kind}"
         client = owner.know(name)
         given = {"minimum_runtime_s": 5.0, "path": [PathNode("local", 10), PathNode(owner.name, 1)]} | more

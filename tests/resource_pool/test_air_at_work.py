@@ -20,7 +20,8 @@ from backbone.scheduling.requests import RcUse
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import SimulatedRadio
 from resource_pool.drivers.simulated_video import SimulatedFramegrabber
-from resource_pool.messages import Applied, Tune, WorldState
+from resource_pool.drivers.world_messages import WorldState
+from resource_pool.messages import Applied, Tune
 from resource_pool.simulated_world import SimulatedWorld
 from scout_model import radio_link
 from scout_model.description import CLEAN_AIR, AirDescription, ScoutPlace, WorldDescription

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from pool_on_local_network import Owner, Pool, a_pool
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.errors import Refusal
 from backbone.keys import Conversation
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskRequest, CurrentRequest, GateOpens, Leases, OpenGate
 from backbone.scheduling.requests import LEASE_S, Lease, MissingRuntime
 from resource_pool.arc_client import ArcClient

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
-from backbone.nameserver.messages import NameTaken
-from backbone.placer.messages import ADDRESS as PLACER
+from backbone.component.messages import NameTaken
 from backbone.placer.messages import Ended, Start, Started, StopComponent
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import ArcClient, Resumed, Suspended, Suspending

@@ -35,18 +35,16 @@ from resource_pool.messages import (
     Applied,
     CommandScout,
     Drive,
-    GivenBeforeStop,
     Jump,
     LoadPacket,
     NotFromYou,
     NoTurnSoon,
-    OtherStop,
     PacketLoaded,
-    Stopper,
 )
 from resource_pool.rcs.scout import Scout
 from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import GivenBeforeStop, OtherStop, Stopper
 from scout_model.radio_link import encode_drive, encode_halt, encode_jump, encode_transmitter_on
 
 RCS = ["scout1", "scout2", "radio"]
@@ -94,7 +92,7 @@ def test_all_who_stop_a_robot_are_named_once_until_it_may_move_again() -> None:
 
 
 def test_a_lift_of_what_was_seen_before_somebody_else_stopped_too_lifts_nothing() -> None:
-    """Who presses stop sees it done, also if it was done already: nobody frees the robot without having seen that."""
+    """A press of stop is always confirmed, also for a stopped robot: only an operator who saw that can free it."""
     latch = StopLatch("scout1")
     latch.stop("anna", "", 1.0)
     seen = latch.state.number
@@ -398,7 +396,7 @@ def test_a_commander_that_was_refused_for_a_stop_it_did_not_know_of_knows_of_it_
 
 
 def speed_for(known: int) -> float:
-    """A wheel speed that tells on the air which stop its command was given after."""
+    """A wheel speed whose packet names the stop after which its command was given."""
     return 1.0 + known / 200
 
 

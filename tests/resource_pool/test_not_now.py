@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from pool_on_local_network import Owner, Pool, a_pool
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import Done, SetPriority, TraceLine
 from backbone.wire import Envelope
 from resource_pool.arc_client import ArcClient, SliceEnds

@@ -23,7 +23,7 @@ def packet(arc: str, network_id: int = 1, payload: bytes = b"P", epoch: int = 1)
 
 
 def serve(schedule: PacketSchedule, from_s: float, until_s: float) -> list[tuple[float, Sending]]:
-    """Send like a radio that is always on time: what is due, one after the other, without a pause between."""
+    """Send like a radio that is always on time: due packets one after the other, without a pause between."""
     sent, now_s = [], from_s
     while now_s < until_s:
         sending = schedule.take(now_s)
@@ -72,7 +72,7 @@ def demands(draw: st.DrawFn) -> dict[str, Asked]:
 
 
 def play(schedule: PacketSchedule, asked: dict[str, Asked]) -> list[tuple[float, Sending]]:
-    """Return what is sent in the first half second."""
+    """Return the packets of the first half second."""
     events: list[tuple[int, str, str, bool]] = []
     for arc, wish in asked.items():
         schedule.connect(arc, [usage for usage, _ in wish.streams], wish.rank)

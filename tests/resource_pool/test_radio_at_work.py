@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from pool_on_local_network import Pool, a_pool
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.keys import Conversation
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, Leases, StaleEpoch
 from backbone.scheduling.requests import Lease, RcUse, Usage
 from resource_pool.messages import LoadPacket, NoTurnSoon, PacketLoaded

@@ -31,6 +31,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.scheduling.requests import RcUse, Usage
 from backbone.wire import Envelope
+from resource_pool.drivers.interface import HardwareFault
 from resource_pool.messages import (
     Accepted,
     Applied,
@@ -38,7 +39,6 @@ from resource_pool.messages import (
     Drive,
     Frame,
     Halt,
-    HardwareFault,
     Jump,
     LoadPacket,
     NotYours,

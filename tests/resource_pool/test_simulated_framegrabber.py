@@ -1,4 +1,4 @@
-"""The simulated receiver and camera: what is heard is drawn, a failed drawing is not silent, an end is prompt."""
+"""The simulated receiver and camera: a received signal is drawn, a failed drawing is reported, an end is prompt."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from backbone.keys import Conversation
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated_video import GrabberOptions, SimulatedFramegrabber
-from resource_pool.messages import AskWorld, WorldModel, WorldState
+from resource_pool.drivers.world_messages import AskWorld, WorldModel, WorldState
 from scout_model.description import ScoutPlace, WorldDescription
 from scout_model.world import World
 

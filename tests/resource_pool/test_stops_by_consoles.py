@@ -17,20 +17,20 @@ import pytest
 from cut_network import CutNetwork
 from pool_on_local_network import ARC_CLASSES, Pool, a_pool
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import run_virtual
 from backbone.component.launch import Launch
 from backbone.creator.messages import EndedBy
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem, address
-from backbone.operators import OperatorActed, OperatorAction
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, Started, StopComponent
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, watch_stops
 from scout_model.radio_link import encode_drive
 from ui_console.model.consent import CONSENT_WITHIN_S
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import STICK_LASTS_S, Drive
+from ui_console.model.driving import STICK_LASTS_S, DriveWish
 from ui_console.session.teleoperation import Teleoperation
 
 PEOPLE = ("anna", "ben", "cleo")
@@ -75,7 +75,7 @@ class PoolPlacer:
 
 
 class Person:
-    """Somebody at a console: hands, and what the screens show."""
+    """A person at a console: held controls, and the content of the screens."""
 
     def __init__(self, name: str, stage: Stage, *, uses_stick: bool) -> None:
         self.name, self.stage, self.uses_stick = name, stage, uses_stick
@@ -86,10 +86,10 @@ class Person:
         self.console = Teleoperation(
             launch, bus, stage.pool.clock, show=self.model.apply, takes=False, keeps_arc=True, user=name
         )
-        self.drive: Drive | None = None
+        self.drive: DriveWish | None = None
 
     async def hands(self) -> None:
-        """Say again what is held, for ever."""
+        """Repeat the held controls, for ever."""
         while True:
             if self.drive is not None:
                 self.console.hold(self.drive, STICK_LASTS_S if self.uses_stick else None)
@@ -119,10 +119,10 @@ class Stage:
         watch_stops(ear, lambda state: self.stops.append((pool.clock.now_s(), state)))
         ear.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
 
-    def new_press(self) -> Drive:
+    def new_press(self) -> DriveWish:
         """Return wheel speeds that no other press has."""
         number = len(self.presses)
-        drive = Drive(1.0 + number % 100 / 20, 1.0 + number // 100 / 20)
+        drive = DriveWish(1.0 + number % 100 / 20, 1.0 + number // 100 / 20)
         self.presses[encode_drive(drive.left_rad_s, drive.right_rad_s)] = self.pool.clock.now_s()
         return drive
 
@@ -172,7 +172,7 @@ class Stage:
         self.network.heal(source)
 
     async def play(self) -> None:
-        """One random sequence; afterwards everybody has let go and nobody is cut off."""
+        """One random sequence; afterwards all controls are let go and no console is cut off."""
         for _step in range(STEPS):
             await self.do(self.rng.choice(self.people), self.rng.choice(DOES))
             for who in self.people:

@@ -1,4 +1,4 @@
-"""RCs and ARCs take from each component only what is that component's to give."""
+"""RCs and ARCs accept from each component only the messages of its role."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A robot of another kind, as somebody else would add it: a box on two wheels that hears the Scouts' packets."""
+"""A robot of another kind, as a user would add it: a box on two wheels that receives the Scouts' packets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a Textual screen shows, as lines of text; and a comparison with what it showed when somebody looked last."""
+"""Content of a Textual screen as lines of text, and a comparison with the recorded content."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def odd(value: Any, kind: inspect.Type, where: str = "view") -> list[str]:
 
 
 def fits_plain(value: Any, kind: inspect.Type) -> bool:
-    """Say whether a value that is made of nothing else is of this type."""
+    """Return whether a plain value is of this type."""
     match kind:
         case inspect.StrType():
             return isinstance(value, str)

@@ -7,12 +7,12 @@ from typing import Any
 from backbone.component.component import Component
 from backbone.keys import Conversation
 from backbone.wire import Envelope, Message
-from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 
 
 class StoppableRobot(Component[Any]):
-    """Keeps who stopped it, and tells everybody."""
+    """Keeps the authors of its stop, and publishes it."""
 
     accepts = AskStop | EmergencyStop | LiftStop
 

@@ -69,7 +69,7 @@ def test_every_profile_and_every_size_of_the_page_is_a_console_of_the_table(plac
 
 
 class Controls(HTMLParser):
-    """Finds what can have the focus; a control without an id is called after what is around it."""
+    """Finds the controls that can have the focus; a control without an id has the name of its parent."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from textual.pilot import Pilot
 
 from backbone.errors import Refusal
-from backbone.log_question import LogQuestion
-from backbone.mission_log import AskLog, Log
+from backbone.mission_log.log import AskLog, Log
+from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 from ui_console.model.events import ConsoleEvent
 from ui_console.terminal.verbs import Session
 
@@ -39,7 +39,7 @@ class WrittenSession(Session):
     def now_s(self) -> float:
         return 12.0
 
-    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
+    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
         self.wanted.append(drive if lasts_s is None else (drive, lasts_s))
 
     def stop(self) -> None:

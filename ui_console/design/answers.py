@@ -1,4 +1,4 @@
-"""What the designer's server answers one page; the page knows an answer by its fields."""
+"""Answers of the designer's server to one page; the page knows an answer by its fields."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ class AskAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RefusalAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The server refuses what the page said.
+    """The server refuses a message of the page.
 
     Attributes:
-        refused: Why.
-        remedy: What to do about it; may be empty.
-        is_change: Whether the page meant to change, save or read the draft.
+        refused: The reason.
+        remedy: An action against it; may be empty.
+        is_change: True: the page meant to change, save or read the draft.
     """
 
     refused: str
@@ -30,11 +30,11 @@ class RefusalAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class FileChangedAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The file holds what another program wrote; the draft is not saved.
+    """Another program changed the file; the draft is not saved.
 
     Attributes:
-        file_changed: What happened.
-        name: Another file of the same folder that the draft was to be saved as; empty: its own.
+        file_changed: The event, for people.
+        name: Another file of the same folder for the draft; empty: its own.
     """
 
     file_changed: str
@@ -42,7 +42,7 @@ class FileChangedAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 
 
 class NoticeAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A designer has to know this, whatever the page said last."""
+    """A notice to a designer, not an answer to the page's last message."""
 
     notice: str
     remedy: str

@@ -1,7 +1,7 @@
-"""What a mission can be made of: component types, what they are for, their parameters.
+"""Catalogue of component types, with their roles and parameters.
 
-Types come from the project's own list and from the designed file. What their classes say of themselves, their
-documentation and parameters, is asked of another process (``look_up``), for to import a behavior imports OpenCV.
+Types come from the project's own list and from the designed file. Another process reads the documentation and
+parameters of their classes (``look_up``), because the import of a behavior imports OpenCV.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from backbone.naming import Subsystem
 
 
 class Role(StrEnum):
-    """What a type is for."""
+    """Role of a type."""
 
     BEHAVIOR = "behavior"
     ARC = "ARC"
@@ -36,11 +36,11 @@ class TypeEntry:
     Attributes:
         name: Its name in mission files.
         class_path: The class that runs it.
-        role: What it is for.
+        role: Its role.
         needs: Types of resource an ARC needs.
         uses: Types of resource a resource must be tied to.
-        is_stock: Whether the project brings it along.
-        is_declared: Whether the designed file has it.
+        is_stock: True: the project ships it.
+        is_declared: True: the designed file declares it.
     """
 
     name: str
@@ -53,12 +53,12 @@ class TypeEntry:
 
 
 def stock() -> Node:
-    """Return the project's own types, as a mission that has nothing else."""
+    """Return the project's own types, as a mission without anything else."""
     return outline(shipped_text())
 
 
 def new_text() -> bytes:
-    """Return the text a new mission begins with: one host."""
+    """Return the text of a new mission: one host."""
     return resources.files("ui_console.design").joinpath("new.xml").read_bytes()
 
 
@@ -73,7 +73,7 @@ def stock_resource(kind: str) -> Node | None:
 
 
 def entries(mission: Node) -> list[TypeEntry]:
-    """Return every type that is at hand: the file's own in its order, then those of the project.
+    """Return every type: the file's own in its order, then the project's.
 
     Args:
         mission: The designed file.
@@ -92,11 +92,11 @@ def entries(mission: Node) -> list[TypeEntry]:
 
 
 def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
-    """Return all that is known of a type, as lines to read.
+    """Return the description of a type, as lines to read.
 
     Args:
         entry: The type.
-        facts: Class path → what the class says.
+        facts: Class path → facts of the class.
     """
     lines = [f"{entry.name}: {entry.role}, {entry.class_path}"]
     if entry.needs:

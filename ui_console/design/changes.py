@@ -1,6 +1,6 @@
-"""What a page's change does to a draft, and what all pages are then told.
+"""Effect of a page's change on a draft, and the sections of the view for all pages.
 
-Pure: a draft and what was asked in, another draft or typed refusal out; a draft in, sections as JSON out.
+Pure: a draft and a change in, another draft or typed refusal out; a draft in, sections as JSON out.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*\.xml")
 
 
 class ChangedMeanwhile(DesignRefused):
-    """The draft is not the one a change was meant for."""
+    """The draft is not the revision that the change names."""
 
     code = "design.changed_meanwhile"
-    remedy = "Look at it as it is now, and do it again if it is still meant."
+    remedy = "Look at the mission as it is now, and repeat the change if you still want it."
 
 
 class MustAsk(DesignRefused):
-    """Something has to be answered before it can be added.
+    """The addition needs answers first.
 
     Attributes:
-        offer: What.
+        offer: The offer with its questions.
     """
 
     code = "design.must_ask"
@@ -51,8 +51,8 @@ def changed(draft: Draft, change: Change) -> Draft:
     """Return the draft after a change; itself if that changes nothing.
 
     Raises:
-        MustAsk: It is to be added with answers.
-        Refusal: It cannot be done; see ``Draft.do``.
+        MustAsk: The addition needs answers first.
+        Refusal: The change is not possible; see ``Draft.do``.
     """
     match change:
         case TakeOffer(path=path, label=label, answers=answers):
@@ -75,7 +75,7 @@ def changed(draft: Draft, change: Change) -> Draft:
 
 
 def touched_by(change: Change, before: Draft, after: Draft) -> Path:
-    """Return the element that a change was about, as it stands afterwards; of a parameter the one that has it."""
+    """Return the changed element, by its path afterwards; for a parameter the element that has it."""
     if isinstance(change, Undo):
         path = follower(before, after)(before.mission.nearest(before.step.touched))
     else:
@@ -84,10 +84,10 @@ def touched_by(change: Change, before: Draft, after: Draft) -> Path:
 
 
 def sibling_file(source: str, name: str) -> FilePath:
-    """Return a mission file in the folder of another; an empty name is that one.
+    """Return a mission file in the folder of another one; an empty name means that one.
 
     Raises:
-        DesignRefused: It would be no mission file there.
+        DesignRefused: The name is no name of a mission file.
     """
     if not name:
         return FilePath(source)
@@ -99,11 +99,11 @@ def sibling_file(source: str, name: str) -> FilePath:
 
 
 def sections(draft: Draft, facts: Mapping[str, ClassFacts]) -> dict[str, bytes]:
-    """Return what all pages are told of a draft, as JSON by name.
+    """Return the sections of a draft's view for all pages, as JSON by name.
 
     Args:
         draft: The draft.
-        facts: Class path → what the class says of itself.
+        facts: Class path → facts of the class.
     """
     told = {
         "tree": tree_view(draft),
@@ -115,7 +115,7 @@ def sections(draft: Draft, facts: Mapping[str, ClassFacts]) -> dict[str, bytes]:
 
 
 def _property(draft: Draft, change: SetProperty) -> Property:
-    """Return the property to set; what the class is not known to have may be set as a parameter all the same."""
+    """Return the property to set; a name unknown to the class may still be set as a parameter."""
     node = draft.mission.at(change.path)
     for one in properties(draft.mission, node, {}):
         if (one.name, one.is_parameter) == (change.name, change.is_parameter):
@@ -124,7 +124,7 @@ def _property(draft: Draft, change: SetProperty) -> Property:
 
 
 def _place(draft: Draft, path: Path, parent: Path, before: int | None) -> int:
-    """Return the number that an element gets, which is counted without the element itself."""
+    """Return the new number of an element, counted without the element itself."""
     count = len(draft.mission.at(parent).children)
     number = count if before is None else before
     is_later_sibling = bool(path) and parent == path[:-1] and number > path[-1]

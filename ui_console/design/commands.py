@@ -1,6 +1,6 @@
-"""What can be done to a mission while it is designed, and how it is refused.
+"""Commands that change a mission while it is designed, and their refusals.
 
-Pure: values. What they do is in ``effects``.
+Pure: values. ``effects`` carries them out.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from backbone.mission.edit import NewElement, Path
 
 
 class DesignRefused(Refusal):
-    """A command that cannot be done as it was meant; the draft is as it was."""
+    """A command is not possible; the draft is as it was."""
 
     code = "design.refused"
     remedy = "Choose something else."
 
 
-class NameTaken(DesignRefused):
-    """Two of a kind would have one name, and what refers to it would mean both."""
+class ElementNameTaken(DesignRefused):
+    """Two elements of a kind would have one name, so a reference to it would mean both."""
 
     code = "design.name_taken"
-    remedy = "Give it a name that nobody has."
+    remedy = "Give it a name that no other element has."
 
 
 class NothingToUndo(DesignRefused):
@@ -34,7 +34,7 @@ class NothingToUndo(DesignRefused):
 
 @dataclass(frozen=True, slots=True)
 class Add:
-    """Add an element as it is given."""
+    """Add a given element."""
 
     parent: Path
     element: NewElement
@@ -43,7 +43,7 @@ class Add:
 
 @dataclass(frozen=True, slots=True)
 class AddType:
-    """Declare a type that the project brings along, with the types it needs; those that are declared stay."""
+    """Declare a type that the project ships, with the types it needs; declared types stay."""
 
     name: str
 
@@ -66,8 +66,8 @@ class AddBehavior:
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
-    """Have a behavior claim an ARC, in place of the one it claims; the kind is declared if need be."""
+class ClaimArc:
+    """Set the ARC that a behavior claims, in place of its present one; the kind is declared if need be."""
 
     behavior: Path
     kind: str
@@ -76,7 +76,7 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class AddResource:
-    """Add a piece of hardware in its first shape, tied to what there is, and its body if there is a world."""
+    """Add a piece of hardware in its first shape, tied to existing hardware, and its body if there is a world."""
 
     type: str
     name: str
@@ -99,7 +99,7 @@ class Remove:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """Put an element elsewhere; ``at`` is its number among its siblings afterwards."""
+    """Move an element; ``at`` is its number among its siblings afterwards."""
 
     path: Path
     parent: Path
@@ -116,7 +116,7 @@ class SetValue:
 
 
 @dataclass(frozen=True, slots=True)
-class SetParameter:
+class WriteParameter:
     """Set a parameter of a behavior, a resource or a service; None leaves it out."""
 
     path: Path
@@ -126,12 +126,12 @@ class SetParameter:
 
 @dataclass(frozen=True, slots=True)
 class Rename:
-    """Rename an element, and with it whatever refers to it."""
+    """Rename an element, and all references to it."""
 
     path: Path
     name: str
 
 
 Command = (
-    Add | AddType | AddBehavior | Claim | AddResource | AddWorld | Remove | Move | SetValue | SetParameter | Rename
+    Add | AddType | AddBehavior | ClaimArc | AddResource | AddWorld | Remove | Move | SetValue | WriteParameter | Rename
 )

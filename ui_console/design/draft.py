@@ -1,7 +1,7 @@
-"""A mission while it is designed: a text, what is wrong with it, what it would do, and the way back.
+"""A mission while it is designed: a text, its problems, its rehearsal, and the steps to undo.
 
 Pure: a draft and a command in, another draft out. The text is the only truth: the tree, the problems and the dry run
-are read from it, so what is shown is what ``check`` and ``up`` will read. To undo restores the bytes.
+are read from it, so the page shows the mission that ``check`` and ``up`` will read. To undo restores the bytes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path as FilePath
 
 from backbone.atomic_file import remove_leftover
-from backbone.dry_run import DryRun, dry_run
+from backbone.dry_run.run import DryRun, dry_run
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.document import read_bytes
 from backbone.mission.edit import Node, Path, outline, set_attribute
@@ -24,7 +24,7 @@ from backbone.mission.report import Report
 from backbone.naming import is_legal
 from ui_console.design.catalogue import new_text
 from ui_console.design.commands import Command, NothingToUndo
-from ui_console.design.effects import Step, carry_out
+from ui_console.design.effects import TextState, carry_out
 
 UNDO_MOST = 1000  # chosen: more than a sitting; a mission file is small
 
@@ -38,32 +38,32 @@ class Draft:
         step: The text as it is now.
         past: Earlier texts, the last one last.
         future: Texts that were undone, the next one last.
-        saved: What the file holds, as far as is known; None: nothing.
-        classes: What is known of the classes of its own types, whose parameters are judged by that.
+        saved: Content of the file, as far as is known; None: there is no file.
+        classes: Facts of the classes of its own types, by which their parameters are checked.
     """
 
     source: str
-    step: Step
-    past: tuple[Step, ...] = ()
-    future: tuple[Step, ...] = ()
+    step: TextState
+    past: tuple[TextState, ...] = ()
+    future: tuple[TextState, ...] = ()
     saved: bytes | None = None
     classes: Mapping[str, ClassFacts] = field(default_factory=dict)
 
     @classmethod
     def new(cls, source: str) -> Draft:
-        """Return a mission that has a host and the core services, and nothing to do; named as its file if it can be."""
+        """Return a mission with a host and the core services, and no behaviors; named as its file if that is legal."""
         name = FilePath(source).stem.lower()
         text = set_attribute(new_text(), (), "name", name) if is_legal(name) else new_text()
-        return cls(source, Step(text))
+        return cls(source, TextState(text))
 
     @classmethod
     def opened(cls, source: str) -> Draft:
-        """Return what the file holds, with all that is wrong with it; what a killed save left beside it is gone.
+        """Return the draft of a file's content with its problems; remove the remains of a killed save.
 
         Raises:
-            MissionInvalid: It cannot be read, or not even as XML.
+            MissionInvalid: The file cannot be read, or is no XML.
         """
-        with contextlib.suppress(OSError):  # it can be opened all the same
+        with contextlib.suppress(OSError):  # the file can be opened all the same
             remove_leftover(FilePath(source).resolve())
         report = Report(source)
         text = read_bytes(FilePath(source), report)
@@ -75,7 +75,7 @@ class Draft:
             raise MissionInvalid(
                 Fault(source, fault.line, fault.column, fault.message, fault.remedy) for fault in invalid.faults
             ) from None
-        return cls(source, Step(text), saved=text)
+        return cls(source, TextState(text), saved=text)
 
     @property
     def text(self) -> bytes:
@@ -84,7 +84,7 @@ class Draft:
 
     @property
     def is_changed(self) -> bool:
-        """Whether it is anything but what the file holds."""
+        """Whether it differs from the file."""
         return self.text != self.saved
 
     @cached_property
@@ -101,12 +101,12 @@ class Draft:
 
     @property
     def problems(self) -> tuple[Fault, ...]:
-        """What ``scout-backbone check`` would say, but for classes that nobody has looked up; none: all is fine."""
+        """The faults ``scout-backbone check`` would report, but for classes not looked up; none: all is fine."""
         return self._read if isinstance(self._read, tuple) else ()
 
     @property
     def description(self) -> MissionDescription | None:
-        """What the text means; None while it has problems."""
+        """The mission of the text; None while it has problems."""
         return None if isinstance(self._read, tuple) else self._read
 
     @cached_property
@@ -119,20 +119,20 @@ class Draft:
         """Return the draft after a command; itself if that changes nothing.
 
         Raises:
-            Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: it cannot be done.
+            Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: the command is not possible.
         """
         return self._after(carry_out(self.step, command))
 
     def taken_from(self, text: bytes) -> Draft:
-        """Return the draft that has what the file holds now; what it had before can be had again by undo.
+        """Return the draft with the file's present content; undo restores the text before.
 
         Raises:
-            MissionInvalid: It is no XML.
+            MissionInvalid: The text is no XML.
         """
         outline(text)
-        return replace(self._after(Step(text)), saved=text)
+        return replace(self._after(TextState(text)), saved=text)
 
-    def _after(self, step: Step) -> Draft:
+    def _after(self, step: TextState) -> Draft:
         if step.text == self.text:
             return self
         return replace(self, step=step, past=(*self.past, self.step)[-UNDO_MOST:], future=())
@@ -158,7 +158,7 @@ class Draft:
         return replace(self, step=self.future[-1], past=(*self.past, self.step), future=self.future[:-1])
 
     def knowing(self, classes: Mapping[str, ClassFacts]) -> Draft:
-        """Return the same draft, with parameters judged by what these classes say of themselves."""
+        """Return the same draft, with parameters checked by the facts of these classes."""
         return replace(self, classes=classes)
 
     def kept(self, source: str) -> Draft:
@@ -166,7 +166,7 @@ class Draft:
         return replace(self, source=source, saved=self.text)
 
     def element_of(self, fault: Fault) -> Path:
-        """Return the element a problem is about: the last one that begins before its place."""
+        """Return the element of a problem: the last one that begins before its place."""
         positions, paths = self._beginnings
         return paths[max(0, bisect.bisect_right(positions, (fault.line, fault.column)) - 1)]
 

@@ -1,12 +1,12 @@
-"""What commands do: a text and a command in, another text and what was touched out.
+"""Effects of commands: a text and a command in, another text and the touched element out.
 
-Pure. The text is the only truth: what stands where is read from it anew for each change.
+Pure. The text is the only truth: each change reads the elements' places from it anew.
 
 Rules of this file:
 
-* A command is done whole or refused whole. A refusal is typed and says what to do.
-* Refused is what cannot be written or would lose what was meant: a place, a name that is another's. What is
-  only wrong yet, an empty section, a wish for nobody, is a problem, told as ``scout-backbone check`` tells it.
+* A command is carried out whole or refused whole. A refusal is typed and has a remedy.
+* A command is refused if the text cannot express it or would become ambiguous: a wrong place, a name that is taken. An
+  incomplete text, with an empty section or a wish without a resource, is a problem as of ``scout-backbone check``.
 """
 
 from __future__ import annotations
@@ -25,41 +25,41 @@ from ui_console.design.commands import (
     AddResource,
     AddType,
     AddWorld,
-    Claim,
+    ClaimArc,
     Command,
     DesignRefused,
+    ElementNameTaken,
     Move,
-    NameTaken,
     Remove,
     Rename,
-    SetParameter,
     SetValue,
+    WriteParameter,
 )
 
 LAST_NETWORK_ID = 254  # as the reader has it
-BODY_STEP_M = 1.0  # chosen: so far apart the first places of robots are, half of it from the wall; none touch
+BODY_STEP_M = 1.0  # chosen: distance of the robots' first places, half of it from the wall; none touch
 WORLD_NAMED_BY = (WORLD, "localizer")  # parameters whose value is the world's name
 RADIO_RATE = {"period-s": "0.1", "packet-time-s": "0.002"}  # chosen: as mission.xml, a fiftieth of a radio
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class TextState:
     """One state of the text.
 
     Attributes:
         text: The bytes of the file.
-        touched: What was added or changed last; the cursor belongs there.
+        touched: The element added or changed last; the cursor goes there.
     """
 
     text: bytes
     touched: Path = ()
 
 
-def carry_out(step: Step, command: Command) -> Step:
-    """Return the text after a command, and what it touched.
+def carry_out(step: TextState, command: Command) -> TextState:
+    """Return the text after a command, and the element it touched.
 
     Raises:
-        Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: it cannot be done.
+        Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: the command is not possible.
     """
     match command:
         case Add(parent, element, at):
@@ -68,7 +68,7 @@ def carry_out(step: Step, command: Command) -> Step:
             return _add_type(step.text, name)
         case AddBehavior():
             return _add_behavior(step.text, command)
-        case Claim():
+        case ClaimArc():
             return _claim(step.text, command)
         case AddResource(kind, name):
             return _add_resource(step.text, kind, name)
@@ -79,21 +79,21 @@ def carry_out(step: Step, command: Command) -> Step:
         case Move(path, parent, at):
             return _move(step.text, path, parent, at)
         case SetValue(path, attribute, value):
-            return Step(set_attribute(step.text, path, attribute, value), path)
-        case SetParameter():
+            return TextState(set_attribute(step.text, path, attribute, value), path)
+        case WriteParameter():
             return _set_parameter(step.text, command)
         case Rename(path, name):
             return _rename(step.text, path, name)
 
 
-def _add(text: bytes, parent: Path, element: NewElement, at: int | None = None) -> Step:
+def _add(text: bytes, parent: Path, element: NewElement, at: int | None = None) -> TextState:
     node = outline(text).at(parent)
     after = add(text, parent, element, at)
-    return Step(after, (*parent, place_for(node, element.tag, at)))
+    return TextState(after, (*parent, place_for(node, element.tag, at)))
 
 
 def _section(text: bytes, tag: str) -> tuple[bytes, Path]:
-    """Return a text that has this section of the mission, and where it stands."""
+    """Return a text with this section of the mission, and the section's path."""
     root = outline(text)
     found = root.first(tag)
     if found is None:
@@ -104,12 +104,12 @@ def _section(text: bytes, tag: str) -> tuple[bytes, Path]:
     return text, found.path
 
 
-def _add_type(text: bytes, name: str) -> Step:
-    """Write a shipped type into the file, which may then change it."""
+def _add_type(text: bytes, name: str) -> TextState:
+    """Write a shipped type into the file, where it may be changed."""
     text, section = _section(text, "types")
     for declared in outline(text).at(section).all("type"):
         if declared.text("name") == name:
-            return Step(text, declared.path)
+            return TextState(text, declared.path)
     known = stock_type(name)
     if known is None:
         raise _no_type(name)
@@ -124,7 +124,7 @@ def _must_have_type(text: bytes, name: str) -> None:
 
 def _no_type(name: str) -> DesignRefused:
     return DesignRefused(
-        f"no type {quoted(name)} is declared, and the project brings none along",
+        f"no type {quoted(name)} is declared, and the project ships none",
         remedy="Add a <type> with its class first.",
     )
 
@@ -133,7 +133,7 @@ def _copy(node: Node) -> NewElement:
     return NewElement(node.tag, dict(node.attributes), [_copy(child) for child in node.children])
 
 
-def _add_behavior(text: bytes, command: AddBehavior) -> Step:
+def _add_behavior(text: bytes, command: AddBehavior) -> TextState:
     _free(outline(text), "behavior", command.name)
     parent = command.parent
     if outline(text).at(parent).tag == "mission":
@@ -156,7 +156,7 @@ class _Marked:
         return (*outline(text).all(self._tag)[self._before].path, *self._below) if self._tag else ()
 
 
-def _claim(text: bytes, command: Claim) -> Step:
+def _claim(text: bytes, command: ClaimArc) -> TextState:
     node = outline(text).at(command.behavior)
     if node.tag != "behavior":
         raise DesignRefused(f"a <{node.tag}> claims no ARC", remedy="Pick a behavior.")
@@ -165,12 +165,12 @@ def _claim(text: bytes, command: Claim) -> Step:
     arc = outline(text).at(path).first("arc")
     if arc is not None:
         text = set_attribute(text, arc.path, "kind", command.kind)
-        return Step(set_attribute(text, arc.path, "minimum-runtime-s", command.minimum_runtime_s), arc.path)
+        return TextState(set_attribute(text, arc.path, "minimum-runtime-s", command.minimum_runtime_s), arc.path)
     values = {"kind": command.kind, "minimum-runtime-s": command.minimum_runtime_s, **RADIO_RATE}
     return _add(text, path, NewElement("arc", values))
 
 
-def _add_resource(text: bytes, kind: str, name: str) -> Step:
+def _add_resource(text: bytes, kind: str, name: str) -> TextState:
     _free(outline(text), "resource", name)
     _must_have_type(text, kind)
     text, section = _section(text, "resources")
@@ -192,13 +192,13 @@ def _add_resource(text: bytes, kind: str, name: str) -> Step:
             children.append(_copy(part))
     values = {**shape.attributes, "name": name}
     step = _add(text, section, NewElement("resource", values, children))
-    return Step(_with_bodies(step.text, name), step.touched)
+    return TextState(_with_bodies(step.text, name), step.touched)
 
 
-def _add_world(text: bytes, command: AddWorld) -> Step:
+def _add_world(text: bytes, command: AddWorld) -> TextState:
     room = NewElement("room", {"width-m": command.width_m, "depth-m": command.depth_m})
     step = _add(text, (), NewElement("world", {"name": "world", "type": "simulated_world"}, [room]))
-    return Step(_with_bodies(step.text), step.touched)
+    return TextState(_with_bodies(step.text), step.touched)
 
 
 def _with_bodies(text: bytes, only: str = "") -> bytes:
@@ -206,7 +206,7 @@ def _with_bodies(text: bytes, only: str = "") -> bytes:
 
     Args:
         text: The text.
-        only: The one robot that shall get a body; empty: all that have none.
+        only: The one robot to get a body; empty: all robots without one.
     """
     world = outline(text).first("world")
     section = outline(text).first("resources")
@@ -248,7 +248,7 @@ def _free_network_id(root: Node) -> int:
     return free
 
 
-def _remove(text: bytes, path: Path) -> Step:
+def _remove(text: bytes, path: Path) -> TextState:
     node = outline(text).at(path)
     text = remove(text, path)
     if node.tag == "resource":
@@ -263,10 +263,10 @@ def _remove(text: bytes, path: Path) -> Step:
     else:
         parent = path[:-1]
     siblings = outline(text).at(parent).children
-    return Step(text, (*parent, min(path[-1], len(siblings) - 1)) if siblings else parent)
+    return TextState(text, (*parent, min(path[-1], len(siblings) - 1)) if siblings else parent)
 
 
-def _move(text: bytes, path: Path, parent: Path, at: int) -> Step:
+def _move(text: bytes, path: Path, parent: Path, at: int) -> TextState:
     root = outline(text)
     node = root.at(path)
     after = move(text, path, parent, at)
@@ -277,20 +277,20 @@ def _move(text: bytes, path: Path, parent: Path, at: int) -> Step:
     number = min(max(at, 0), len(target.children) - 1)
     if target.children[number].tag != node.tag:
         raise AssertionError(f"<{node.tag}> was moved and is not where it should be")
-    return Step(after, (*parent, number))
+    return TextState(after, (*parent, number))
 
 
-def _set_parameter(text: bytes, command: SetParameter) -> Step:
+def _set_parameter(text: bytes, command: WriteParameter) -> TextState:
     node = outline(text).at(command.path)
     found = next((one for one in node.all("parameter") if one.text("name") == command.name), None)
     if found is None:
         if command.value is None:
-            return Step(text, command.path)
+            return TextState(text, command.path)
         new = NewElement("parameter", {"name": command.name, "value": command.value})
-        return Step(add(text, command.path, new), command.path)
+        return TextState(add(text, command.path, new), command.path)
     if command.value is None:
-        return Step(remove(text, found.path), command.path)
-    return Step(set_attribute(text, found.path, "value", command.value), command.path)
+        return TextState(remove(text, found.path), command.path)
+    return TextState(set_attribute(text, found.path, "value", command.value), command.path)
 
 
 # ---------------------------------------------------------------------- names
@@ -299,31 +299,31 @@ def _free(root: Node, tag: str, name: str) -> None:
 
     Raises:
         IllegalName: It does not follow the rule for names.
-        NameTaken: Another has it.
+        ElementNameTaken: Another element has it.
     """
     legal(name)
     kinds = _ONE_SPACE if tag in _ONE_SPACE else (tag,)
     for node in root:
         if node.tag in kinds and node.text("name") == name and _is_named(root, node):
-            raise NameTaken(f"a {node.tag} has the name {quoted(name)} already")
+            raise ElementNameTaken(f"a {node.tag} has the name {quoted(name)} already")
 
 
-_ONE_SPACE = ("resource", "behavior", "world")  # components of the mission, which all have different names
+_ONE_SPACE = ("resource", "behavior", "world")  # components of the mission; all their names differ
 
 
 def _is_named(root: Node, node: Node) -> bool:
-    """Say whether the element has a name of its own, so is no mention of another's."""
+    """Return whether the element has a name of its own, so is no reference to another one."""
     return node.tag not in ("wish", "uses", "parameter") and node is not root
 
 
-def _rename(text: bytes, path: Path, name: str) -> Step:
+def _rename(text: bytes, path: Path, name: str) -> TextState:
     root = outline(text)
     node = root.at(path)
     old = node.text("name")
     if name == old:
-        return Step(text, path)
+        return TextState(text, path)
     if node.tag in ("wish", "uses", "parameter"):
-        return Step(set_attribute(text, path, "name", name), path)
+        return TextState(set_attribute(text, path, "name", name), path)
     if node.tag == "scout" and old:
         owner = next((one for one in root if one.tag == "resource" and one.text("name") == old), None)
         node = owner or node
@@ -331,11 +331,11 @@ def _rename(text: bytes, path: Path, name: str) -> Step:
     text = set_attribute(text, node.path, "name", name)
     for other, attribute, value in _mentions(root, node, old, name):
         text = set_attribute(text, other.path, attribute, value)
-    return Step(text, path)
+    return TextState(text, path)
 
 
 def _mentions(root: Node, node: Node, old: str, new: str) -> Iterator[tuple[Node, str, str]]:
-    """Yield each element that refers to another by its name, the attribute, and what that shall be."""
+    """Yield each element that refers to another by its name, the attribute, and the attribute's new value."""
     find = _MENTIONS.get(node.tag)
     for other in root:
         for attribute in [] if find is None else find(node, other):

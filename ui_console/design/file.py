@@ -1,4 +1,4 @@
-"""Saving a draft: whole or not at all, and never over somebody else's work unasked."""
+"""Saving a draft: whole or not at all, and over another program's change only on request."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ui_console.design.draft import Draft
 
 
 class FileChanged(DesignRefused):
-    """The file is no longer what was opened or saved last."""
+    """The file has changed since the designer opened or saved it."""
 
     code = "design.file_changed"
     remedy = "Save it under another name, or save again to overwrite."
 
 
 class NotSaved(Refusal):
-    """The system did not let the file be written; what it held before it holds now."""
+    """The system refused to write the file; its content is as before."""
 
     code = "design.not_saved"
     remedy = "Free the disk, or save it elsewhere."
@@ -27,15 +27,16 @@ class NotSaved(Refusal):
 def save(draft: Draft, path: Path, *, overwrite: bool = False) -> Draft:
     """Write the draft's bytes and return it as saved there.
 
-    The file is replaced in one step: whoever reads it meanwhile sees the old one or the new one. Its permissions stay.
+    The file is replaced in one step: a program that reads it meanwhile gets the old or the new one. Its permissions
+    stay.
 
     Args:
-        draft: What is saved.
-        path: Where; a symbolic link is followed.
-        overwrite: Whether to replace what somebody else wrote there.
+        draft: The draft.
+        path: The file; a symbolic link is followed.
+        overwrite: True: replace the changes of other programs.
 
     Raises:
-        FileChanged: The file holds something else than was opened or saved last.
+        FileChanged: The file has changed since the designer opened or saved it.
         NotSaved: The system refused.
     """
     try:

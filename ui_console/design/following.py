@@ -1,6 +1,6 @@
-"""Where an element stands after somebody else changed the text, so that a cursor stays on what its owner chose.
+"""The new path of an element after another designer changed the text, so that each cursor stays on its element.
 
-Pure: two drafts in, a way from the one's places to the other's out.
+Pure: two drafts in, a function from the paths of the one to the paths of the other out.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from ui_console.design.draft import Draft
 
 
 def follower(before: Draft, after: Draft) -> Callable[[Path], Path]:
-    """Return what leads from an element of one draft to the same one in another.
+    """Return the function from an element's path in one draft to its path in another one.
 
-    What stands before or behind all that was changed is found by its place in the text, else what is written like
-    nothing else by its tag, else by its number in the element that it stood in; what is gone leads to what held it.
+    An element before or behind all changes is found by its place in the text; else, if its text is unique, by that;
+    else by its number in its parent. A removed element leads to its parent.
 
     Args:
-        before: The draft in which elements were chosen.
-        after: The draft in which they are looked for.
+        before: The draft of the given paths.
+        after: The draft of the returned paths.
     """
     old, new = before.text, after.text
     prefix = _alike(old, new)
@@ -55,7 +55,7 @@ def follower(before: Draft, after: Draft) -> Callable[[Path], Path]:
 
 
 def _alike(one: bytes, other: bytes) -> int:
-    """Return how many bytes are the same from the beginning on."""
+    """Return the number of equal bytes from the beginning on."""
     low, high = 0, min(len(one), len(other))
     while low < high:
         middle = (low + high + 1) // 2

@@ -1,7 +1,7 @@
-"""The draft file: what is not saved yet, beside the mission file, so that no reload, restart or power cut loses it.
+"""The draft file: unsaved changes, beside the mission file, so that no reload, restart or power cut loses them.
 
-It is there only while there is something to lose. It holds the text and what the mission file held when it was
-opened or saved last, so that somebody else's change is seen also after a restart; the steps to undo are not kept.
+It exists only while there are unsaved changes. It holds the text and the mission file's content when it was opened or
+saved last, so that another program's change is noticed after a restart too; the steps to undo are not kept.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from backbone.mission.document import MAX_BYTES
 from backbone.mission.edit import outline
 from backbone.mission.report import MissionInvalid
 from ui_console.design.draft import Draft
-from ui_console.design.effects import Step
+from ui_console.design.effects import TextState
 
 FORMAT = 1
-MOST_BYTES = 4 * MAX_BYTES  # two texts in Base64 and what is around them
+MOST_BYTES = 4 * MAX_BYTES  # two texts in Base64 and their envelope
 
 
 class DraftUnreadable(Refusal):
@@ -37,14 +37,14 @@ class DraftNotKept(Refusal):
     remedy = "Save the mission, or free the disk."
 
 
-class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _DraftRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     format: int
     text: bytes
     saved: bytes | None
 
 
 class DraftFile:
-    """What is kept of one draft; only whoever keeps it writes there.
+    """The file that keeps one draft; only the designer that keeps it writes there.
 
     Args:
         source: The mission file.
@@ -68,7 +68,7 @@ class DraftFile:
                 return None
             with self.path.open("rb") as file:
                 data = file.read(MOST_BYTES + 1)
-            kept = msgspec.json.decode(data, type=_Kept)
+            kept = msgspec.json.decode(data, type=_DraftRecord)
             outline(kept.text)
         except OSError as error:
             raise DraftUnreadable(f"{self.path}: {error.strerror or error}") from error
@@ -77,10 +77,10 @@ class DraftFile:
         if kept.format != FORMAT or len(data) > MOST_BYTES:
             raise DraftUnreadable(f"{self.path} is no draft that this program wrote")
         self._wrote = data
-        return Draft(self._source, Step(kept.text), saved=kept.saved)
+        return Draft(self._source, TextState(kept.text), saved=kept.saved)
 
     def keep(self, draft: Draft) -> None:
-        """Have the draft file hold this draft, or be away if there is nothing to lose.
+        """Write this draft to the draft file, or remove the file if there are no unsaved changes.
 
         Raises:
             DraftNotKept: The system refused, or another designer keeps its draft there.
@@ -92,7 +92,7 @@ class DraftFile:
                     f"{self.path} is another designer's", remedy="End the other one, then save or change something."
                 )
             if draft.is_changed:
-                data = msgspec.json.encode(_Kept(FORMAT, draft.text, draft.saved))
+                data = msgspec.json.encode(_DraftRecord(FORMAT, draft.text, draft.saved))
                 if data != there:
                     replace_file(self.path, data)
                 self._wrote = data

@@ -10,7 +10,7 @@ from backbone.mission.class_facts import ClassFacts
 
 
 async def look_up(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
-    """Return the facts of each class, asked in another process; ``failure`` says why a class has none.
+    """Return the facts of each class, read in another process; ``failure`` has the reason why a class has none.
 
     Args:
         class_paths: ``package.module:Class`` each. Their modules are run.

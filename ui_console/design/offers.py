@@ -1,4 +1,4 @@
-"""What may be added where, what has to be asked for it, and which command that becomes.
+"""Offers of additions: their places, their questions, and the commands they become.
 
 Pure: a tree and an element in, offers out.
 """
@@ -21,10 +21,10 @@ from ui_console.design.commands import (
     AddResource,
     AddType,
     AddWorld,
-    Claim,
+    ClaimArc,
     Command,
     DesignRefused,
-    SetParameter,
+    WriteParameter,
 )
 from ui_console.design.properties import choices
 
@@ -32,15 +32,15 @@ MINIMUM_RUNTIME_S = "5"  # RAM 2002, "Experiments": slices of five seconds
 _POINT = re.compile(r"([^\s,]+),([^\s,]+)")
 
 
-class Asked(msgspec.Struct, frozen=True):
-    """Something to be asked.
+class Prompt(msgspec.Struct, frozen=True):
+    """A question of an offer.
 
     Attributes:
-        name: What.
-        doc: What it means.
-        proposed: What is proposed.
-        choices: What makes sense, if it can be listed.
-        is_required: False: no answer is an answer.
+        name: Name of the answer.
+        doc: Its meaning.
+        proposed: The proposed answer.
+        choices: Sensible answers, if they can be listed.
+        is_required: False: the answer may be empty.
     """
 
     name: str
@@ -52,30 +52,30 @@ class Asked(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """Something that may be added.
+    """A possible addition.
 
     Attributes:
         label: Its name in a list.
-        doc: What it is.
-        asks: What has to be asked for it.
-        build: From the answers, in this order, to the command; may refuse with ``DesignRefused``.
+        doc: Its meaning.
+        asks: Its questions.
+        build: Returns the command for the answers in this order; may refuse with ``DesignRefused``.
     """
 
     label: str
     doc: str
-    asks: tuple[Asked, ...]
+    asks: tuple[Prompt, ...]
     build: Callable[[Sequence[str]], Command]
 
     @property
     def must_ask(self) -> bool:
-        """Something is asked that has no proposal, or several answers that make sense."""
+        """True if a question has no proposal, or several sensible answers."""
         return any(not asked.proposed or len(asked.choices) > 1 for asked in self.asks)
 
     def command(self, answers: Sequence[str]) -> Command:
-        """Return the command these answers make; none at all: what is proposed.
+        """Return the command for these answers; without answers, for the proposed ones.
 
         Raises:
-            DesignRefused: There is not one for each question, or they make no sense.
+            DesignRefused: The number of answers is wrong, or an answer is not valid.
         """
         if not answers:
             answers = [asked.proposed for asked in self.asks]
@@ -85,7 +85,7 @@ class Offer:
 
 
 def offers(mission: Node, path: Path) -> list[Offer]:
-    """Return what may be added: in an element first, then in those above it, each kind at the nearest that can hold it.
+    """Return the possible additions: to an element first, then to its ancestors, each kind at the nearest place.
 
     Args:
         mission: The whole file.
@@ -99,10 +99,10 @@ def offers(mission: Node, path: Path) -> list[Offer]:
 
 
 def offer_at(mission: Node, path: Path, label: str) -> Offer:
-    """Return the offer of this label at an element; for what belongs in an ARC a behavior stands for its ARC.
+    """Return the offer of this label at an element; for an addition to an ARC, a behavior stands for its ARC.
 
     Raises:
-        DesignRefused: It cannot be added there.
+        DesignRefused: The addition is not possible there.
         EditRefused: There is no such element.
     """
     arc = mission.at(path).first("arc")
@@ -119,7 +119,7 @@ def offer_at(mission: Node, path: Path, label: str) -> Offer:
 
 
 def free_name(mission: Node, wished: str) -> str:
-    """Return the name, or the first like it with another number, that no component has.
+    """Return the name, or the first one like it with another number, that no component has.
 
     Example: with ``scout1`` taken, ``scout1`` gives ``scout2``.
     """
@@ -169,8 +169,8 @@ def _behaviors(mission: Node, node: Node) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
         rules = vocabulary()["behavior"].attributes
         asks = (
-            Asked("name", rules["name"].documentation, free_name(mission, entry.name.replace("_", "-"))),
-            Asked("priority", rules["priority"].documentation, "1"),
+            Prompt("name", rules["name"].documentation, free_name(mission, entry.name.replace("_", "-"))),
+            Prompt("priority", rules["priority"].documentation, "1"),
         )
         return Offer(f"behavior {entry.name}", entry.class_path, asks, lambda given: build(entry, given))
 
@@ -184,11 +184,11 @@ def _behaviors(mission: Node, node: Node) -> list[Offer]:
 
 def _claims(mission: Node, node: Node) -> list[Offer]:
     doc = vocabulary()["arc"].attributes["minimum-runtime-s"].documentation
-    asks = (Asked("minimum-runtime-s", doc, MINIMUM_RUNTIME_S),)
+    asks = (Prompt("minimum-runtime-s", doc, MINIMUM_RUNTIME_S),)
 
     def offer(entry: TypeEntry) -> Offer:
         what = f"claims one each of: {', '.join(entry.needs)}"
-        return Offer(f"arc {entry.name}", what, asks, lambda given: Claim(node.path, entry.name, given[0].strip()))
+        return Offer(f"arc {entry.name}", what, asks, lambda given: ClaimArc(node.path, entry.name, given[0].strip()))
 
     return [offer(entry) for entry in _of(mission, Role.ARC)]
 
@@ -200,7 +200,7 @@ def _wishes(mission: Node, node: Node) -> list[Offer]:
     def offer(kind: str) -> Offer:
         there = [one.text("name") for one in mission if one.tag == "resource" and one.text("type") == kind]
         doc = vocabulary()["wish"].attributes["name"].documentation
-        asks = (Asked("name", doc, there[0] if there else "", tuple(there)),)
+        asks = (Prompt("name", doc, there[0] if there else "", tuple(there)),)
         return Offer(
             f"wish {kind}",
             vocabulary()["wish"].documentation,
@@ -215,7 +215,7 @@ def _resources(mission: Node) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
         shape = stock_resource(entry.name)
         name = shape.text("name") if shape is not None else entry.name
-        asks = (Asked("name", vocabulary()["resource"].attributes["name"].documentation, free_name(mission, name)),)
+        asks = (Prompt("name", vocabulary()["resource"].attributes["name"].documentation, free_name(mission, name)),)
         return Offer(f"resource {entry.name}", entry.class_path, asks, lambda given: AddResource(entry.name, given[0]))
 
     return [offer(entry) for entry in _of(mission, Role.RESOURCE)]
@@ -224,8 +224,8 @@ def _resources(mission: Node) -> list[Offer]:
 def _world() -> Offer:
     rules = vocabulary()["room"].attributes
     asks = (
-        Asked("width-m", rules["width-m"].documentation, "9"),
-        Asked("depth-m", rules["depth-m"].documentation, "6"),
+        Prompt("width-m", rules["width-m"].documentation, "9"),
+        Prompt("depth-m", rules["depth-m"].documentation, "6"),
     )
     return Offer(
         "world", vocabulary()["world"].documentation, asks, lambda given: AddWorld(given[0].strip(), given[1].strip())
@@ -242,24 +242,24 @@ def _types(mission: Node) -> list[Offer]:
 def _parameter(node: Node) -> Offer:
     rules = vocabulary()["parameter"].attributes
     asks = (
-        Asked("name", rules["name"].documentation),
-        Asked("value", rules["value"].documentation, is_required=False),
+        Prompt("name", rules["name"].documentation),
+        Prompt("value", rules["value"].documentation, is_required=False),
     )
     return Offer(
         "parameter",
         vocabulary()["parameter"].documentation,
         asks,
-        lambda given: SetParameter(node.path, given[0], given[1]),
+        lambda given: WriteParameter(node.path, given[0], given[1]),
     )
 
 
 def _generic(mission: Node, node: Node, tag: str) -> list[Offer]:
-    """Return an offer of an element as the schema describes it: its required attributes are asked."""
+    """Return an offer of an element by its schema, with a question for each required attribute."""
     rule = vocabulary()[tag]
     new = Node((*node.path, 0), tag, {}, (), 0, 0, 0, 0, 0, is_empty=True)
     required = [name for name, one in rule.attributes.items() if one.required]
     asks = [
-        Asked(
+        Prompt(
             name,
             rule.attributes[name].documentation,
             free_name(mission, tag) if name == "name" and tag not in ("uses", "parameter") else "",
@@ -268,7 +268,7 @@ def _generic(mission: Node, node: Node, tag: str) -> list[Offer]:
         for name in required
     ]
     if tag == "target":
-        asks.append(Asked("path", "Its way points, x,y in meters, separated by blanks.", "1,1 2,1"))
+        asks.append(Prompt("path", "Its way points, x,y in meters, separated by blanks.", "1,1 2,1"))
 
     def build(given: Sequence[str]) -> Command:
         values = {name: value for name, value in zip(required, given, strict=False) if value}

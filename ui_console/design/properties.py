@@ -1,4 +1,4 @@
-"""What can be set of an element: its attributes and parameters, with what they mean and may be.
+"""Properties of an element: its attributes and parameters, with their meanings and choices.
 
 Pure. Meanings and defaults are the schema's and, for parameters, the class's own.
 """
@@ -13,24 +13,24 @@ from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path
 from ui_console.design.catalogue import Role, entries
-from ui_console.design.commands import Command, Rename, SetParameter, SetValue
+from ui_console.design.commands import Command, Rename, SetValue, WriteParameter
 
 HAVE_PARAMETERS = ("behavior", "resource", "world")
 WITH_NAMES = ("host", "type", "resource", "world", "behavior", "target", "scout")
-"""Tags whose name others mention; to set it is to rename."""
+"""Tags whose names other elements refer to; to set one is to rename."""
 
 
 class Property(msgspec.Struct, frozen=True):
-    """One thing that can be set.
+    """One attribute or parameter.
 
     Attributes:
-        name: Attribute or parameter.
-        value: What is written; None: nothing.
-        default: What holds then; None: nothing does.
-        is_missing: Whether it must be written, and is not.
-        is_parameter: Whether it is a parameter.
-        doc: What it means and may be.
-        choices: Values that make sense, if they can be listed.
+        name: Its name.
+        value: Its text; None: it is not written.
+        default: Its value if it is not written; None: it has none.
+        is_missing: True: it must be written, and is not.
+        is_parameter: True: it is a parameter.
+        doc: Its meaning and range.
+        choices: Sensible values, if they can be listed.
     """
 
     name: str
@@ -42,21 +42,21 @@ class Property(msgspec.Struct, frozen=True):
     choices: tuple[str, ...] = ()
 
     def command(self, path: Path, tag: str, value: str) -> Command:
-        """Return what sets it; empty text leaves it out."""
+        """Return the command that sets it; an empty text leaves it out."""
         if self.is_parameter:
-            return SetParameter(path, self.name, value or None)
+            return WriteParameter(path, self.name, value or None)
         if self.name == "name" and tag in WITH_NAMES and value:
             return Rename(path, value)
         return SetValue(path, self.name, value or None)
 
 
 def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> list[Property]:
-    """Return everything that can be set of an element, attributes first.
+    """Return all properties of an element, attributes first.
 
     Args:
         mission: The whole file.
         node: The element.
-        facts: Class path → what the class says of itself.
+        facts: Class path → facts of the class.
     """
     rule = vocabulary().get(node.tag)
     if rule is None:
@@ -77,7 +77,7 @@ def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> li
 
 
 def choices(mission: Node, node: Node, attribute: str, words: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the values of an attribute that make sense where it stands; none if they cannot be listed."""
+    """Return the sensible values of an attribute at its place; none if they cannot be listed."""
     match node.tag, attribute:
         case (_, "host"):
             return _names(mission, "hosts")
@@ -103,7 +103,7 @@ def choices(mission: Node, node: Node, attribute: str, words: tuple[str, ...] = 
 
 
 def class_of(mission: Node, node: Node) -> str:
-    """Return the class path of the component that an element is; empty if that is not known."""
+    """Return the class path of an element's component; empty if that is not known."""
     return next((one.class_path for one in entries(mission) if one.name == node.text("type")), "")
 
 

@@ -1,7 +1,7 @@
-"""What a page of the designer may say.
+"""Messages of a page of the designer.
 
-A message is a JSON object whose ``do`` says which of these it is; anything else in it makes it meaningless. What alters
-the draft names the revision it was meant for: nobody moves an element that was another one a moment ago.
+A message is a JSON object whose ``do`` names one of these; an unknown field makes it invalid. A message that changes
+the draft names its revision: a change of an older revision is refused.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Annotated
 
 import msgspec
 
-from ui_console.web.door import Beat, Hello
+from ui_console.web.login import BeatRequest, Hello
 
 MOST_TEXT = 1024  # chosen: longer than any value a mission needs; a message is 4096 bytes at most
 MOST_ANSWERS = 16  # chosen: twice what any element asks for
@@ -21,11 +21,11 @@ Text = Annotated[str, msgspec.Meta(max_length=MOST_TEXT)]
 
 
 class Select(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="select"):
-    """Show all about this element.
+    """Show this element.
 
     Attributes:
         path: The element.
-        number: Told back with what is shown, so that a page knows to which of its choices it belongs.
+        number: Comes back with the element, so that a page knows to which of its choices the answer belongs.
     """
 
     path: PathSaid
@@ -33,13 +33,13 @@ class Select(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field=
 
 
 class TakeOffer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="take"):
-    """Add something to an element, or to the nearest above it that can hold it.
+    """Take an offer at an element, or at its nearest ancestor with that offer.
 
     Attributes:
-        revision: Of the draft it was meant for.
+        revision: Of the draft to change.
         path: The element.
         label: Of the offer.
-        answers: To what it asks; none: ask if something has to be asked, else as proposed.
+        answers: To its questions; none: the proposed ones, unless the offer must ask.
     """
 
     revision: int
@@ -59,13 +59,13 @@ class SetProperty(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 
 
 class MoveElement(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="move"):
-    """Put an element elsewhere.
+    """Move an element.
 
     Attributes:
-        revision: Of the draft it was meant for.
+        revision: Of the draft to change.
         path: The element.
-        parent: Where it goes in.
-        before: The sibling it shall stand before, by its number as it is now; None: last.
+        parent: Its new parent.
+        before: Its next sibling, by the sibling's present number; None: the element goes last.
     """
 
     revision: int
@@ -82,24 +82,24 @@ class RemoveElement(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag
 
 
 class Undo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="undo"):
-    """Take the last change back."""
+    """Undo the last change."""
 
     revision: int
 
 
 class Redo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="redo"):
-    """Do again what was taken back."""
+    """Redo the change undone last."""
 
     revision: int
 
 
 class SaveFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="save"):
-    """Save what this revision is.
+    """Save this revision.
 
     Attributes:
         revision: Of the draft.
-        name: Another file of the same folder; empty: the one it is from.
-        overwrite: Whether to replace what somebody else wrote there.
+        name: Another file of the same folder; empty: its own.
+        overwrite: True: replace the changes of other programs.
     """
 
     revision: int
@@ -108,13 +108,13 @@ class SaveFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class TakeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="reread"):
-    """Have what the file holds now; can be undone."""
+    """Take the file's present content; can be undone."""
 
     revision: int
 
 
 class Rehearse(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="rehearse"):
-    """Show the first minute of the schedule from now on, or no more."""
+    """Begin or end to show the first minute of the schedule."""
 
     is_shown: bool
 
@@ -130,7 +130,7 @@ class ReadText(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 Change = TakeOffer | SetProperty | MoveElement | RemoveElement | Undo | Redo
-"""What alters the draft, and nothing else."""
+"""Messages that change the draft only."""
 
 DesignIntent = (
     Select
@@ -146,13 +146,15 @@ DesignIntent = (
     | LookUp
     | ReadText
 )
-_intents: msgspec.json.Decoder[Hello | Beat | DesignIntent] = msgspec.json.Decoder(Hello | Beat | DesignIntent)
+_intents: msgspec.json.Decoder[Hello | BeatRequest | DesignIntent] = msgspec.json.Decoder(
+    Hello | BeatRequest | DesignIntent
+)
 
 
-def understand_designer(data: bytes | str) -> Hello | Beat | DesignIntent:
-    """Return what a message means.
+def understand_designer(data: bytes | str) -> Hello | BeatRequest | DesignIntent:
+    """Return the decoded message.
 
     Raises:
-        msgspec.DecodeError: Nothing.
+        msgspec.DecodeError: The message is not valid.
     """
     return _intents.decode(data)

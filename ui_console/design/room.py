@@ -1,6 +1,7 @@
 """One mission file and the people who design it in their browsers: they share the draft, and each has a cursor.
 
-What a change does is decided in ``changes``; here it is done in turn, told to all, and kept beside the file.
+``changes`` decides the effect of a change; the room carries changes out in turn, shows them to all, and keeps the draft
+beside the file.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ from ui_console.design.views import (
     rehearsal_view,
     status_view,
 )
-from ui_console.web.door import Offence, Welcome
+from ui_console.web.login import ProtocolViolation, Welcome
 from ui_console.web.outbox import Outbox
 
 log = logging.getLogger(__name__)
@@ -68,7 +69,7 @@ class Designer:
     """A person at a page.
 
     Args:
-        welcome: Who it is.
+        welcome: Identity of the person.
     """
 
     def __init__(self, welcome: Welcome) -> None:
@@ -76,20 +77,20 @@ class Designer:
         self.outbox = Outbox()
         self.news = asyncio.Event()
         self.at: Path = ()
-        """The element all about which is shown."""
+        """The element shown to this person."""
         self.selected = 0
         """The page's number of its last choice."""
         self.sees_rehearsal = False
         self.handled = 0
-        """How much that names a revision was done or refused; the page says one such thing at a time."""
+        """Number of changes carried out or refused; the page sends one change at a time."""
 
-    def tell(self, name: str, view: object) -> None:
-        """Have a section of the view told."""
+    def put(self, name: str, view: object) -> None:
+        """Queue a section of the view."""
         self.outbox.put_section(name, msgspec.json.encode(view))
         self.news.set()
 
     def answer(self, answer: DesignAnswer) -> None:
-        """Have an answer sent."""
+        """Queue an answer."""
         self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
         self.news.set()
 
@@ -98,20 +99,20 @@ class DesignRoom:
     """Serves any number of designers of one file.
 
     Args:
-        draft: What is designed.
-        kept: Where it is kept until it is saved.
+        draft: The mission.
+        kept: Keeps it until it is saved.
         look_up: Asks classes for their documentation and parameters, see ``look_up.look_up``.
     """
 
     def __init__(self, draft: Draft, kept: DraftFile, look_up: LookUpClasses) -> None:
         self.draft = draft
         self.revision = 1
-        self.guests: dict[Designer, None] = {}
+        self.clients: dict[Designer, None] = {}
         self._kept, self._look_up = kept, look_up
         self._facts = dict(shipped_classes())
         self._trusted = _classes_of(draft.saved)
         self._turn = asyncio.Lock()
-        self._told: dict[str, bytes] = {}
+        self._sections: dict[str, bytes] = {}
         self._rehearsal: tuple[int, RehearsalView | None] = (0, None)
         self._to_keep = asyncio.Event()
         self._keeping: asyncio.Task[None] | None = None
@@ -119,92 +120,92 @@ class DesignRoom:
 
     # ------------------------------------------------------------------ designers come and go
     def enter(self, welcome: Welcome) -> Designer:
-        """Return a new designer, who is told everything there is."""
-        guest = Designer(welcome)
-        self.guests[guest] = None
-        guest.tell("welcome", DesignerWelcomed(welcome.user))
-        if self._told:
-            self._tell(guest)
-        self._tell_people()
-        return guest
+        """Return a new designer, whose page gets the whole view."""
+        client = Designer(welcome)
+        self.clients[client] = None
+        client.put("welcome", DesignerWelcomed(welcome.user))
+        if self._sections:
+            self._send(client)
+        self._send_people()
+        return client
 
-    async def leave(self, guest: Designer, reason: str) -> None:
-        """Let a designer go; the draft stays."""
-        self.guests.pop(guest, None)
-        log.info("%s left: %s", guest.welcome.user, reason)
-        self._tell_people()
+    async def leave(self, client: Designer, reason: str) -> None:
+        """Remove a designer; the draft stays."""
+        self.clients.pop(client, None)
+        log.info("%s left: %s", client.welcome.user, reason)
+        self._send_people()
 
-    def refused(self, guest: Designer) -> None:
-        """Nothing of a designer's goes on by itself."""
+    def refused(self, client: Designer) -> None:
+        """Do nothing: a designer has no actions under way."""
 
-    def offended(self, who: str, offence: Offence) -> None:
-        """Have the designers know of a visitor that did what it must not."""
-        log.warning("%s %s", who, offence.line)
-        for guest in self.guests:
-            guest.answer(NoticeAnswer(f"{who} {offence.line}", offence.remedy))
+    def report_violation(self, who: str, violation: ProtocolViolation) -> None:
+        """Show the designers a violation."""
+        log.warning("%s %s", who, violation.line)
+        for client in self.clients:
+            client.answer(NoticeAnswer(f"{who} {violation.line}", violation.remedy))
 
-    # ------------------------------------------------------------------ what pages ask for
-    async def obey(self, guest: Designer, intent: DesignIntent) -> None:
-        """Do what a designer asks, one after the other; what is refused is told to that one."""
+    # ------------------------------------------------------------------ messages of pages
+    async def obey(self, client: Designer, intent: DesignIntent) -> None:
+        """Carry out a designer's messages one after the other; answer that designer with a refusal."""
         is_change = isinstance(intent, Change | SaveFile | TakeFile)
         try:
             async with self._turn:
-                await self._do(guest, intent)
+                await self._do(client, intent)
         except MustAsk as must:
             if isinstance(intent, TakeOffer):
-                guest.answer(AskAnswer(offer_view(must.offer), intent.path))
+                client.answer(AskAnswer(offer_view(must.offer), intent.path))
         except FileChanged as refusal:
-            guest.answer(FileChangedAnswer(refusal.detail, intent.name if isinstance(intent, SaveFile) else ""))
+            client.answer(FileChangedAnswer(refusal.detail, intent.name if isinstance(intent, SaveFile) else ""))
         except MissionInvalid as invalid:
-            guest.answer(RefusalAnswer(str(invalid.faults[0]), "Mend the file, or save over it.", is_change))
+            client.answer(RefusalAnswer(str(invalid.faults[0]), "Mend the file, or save over it.", is_change))
         except Refusal as refusal:
-            guest.answer(RefusalAnswer(refusal.detail, refusal.remedy, is_change))
+            client.answer(RefusalAnswer(refusal.detail, refusal.remedy, is_change))
         if is_change:
-            guest.handled += 1
-            guest.tell("handled", guest.handled)
+            client.handled += 1
+            client.put("handled", client.handled)
 
-    async def _do(self, guest: Designer, intent: DesignIntent) -> None:
+    async def _do(self, client: Designer, intent: DesignIntent) -> None:
         match intent:
             case Select(path=path, number=number):
-                guest.at, guest.selected = self.draft.mission.nearest(path), number
-                self._tell_element(guest)
+                client.at, client.selected = self.draft.mission.nearest(path), number
+                self._send_element(client)
             case TakeOffer() | SetProperty() | MoveElement() | RemoveElement() | Undo() | Redo():
-                await self._change(guest, intent)
+                await self._change(client, intent)
             case SaveFile():
-                await self._save(guest, intent)
+                await self._save(client, intent)
             case TakeFile(revision=revision):
                 self._must_be(revision)
                 opened = await asyncio.to_thread(Draft.opened, self.draft.source)
-                await self._show(self.draft.taken_from(opened.text), guest.welcome.user)
+                await self._show(self.draft.taken_from(opened.text), client.welcome.user)
             case Rehearse(is_shown=is_shown):
-                guest.sees_rehearsal = is_shown
+                client.sees_rehearsal = is_shown
                 await self._rehearse()
             case LookUp(type=name):
                 await self._learn_type(name)
             case ReadText():
-                text, line = self.draft.text.decode("utf-8-sig"), self.draft.mission.at(guest.at).line
-                guest.answer(TextAnswer(text, line, self.draft.source))
+                text, line = self.draft.text.decode("utf-8-sig"), self.draft.mission.at(client.at).line
+                client.answer(TextAnswer(text, line, self.draft.source))
             case _:
                 assert_never(intent)
 
-    async def _change(self, guest: Designer, change: Change) -> None:
+    async def _change(self, client: Designer, change: Change) -> None:
         self._must_be(change.revision)
         before = self.draft
         after = await asyncio.to_thread(changed, before, change)
         if after is before:
             return
-        await self._show(after, guest.welcome.user, (guest, touched_by(change, before, after)))
+        await self._show(after, client.welcome.user, (client, touched_by(change, before, after)))
 
-    async def _save(self, guest: Designer, intent: SaveFile) -> None:
+    async def _save(self, client: Designer, intent: SaveFile) -> None:
         self._must_be(intent.revision)
         path = sibling_file(self.draft.source, intent.name)
         kept = await asyncio.to_thread(save, self.draft, path, overwrite=intent.overwrite)
         if kept.source != self.draft.source:
-            await self._keep(self.draft.kept(self.draft.source))  # what is saved elsewhere has nothing to lose here
+            await self._keep(self.draft.kept(self.draft.source))  # saved elsewhere, it needs no draft file here
             self._kept = DraftFile(kept.source)
-        await self._show(kept, guest.welcome.user)
+        await self._show(kept, client.welcome.user)
         await self._keep(kept)
-        guest.answer(SavedAnswer(kept.source, len(kept.problems)))
+        client.answer(SavedAnswer(kept.source, len(kept.problems)))
 
     def _must_be(self, revision: int) -> None:
         if revision != self.revision:
@@ -222,9 +223,9 @@ class DesignRoom:
             )
         await self._learn([entry.class_path])
 
-    # ------------------------------------------------------------------ what goes on beside
+    # ------------------------------------------------------------------ tasks beside the pages
     async def prepare(self) -> None:
-        """Have all there is to tell at hand."""
+        """Make the sections of the first view."""
         async with self._turn:
             await self._show(self.draft, "")
         self._to_keep.clear()
@@ -238,20 +239,20 @@ class DesignRoom:
                 await self._keep(self.draft)
 
     async def keep_now(self) -> None:
-        """Return when the draft as it is was kept; one that nobody changed leaves nothing."""
+        """Return once the present draft is kept; an unchanged draft leaves no file."""
         if self.revision > 1:
             await self._keep(self.draft)
 
     async def _keep(self, draft: Draft) -> None:
         if self._keeping is not None:
-            await asyncio.wait({self._keeping})  # whoever wanted that may have been cancelled; it goes on all the same
+            await asyncio.wait({self._keeping})  # its task goes on if its caller was cancelled
         self._keeping = asyncio.create_task(asyncio.to_thread(self._kept.keep, draft), name="design: keep")
         try:
             await asyncio.shield(self._keeping)
         except DraftNotKept as refusal:
             log.warning("%s", refusal)
-            for guest in self.guests:
-                guest.answer(NoticeAnswer(refusal.detail, refusal.remedy))
+            for client in self.clients:
+                client.answer(NoticeAnswer(refusal.detail, refusal.remedy))
 
     async def _learn(self, class_paths: Sequence[str]) -> None:
         await self._known(await self._look_up(class_paths))
@@ -259,18 +260,18 @@ class DesignRoom:
     async def _known(self, facts: dict[str, ClassFacts]) -> None:
         self._facts = {**self._facts, **facts}
         self.draft = self.draft.knowing(self._facts)
-        self._told = await asyncio.to_thread(sections, self.draft, self._facts)
-        for guest in self.guests:
-            self._tell(guest)
+        self._sections = await asyncio.to_thread(sections, self.draft, self._facts)
+        for client in self.clients:
+            self._send(client)
 
-    # ------------------------------------------------------------------ what pages are told
+    # ------------------------------------------------------------------ messages to pages
     async def _show(self, draft: Draft, user: str, chosen: tuple[Designer, Path] | None = None) -> None:
-        """Have all pages show this draft from now on, each with its cursor on what it was on.
+        """Show this draft on all pages from now on, each with its cursor on the same element.
 
         Args:
             draft: The draft.
-            user: Who changed it.
-            chosen: Whose cursor goes elsewhere, and where.
+            user: Author of the change.
+            chosen: The designer whose cursor moves, and its new element.
         """
         told = await asyncio.to_thread(sections, draft, self._facts)
         follow = await asyncio.to_thread(follower, self.draft, draft)
@@ -278,39 +279,39 @@ class DesignRoom:
         if draft is not self.draft:
             self.revision += 1
             self._changed_by = user
-        self.draft, self._told = draft, told
-        for guest in self.guests:
-            guest.at = chosen[1] if chosen is not None and guest is chosen[0] else follow(guest.at)
-            self._tell(guest)
+        self.draft, self._sections = draft, told
+        for client in self.clients:
+            client.at = chosen[1] if chosen is not None and client is chosen[0] else follow(client.at)
+            self._send(client)
         await self._rehearse()
 
     async def _rehearse(self) -> None:
-        watching = [guest for guest in self.guests if guest.sees_rehearsal]
+        watching = [client for client in self.clients if client.sees_rehearsal]
         if not watching:
             return
         if self._rehearsal[0] != self.revision:
             self._rehearsal = (self.revision, await asyncio.to_thread(_rehearsed, self.draft))
-        for guest in watching:
-            guest.tell("rehearsal", self._rehearsal[1])
+        for client in watching:
+            client.put("rehearsal", self._rehearsal[1])
 
-    def _tell(self, guest: Designer) -> None:
-        for name, body in self._told.items():
-            guest.outbox.put_section(name, body)
-        guest.tell("status", status_view(self.draft, self.revision, self._changed_by))
-        self._tell_element(guest)
+    def _send(self, client: Designer) -> None:
+        for name, body in self._sections.items():
+            client.outbox.put_section(name, body)
+        client.put("status", status_view(self.draft, self.revision, self._changed_by))
+        self._send_element(client)
 
-    def _tell_element(self, guest: Designer) -> None:
-        guest.tell("selected", guest.selected)
-        guest.tell("element", element_view(self.draft, guest.at, self._facts))
+    def _send_element(self, client: Designer) -> None:
+        client.put("selected", client.selected)
+        client.put("element", element_view(self.draft, client.at, self._facts))
 
-    def _tell_people(self) -> None:
-        users = sorted(guest.welcome.user for guest in self.guests)
-        for guest in self.guests:
-            guest.tell("people", users)
+    def _send_people(self) -> None:
+        users = sorted(client.welcome.user for client in self.clients)
+        for client in self.clients:
+            client.put("people", users)
 
 
 def _classes_of(saved: bytes | None) -> set[str]:
-    """Return the classes that the mission file names; whoever wrote it may run code here."""
+    """Return the classes that the mission file names: its author may run code here."""
     if saved is None:
         return set()
     try:

@@ -1,4 +1,4 @@
-"""The designer's server: its page, its socket, and what goes on beside them. No mission needs to be up."""
+"""The designer's server: its page, its socket, and the tasks beside them. No mission needs to be up."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from ui_console.design.file import NotSaved
 from ui_console.design.keeping import DraftFile
 from ui_console.design.protocol import DesignIntent, understand_designer
 from ui_console.design.room import Designer, DesignRoom
-from ui_console.web.door import Doorkeeper
-from ui_console.web.reception import Reception, port_of
-from ui_console.web.site import DESIGN_FILES, Site
+from ui_console.web.login import Authenticator
+from ui_console.web.page_files import DESIGN_FILES, PageFiles
+from ui_console.web.page_server import PageServer, port_of
 
 
 def begin(source: str) -> tuple[Draft, DraftFile]:
-    """Return the draft of a mission file: what was not saved last time, else what the file holds, else a new mission.
+    """Return the draft of a mission file: unsaved changes of last time, else the file's content, else a new mission.
 
     Raises:
         NotSaved: There is no folder to save it in.
-        DraftUnreadable: What was kept is no draft.
-        MissionInvalid: The file cannot be read, or not even as XML.
+        DraftUnreadable: The draft file holds no draft.
+        MissionInvalid: The file cannot be read, or is no XML.
     """
     folder = Path(source).parent
     if not folder.is_dir():
@@ -40,13 +40,13 @@ class DesignServer:
 
     Args:
         room: The draft and its designers.
-        doorkeeper: Knows the tokens.
+        authenticator: Knows the tokens.
     """
 
-    def __init__(self, room: DesignRoom, doorkeeper: Doorkeeper) -> None:
+    def __init__(self, room: DesignRoom, authenticator: Authenticator) -> None:
         self._room = room
-        self._reception: Reception[Designer, DesignIntent] = Reception(
-            room, doorkeeper, Site(DESIGN_FILES), understand_designer
+        self._page_server: PageServer[Designer, DesignIntent] = PageServer(
+            room, authenticator, PageFiles(DESIGN_FILES), understand_designer
         )
 
     async def run(
@@ -57,20 +57,20 @@ class DesignServer:
         end: asyncio.Event,
         encryption: SSLContext | None = None,
     ) -> None:
-        """Serve until the event is set; what is not saved is kept beside the file; see ``Reception.open``.
+        """Serve until the event is set; unsaved changes are kept beside the file; see ``Reception.open``.
 
         Args:
-            ready: Called with the port once browsers can come.
+            ready: Called with the port once the server listens.
             end: Ends it.
 
         Raises:
-            CannotListen: The address cannot be had.
+            CannotListen: The address is not free, or not one of this machine.
             BaseExceptionGroup: With the bug that ended it.
         """
         room = self._room
         await room.prepare()
         try:
-            async with self._reception.open(host, port, encryption) as server, asyncio.TaskGroup() as beside:
+            async with self._page_server.open(host, port, encryption) as server, asyncio.TaskGroup() as beside:
                 keeping = beside.create_task(room.keep_on(), name="design: keep_on")
                 ready(port_of(server))
                 await end.wait()

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import msgspec
 
-from backbone.dry_run import DryRun
+from backbone.dry_run.run import DryRun
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path
@@ -17,7 +17,7 @@ from backbone.scheduling.rehearsal import Run
 from backbone.spoken import counted
 from ui_console.design.catalogue import Role, TypeEntry, description, entries
 from ui_console.design.draft import Draft
-from ui_console.design.offers import Asked, Offer, offers
+from ui_console.design.offers import Offer, Prompt, offers
 from ui_console.design.properties import Property, class_of, properties
 
 ROLES_ADDED = (Role.BEHAVIOR, Role.ARC, Role.RESOURCE)
@@ -26,23 +26,23 @@ WISHES, ROOM = "wishes", "the room"
 
 
 class DesignerWelcomed(msgspec.Struct, frozen=True):
-    """Who came in."""
+    """The person was authenticated."""
 
     user: str
 
 
 class DraftStatus(msgspec.Struct, frozen=True):
-    """How the draft is.
+    """State of the draft.
 
     Attributes:
         source: The mission file.
-        revision: Counts changes; a change names the one it was meant for.
-        is_changed: Whether the file holds something else.
-        is_new: Whether there is no such file yet.
-        problems: How many ``scout-backbone check`` would find.
-        can_undo: Whether there is a change to take back.
-        can_redo: Whether there is one that was taken back.
-        changed_by: Who changed it last; empty: nobody yet.
+        revision: Counts changes; a change names its revision.
+        is_changed: True: the draft differs from the file.
+        is_new: True: there is no such file yet.
+        problems: Number of faults ``scout-backbone check`` would report.
+        can_undo: True: there is a change to undo.
+        can_redo: True: there is an undone change.
+        changed_by: Author of the last change; empty: none yet.
     """
 
     source: str
@@ -59,10 +59,10 @@ class ElementRow(msgspec.Struct, frozen=True):
     """One element of the tree.
 
     Attributes:
-        path: Where it stands.
+        path: Its path.
         tag: Its tag.
-        told: What tells it from its siblings.
-        problems: What is wrong with it or with one of its parameters, with what to do about it.
+        told: Words that distinguish it from its siblings.
+        problems: Faults of it and its parameters, with remedies.
     """
 
     path: Path
@@ -72,14 +72,14 @@ class ElementRow(msgspec.Struct, frozen=True):
 
 
 class ProblemRow(msgspec.Struct, frozen=True):
-    """One problem, as ``scout-backbone check`` tells it.
+    """One problem, as ``scout-backbone check`` reports it.
 
     Attributes:
         line: Of the text as it would be saved, from 1.
         column: From 1.
-        message: What is wrong.
-        remedy: What to do about it.
-        path: The element it is about.
+        message: The fault.
+        remedy: An action against it.
+        path: Its element.
     """
 
     line: int
@@ -90,16 +90,16 @@ class ProblemRow(msgspec.Struct, frozen=True):
 
 
 class PaletteRow(msgspec.Struct, frozen=True):
-    """Something that may be added somewhere.
+    """A possible addition.
 
     Attributes:
         label: Its offer's, see ``offers``.
-        group: Under which heading.
-        name: What is shown.
-        tag: Of the element that it becomes.
+        group: Its heading.
+        name: Its name on the page.
+        tag: Of its element.
         type: Component type whose class can be looked up; empty: none.
-        is_known: Whether its class was looked up.
-        doc: What it is, as lines.
+        is_known: True: its class was looked up.
+        doc: Its meaning, as lines.
     """
 
     label: str
@@ -112,25 +112,25 @@ class PaletteRow(msgspec.Struct, frozen=True):
 
 
 class OfferView(msgspec.Struct, frozen=True):
-    """Something that may be added here, or above."""
+    """A possible addition here, or to an ancestor."""
 
     label: str
     doc: str
-    asks: tuple[Asked, ...]
+    asks: tuple[Prompt, ...]
 
 
 class ElementView(msgspec.Struct, frozen=True):
-    """All about the element a person has chosen.
+    """The element a person has chosen.
 
     Attributes:
-        path: Where it stands.
+        path: Its path.
         tag: Its tag.
-        told: What tells it from its siblings.
+        told: Words that distinguish it from its siblings.
         line: Its line in the text.
-        doc: What its tag means.
-        type_doc: What its component's class says of itself, as lines; may be empty.
-        properties: What can be set.
-        offers: What may be added to it, or to those above it.
+        doc: Meaning of its tag.
+        type_doc: Documentation of its component's class, as lines; may be empty.
+        properties: Its attributes and parameters.
+        offers: Possible additions to it, or to its ancestors.
     """
 
     path: Path
@@ -144,13 +144,13 @@ class ElementView(msgspec.Struct, frozen=True):
 
 
 class TurnView(msgspec.Struct, frozen=True):
-    """From when to when a resource was somebody's.
+    """A turn of an ARC with a resource.
 
     Attributes:
         from_s: When its RCs began to settle.
-        open_s: When it could be used; ``to_s`` if never.
+        open_s: When the gate opened; ``to_s`` if never.
         to_s: When it was free again.
-        who: Whose.
+        who: In an ARC's row the resources it used, else the ARC.
     """
 
     from_s: float
@@ -168,12 +168,12 @@ class RehearsalRow(msgspec.Struct, frozen=True):
 
 
 class RehearsalView(msgspec.Struct, frozen=True):
-    """What the mission would do at first.
+    """The mission's first minute.
 
     Attributes:
-        end_s: For how long, mission seconds.
+        end_s: Its length, mission seconds.
         rows: ARCs, then resources.
-        told: What became of each request, a line each.
+        told: Outcome of each request, a line each.
         never: Requests that never run and components without a host, with the reason.
     """
 
@@ -184,12 +184,12 @@ class RehearsalView(msgspec.Struct, frozen=True):
 
 
 def status_view(draft: Draft, revision: int, changed_by: str) -> DraftStatus:
-    """Return how a draft is.
+    """Return the state of a draft.
 
     Args:
         draft: The draft.
-        revision: How often it was changed.
-        changed_by: Who changed it last.
+        revision: Number of changes.
+        changed_by: Author of the last change.
     """
     return DraftStatus(
         draft.source,
@@ -242,16 +242,16 @@ def problems_view(draft: Draft) -> list[ProblemRow]:
 
 
 def places() -> dict[str, list[str]]:
-    """Return for each tag which may stand in it."""
+    """Return for each tag the tags of its children."""
     return {tag: list(rule.children) for tag, rule in vocabulary().items()}
 
 
 def palette(mission: Node, facts: Mapping[str, ClassFacts]) -> list[PaletteRow]:
-    """Return what can be dragged into the tree: component types, wishes for resources, what a room is made of.
+    """Return the rows that can be dragged into the tree: component types, wishes for resources, parts of a room.
 
     Args:
         mission: The designed file.
-        facts: Class path → what the class says of itself.
+        facts: Class path → facts of the class.
     """
     at_hand = entries(mission)
     found = [_type_row(entry, facts) for role in ROLES_ADDED for entry in at_hand if entry.role is role]
@@ -267,12 +267,12 @@ def palette(mission: Node, facts: Mapping[str, ClassFacts]) -> list[PaletteRow]:
 
 
 def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> ElementView:
-    """Return all about one element.
+    """Return the view of one element.
 
     Args:
         draft: The draft.
         path: The element; must be there.
-        facts: Class path → what the class says of itself.
+        facts: Class path → facts of the class.
     """
     mission = draft.mission
     node = mission.at(path)
@@ -292,17 +292,17 @@ def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> E
 
 
 def offer_view(offer: Offer, class_doc: str = "") -> OfferView:
-    """Return an offer without the way it is taken.
+    """Return an offer without its command.
 
     Args:
         offer: The offer.
-        class_doc: What the class of its type says of itself, of which the first line is told; empty: not known.
+        class_doc: Documentation of its type's class, of which the first line is shown; empty: not known.
     """
     return OfferView(offer.label, class_doc.partition("\n")[0] or offer.doc, offer.asks)
 
 
 def rehearsal_view(dry: DryRun) -> RehearsalView:
-    """Return who would run when."""
+    """Return the turns of a dry run."""
     seen = dry.timetable
     arcs = [
         RehearsalRow(one.arc, is_arc=True, turns=tuple(_turn(run, ", ".join(run.uses)) for run in seen.of_arc(one.arc)))
@@ -343,7 +343,7 @@ def _tag(entry: TypeEntry) -> str:
 
 
 def _label(entry: TypeEntry) -> str:
-    """Return the label of the offer of something of this type."""
+    """Return the label of the offer of this type."""
     return f"{_tag(entry)} {entry.name}"
 
 

@@ -1,13 +1,13 @@
-"""Alarms: what an operator must know now, few enough to be read.
+"""Alarms: conditions an operator must know now, few enough to be read.
 
 Rules of this file: no bus, no clock, no screen; times are arguments.
 
-* An alarm is told apart by its key. The same one again counts up and has to be seen again; a condition that goes on
-  is one alarm.
-* What is over is none any more: the log has it. What merely happened fades, the sooner the less it matters.
-* While the operator was away nothing goes and nothing fades: it is marked, until somebody has seen it.
-* One cause is one line: what follows from another alarm is told below that one, and seen with it.
-* What nobody has acknowledged is never forgotten for what somebody has, nor what is so now for what is over.
+* A key identifies an alarm. A repeated alarm counts up and has to be acknowledged again; a condition that goes on is
+  one alarm.
+* A condition that ended is no alarm any more: the log has it. An event fades, the sooner the less it matters.
+* While the operator is away no alarm goes or fades: it is marked until a person acknowledges it.
+* One cause is one line: an alarm that follows from another one is listed below it, and acknowledged with it.
+* When the book is full, acknowledged alarms go before unacknowledged ones, and ended conditions before present ones.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.NOT_RECORDED: Severity.WARNING,
     AlarmKind.VISITOR: Severity.WARNING,
 }
-"""How much an alarm of a kind matters, unless it says otherwise itself."""
+"""Severity of an alarm of a kind, unless the alarm has its own."""
 _WEIGHT = {Severity.ALARM: 0, Severity.WARNING: 1, Severity.NOTICE: 2}
 _CAUSES = (AlarmKind.LINK, AlarmKind.ABSENT, AlarmKind.LOST, AlarmKind.RC_DOWN)
-"""Kinds from which others follow, the one that says most first."""
+"""Kinds from which others follow, the most telling kind first."""
 _RANKS = len(_CAUSES) + 1
 
 
@@ -61,11 +61,11 @@ class AlarmBook:
         self._own_away_since_s = NONE_S
         self._now_s = NONE_S
         self.forgotten = 0
-        """How many were dropped because there are too many."""
+        """How many alarms were dropped because the book was full."""
 
     @property
     def away_since_s(self) -> float:
-        """Since when nobody looks; negative: somebody does."""
+        """Since when the operator is away; negative: the operator is there."""
         return self._beside.away_since_s if self._beside is not None else self._own_away_since_s
 
     def happened(
@@ -80,7 +80,7 @@ class AlarmBook:
         *,
         lasts: bool = False,
     ) -> None:
-        """Something happened, and with ``lasts`` is so until ``end``; told again it counts up."""
+        """Raise the alarm of an event, or with ``lasts`` of a condition until ``end``; a repeated call counts it up."""
         key, severity = key or alarm_key(kind, subject), severity or SEVERITIES[kind]
         former = self._alarms.pop(key, None)
         first_s, count = (former.first_s, former.count + 1) if former is not None else (at_s, 1)
@@ -112,7 +112,7 @@ class AlarmBook:
         remedy: str = "",
         severity: Severity | None = None,
     ) -> None:
-        """Something is so from now on until ``end``; told again while it is so, only the words may change."""
+        """Raise the alarm of a condition until ``end``; a repeated call changes only the words."""
         key = alarm_key(kind, subject)
         alarm = self._alarms.get(key)
         if alarm is not None and alarm.is_active:
@@ -121,7 +121,7 @@ class AlarmBook:
             self.happened(kind, subject, line, at_s, remedy, severity=severity, lasts=True)
 
     def end(self, kind: AlarmKind, subject: str, at_s: float) -> None:
-        """It is no longer so: nothing is to be done about it any more."""
+        """End the alarm of a condition: nothing is to be done about it any more."""
         key = alarm_key(kind, subject)
         alarm = self._alarms.get(key)
         if alarm is not None and alarm.is_active:
@@ -129,26 +129,26 @@ class AlarmBook:
             self._over.add(key)
 
     def hold(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
-        """Begin the alarm of a condition that is so, else end it."""
+        """Begin the alarm of a condition that holds, else end it."""
         if is_so:
             self.begin(kind, subject, line, at_s, remedy)
         else:
             self.end(kind, subject, at_s)
 
     def mended(self, kinds: Sequence[AlarmKind]) -> None:
-        """What happened of these kinds matters no longer: what was wanted has come about since."""
+        """End the events of these kinds: the operator's wish has come true since."""
         for key, alarm in self._alarms.items():
             if alarm.kind in kinds and not alarm.is_active:
                 self._alarms[key] = replace(alarm, remedy="")
                 self._over.add(key)
 
     def retract(self, kind: AlarmKind, subject: str) -> None:
-        """It was none: what explains it was heard later."""
+        """Remove an alarm that a later message explains."""
         self._alarms.pop(alarm_key(kind, subject), None)
         self._over.discard(alarm_key(kind, subject))
 
     def acknowledge(self, user: str, keys: Sequence[str] = ()) -> int:
-        """Note that the user has seen these alarms, or without a key all; return how many that were new to people."""
+        """Note that the user has seen these alarms, or without a key all; return how many no person had seen before."""
         seen = [alarm for key, alarm in self._alarms.items() if not keys or key in keys]
         seen = [alarm for alarm in seen if not alarm.acknowledged_by and self._is_shown(alarm)]
         for alarm in seen:
@@ -156,18 +156,18 @@ class AlarmBook:
         return len(seen)
 
     def attention(self, is_there: bool, at_s: float) -> None:
-        """The operator came, or went."""
+        """Note that the operator came, or went."""
         if not is_there and self._own_away_since_s < 0:
             self._own_away_since_s = at_s
         elif is_there:
             self._own_away_since_s = NONE_S
 
     def look(self, now_s: float) -> None:
-        """Let fade what time has passed over."""
+        """Remove the alarms whose time to fade has come."""
         self._now_s = max(self._now_s, now_s)
 
     def views(self) -> list[AlarmView]:
-        """Return what is to be known: unseen ones first, then by weight, newest first."""
+        """Return the alarms that are shown: unseen ones first, then by weight, newest first."""
         return in_order(filter(self._is_shown, self._alarms.values()))
 
     def _is_shown(self, alarm: AlarmView) -> bool:
@@ -178,7 +178,7 @@ class AlarmBook:
         return not (alarm.key in self._over or alarm.acknowledged_by or is_faded)
 
     def _forget_one(self) -> None:
-        """Forget the oldest of those that matter least: seen, or over before anybody looked; then what is over."""
+        """Forget the oldest alarm of the least weight: acknowledged or unseen and ended first, then any ended one."""
 
         def weight(key: str) -> tuple[bool, bool]:
             alarm = self._alarms[key]
@@ -192,7 +192,7 @@ class AlarmBook:
 
 
 def alarm_key(kind: AlarmKind, subject: str) -> str:
-    """Return what an alarm is known by.
+    """Return the key of an alarm.
 
     Example:
         >>> alarm_key(AlarmKind.LOST, "scout1")
@@ -209,11 +209,11 @@ def in_order(alarms: Iterable[AlarmView]) -> list[AlarmView]:
 def one_line_for_one_cause(
     alarms: Sequence[AlarmView], explained_by: Callable[[str], frozenset[str]]
 ) -> list[AlarmView]:
-    """Return the alarms in order; those that follow from another are told with it.
+    """Return the alarms in order; an alarm that follows from another one is listed with it.
 
     Args:
         alarms: Any.
-        explained_by: Names of that without which a subject cannot be well: its host's creator, what it uses.
+        explained_by: Names of the components a subject depends on: its host's creator, the components it uses.
     """
     causes = [one for one in alarms if _rank(one) < _RANKS]
     root_of = {one.key: _cause_of(one, causes, explained_by) for one in alarms}
@@ -237,7 +237,7 @@ def _cause_of(
         if _rank(cause) == rank:
             return cause.subject in needs and len(explained_by(cause.subject)) < len(needs)
         is_near = cause.subject in {one.subject, *needs}
-        is_unseen = cause.kind is AlarmKind.LINK and one.last_s >= cause.first_s  # nothing is heard, so all looks lost
+        is_unseen = cause.kind is AlarmKind.LINK and one.last_s >= cause.first_s  # no message comes: all looks lost
         is_at_once = cause.is_active or abs(one.last_s - cause.last_s) <= AT_ONCE_S
         return _rank(cause) < rank and is_at_once and (is_near or is_unseen)
 

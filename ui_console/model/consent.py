@@ -1,11 +1,11 @@
-"""May I? One operator asks another: to have the robot they hold, or to lift the stop they set.
+"""Consent: one operator asks another for the robot they hold, or to lift the stop they set.
 
 Rules of this file: no bus, no clock, no screen; times are mission seconds and arguments.
 
 * An asker has at most one question of a topic open here; questions are answered in the order in which they came.
-* Each question gets exactly one answer. Without one in time it is a no: everything goes on as before.
-* A yes that gives the robot back answers only the first question for it; the others hear who was let have it.
-* A robot that is given back anyway is a yes to everybody who wants it; one that is lost to somebody else is a no.
+* Each question gets exactly one answer. A question that times out is answered no: everything goes on as before.
+* A yes that gives the robot back answers only the first question for it; the other askers get the name of its user.
+* If the operator releases the robot, every question for it is answered yes; if another ARC gets it, no.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Annotated
 import msgspec
 
 from backbone.errors import Refusal
-from backbone.people import is_console
+from backbone.mission_log.people import is_console
 from backbone.ranges import Line, Mention
 from backbone.wire import Message
 
@@ -28,19 +28,19 @@ MAX_WHY = 200  # chosen: a line a driver reads at a glance
 
 
 class Topic(StrEnum):
-    """What may be asked for."""
+    """Subject of a question to another operator."""
 
     TAKE = "take"  # to have the robot
     LIFT = "lift"  # to let it move again
 
 
 class AskConsent(Message, frozen=True):
-    """May I have it? Asked by a console of one that holds what it waits for; answered within ``CONSENT_WITHIN_S``.
+    """A console asks the console that holds the robot it waits for; answered within ``CONSENT_WITHIN_S``.
 
     Attributes:
-        robot: What it is about, for people.
-        user: Who asks.
-        why: For people.
+        robot: The robot asked for, for people.
+        user: The person who asks.
+        why: The reason, for people.
     """
 
     robot: Mention
@@ -52,10 +52,10 @@ class Consent(Message, frozen=True):
     """Answer to ``AskConsent``.
 
     Attributes:
-        is_given: True: it is being given back, or may move.
-        user: Who decided.
-        reason: For people; empty: none was said.
-        is_here: False: nobody decided, for the person who was asked is not there.
+        is_given: True: the robot is being given back, or may move.
+        user: The person who decided.
+        reason: For people; empty: none was given.
+        is_here: False: the person asked is not there, so no person decided.
     """
 
     is_given: bool
@@ -78,15 +78,15 @@ class TooManyAsk(Refusal):
     remedy = "Wait for your turn by the scheduler's rule."
 
 
-class NobodyToAsk(Refusal):
-    """No operator stands in the way."""
+class NoOperatorToAsk(Refusal):
+    """No operator holds the robot that this console waits for."""
 
     code = "consent.nobody"
-    remedy = "Ask 'why' for what you wait for; behaviors yield by priority and turns, nobody can be asked for them."
+    remedy = "Ask 'why' for the robot you wait for; behaviors yield by priority and turns, not on request."
 
 
 class NotAnOperator(Refusal):
-    """Something else than a console asked a person."""
+    """A component that is no console asked a person."""
 
     code = "consent.not_an_operator"
     remedy = "Claim the robot; the RC manager decides between programs."
@@ -108,11 +108,11 @@ class Sought:
 
     Attributes:
         asker: Address of the console that asks.
-        user: Who sits at it.
-        robot: What it is about.
-        why: For people.
-        until_s: It is a no from then on.
-        topic: What is asked for.
+        user: The person at that console.
+        robot: The robot asked for.
+        why: The reason, for people.
+        until_s: The question times out then, which is a no.
+        topic: To have the robot, or to lift its stop.
     """
 
     asker: str
@@ -125,7 +125,7 @@ class Sought:
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """What became of one question."""
+    """A question with its answer."""
 
     sought: Sought
     consent: Consent
@@ -135,7 +135,7 @@ class ConsentDesk:
     """The questions open at one console.
 
     Args:
-        user: Who sits at it and decides.
+        user: The person at this console, who decides.
     """
 
     def __init__(self, user: str) -> None:
@@ -144,7 +144,7 @@ class ConsentDesk:
 
     @property
     def open(self) -> Sequence[Sought]:
-        """All that wait for an answer, the first to be answered first."""
+        """The questions that wait for an answer, the next one first."""
         return tuple(self._open)
 
     def seek(self, asker: str, asked: AskConsent, now_s: float, within_s: float = CONSENT_WITHIN_S) -> Sought:
@@ -166,7 +166,7 @@ class ConsentDesk:
         return sought
 
     def decide(self, is_given: bool, reason: str = "") -> list[Settled]:
-        """Answer the first question; if it gives the robot away, all others for it too; return what was settled."""
+        """Answer the first question; a yes for the robot also settles all others for it; return the settled ones."""
         if not self._open:
             return []
         first, others = self._open[0], self._open[1:]
@@ -177,13 +177,13 @@ class ConsentDesk:
         return settled
 
     def expire(self, now_s: float) -> list[Settled]:
-        """Settle as a no what was open for too long."""
+        """Settle as a no every question that timed out."""
         late = [one for one in self._open if one.until_s <= now_s]
         self._open = [one for one in self._open if one.until_s > now_s]
         return [Settled(one, Consent(False, self._user, "no answer")) for one in late]
 
     def ended(self, is_given: bool, reason: str) -> list[Settled]:
-        """Settle all who want the robot: nothing is held here any more."""
+        """Settle all questions for the robot: this console holds none any more."""
         return self._close_takes(Consent(is_given, self._user, reason))
 
     def _close_takes(self, consent: Consent) -> list[Settled]:

@@ -1,10 +1,10 @@
-"""The pure console model: all that one console knows, and what its screens show.
+"""The pure console model: the knowledge of one console, and the views its screens show.
 
 Rules of this file: no bus, no clock, no screen. Events go in, views come out; times are mission seconds, and *now* is
 an argument. Terminal, web page and scripts show the same views.
 
-The mission's part is a ``TeamModel`` of its own, which consoles in one process may share; what is here is one
-operator's part: what is wanted, what is held, the pictures that arrive.
+The mission's part is a ``TeamModel`` of its own, which consoles in one process may share. This model has one operator's
+part: the robot wanted, the robot held, the pictures that arrive.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from ui_console.model.team import TeamModel
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
-SLICE_TOLD_S = 1.0  # chosen: what ends within a second is not worth a number
+SLICE_TOLD_S = 1.0  # chosen: a rest below a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 
 
 class ConsoleModel:
-    """All a console knows; screens read it, events change it.
+    """The knowledge of one console; screens read it, events change it.
 
     Args:
         name: Name of this console.
-        user: Who sits at it, for people.
-        team: What is known of the mission; None: a model of its own.
+        user: The person at this console.
+        team: Model of the mission; None: a new one.
         sees: True if pictures are to come while a robot is held: their absence is an alarm then.
-        alarms: Where what concerns this console is told; None: in a book that only its operator reads.
+        alarms: Book for this console's alarms; None: a book that only its operator reads.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class ConsoleModel:
         self.name, self.user = name, user or name
         self.team = team or TeamModel()
         self.robot = ""
-        """Robot asked for or held; empty: any, or none."""
+        """Robot requested or held; empty: any, or none."""
         self.held: events.Granted | None = None
         self.lost: Suspended | None = None
         self.asked: events.Asked | None = None
@@ -68,7 +68,7 @@ class ConsoleModel:
         self._pictures: dict[str, deque[events.PictureSeen]] = {}
         self._sought: dict[tuple[str, Topic], Sought] = {}
         self.moment = 0
-        """Grows whenever presses from before count no more."""
+        """Grows at each event from which on older presses count no more."""
         self._must_let_go = False
         self._went: views.LostView | None = None
         self._asked_whom: events.ConsentAsked | None = None
@@ -76,11 +76,11 @@ class ConsoleModel:
         self._refused = ""  # why the last claim was refused, if it was
         self._blind = ""  # robot that is held without pictures to drive by
         self.alarms = alarms or AlarmBook(beside=self.team.alarms)
-        """What concerns this console alone."""
+        """Alarms of this console alone."""
 
     # ------------------------------------------------------------------ events in
     def apply(self, event: events.ConsoleEvent) -> None:
-        """Take the event in; what concerns the whole mission goes to ``team``."""
+        """Take the event in; an event of the whole mission goes to ``team``."""
         match event:
             case events.Heard(body=Why() as why):
                 self.why = why
@@ -92,7 +92,7 @@ class ConsoleModel:
                 self._apply_own(event)
 
     def look(self, now_s: float) -> None:
-        """Find out what only time can tell; right before a view is taken."""
+        """Raise and end the alarms that depend on time; call it right before a view is taken."""
         self.team.look(now_s)
         self.alarms.look(now_s)
         stale = self._stale_line(now_s)
@@ -105,14 +105,14 @@ class ConsoleModel:
             self.alarms.begin(views.AlarmKind.STALE_VIDEO, blind, stale, now_s, remedy)
 
     def alarm_views(self) -> list[views.AlarmView]:
-        """Return what this console's operator must know; right after ``look``."""
+        """Return the alarms for this console's operator; call it right after ``look``."""
         return self.team.alarm_views(self.alarms)
 
     def acknowledge(self, key: str = "") -> int:
-        """Note that this console's user has seen one alarm and what follows from it, or with an empty key all.
+        """Note that this console's user has seen one alarm and its consequences, or with an empty key all.
 
         Returns:
-            How many that were.
+            Number of alarms acknowledged.
         """
         keys = [one for view in self.alarm_views() if key in ("", view.key) for one in view.keys]
         if not keys:
@@ -120,12 +120,12 @@ class ConsoleModel:
         return self.team.alarms.acknowledge(self.user, keys) + self.alarms.acknowledge(self.user, keys)
 
     def dismiss_lost(self) -> None:
-        """This console's user knows that a robot was lost, and does not want it back."""
+        """Note that this console's user knows of the lost robot, and does not want it back."""
         self._went = None
 
     # ------------------------------------------------------------------ views out
     def view(self, now_s: float) -> views.ConsoleView:
-        """Return all that there is to show."""
+        """Return everything a screen shows."""
         self.look(now_s)
         team = self.team
         return views.ConsoleView(
@@ -147,7 +147,7 @@ class ConsoleModel:
         )
 
     def own(self, now_s: float) -> views.OwnView:
-        """Return what this console wants and has."""
+        """Return the robot this console wants and holds, with its state."""
         held = self.held
         link_down_s = self.team.links.down_s(now_s)
         return views.OwnView(
@@ -173,12 +173,12 @@ class ConsoleModel:
         )
 
     def other_screens(self) -> list[str]:
-        """Return for each other screen of this console's person what it does, one line each."""
+        """Return one line for each other screen of this console's person: its host and its activity."""
         own = [screen for screen in self.team.screens_of(self.user) if component_of(screen.address) != self.name]
         return [f"your other screen on {screen.host} {screen.feedback or 'watches'}" for screen in own]
 
     def consent(self, now_s: float) -> views.ConsentView | None:
-        """Return what this operator is to decide first; None: nobody asks."""
+        """Return the question this operator is to decide next; None: no question is open."""
         if not self._sought:
             return None
         first, *others = self._sought.values()
@@ -193,7 +193,7 @@ class ConsoleModel:
         )
 
     def asked_line(self, now_s: float) -> str:
-        """Return in one line what came of asking others for their consent; empty: nobody was asked."""
+        """Return in one line the answers of other operators to this console's questions; empty: none was asked."""
         asked = self._asked_whom
         if asked is None:
             return ""
@@ -225,7 +225,7 @@ class ConsoleModel:
         return [_video(robot, seen, now_s) for robot, seen in sorted(self._pictures.items())]
 
     def links(self, now_s: float) -> list[views.LinkView]:
-        """Return the ways messages go; commands of this console among them."""
+        """Return the links of the mission, with the path of this console's commands."""
         links = self.team.links.views(now_s)
         if self.applied is not None and self.applied.took_s >= 0:
             line = f"{self.applied.command} was applied {max(0.0, now_s - self.applied.at_s):.1f} s ago"
@@ -233,7 +233,7 @@ class ConsoleModel:
         return links
 
     def log(self, count: int = LOG_SHOWN) -> list[StoryEvent]:
-        """Return the newest that happened, oldest first."""
+        """Return the newest events, oldest first."""
         return self.team.log(count)
 
     def status_line(self, now_s: float) -> str:
@@ -293,7 +293,7 @@ class ConsoleModel:
             case events.CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy, ends_claim=ends_claim):
                 if ends_claim:
                     self.asked, self._refused = None, detail
-                if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these are told in other words
+                if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these have their own alarms
                     alarms.happened(
                         views.AlarmKind.REFUSED, self.robot, f"refused: {detail}", at_s, remedy, f"refused:{code}"
                     )
@@ -304,7 +304,7 @@ class ConsoleModel:
                 self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
                 self._pictures.clear()
                 if not confirmed:
-                    line = f"{self.robot} was given back, but nobody confirmed it"
+                    line = f"{self.robot} was given back, but its ARC did not confirm it"
                     alarms.happened(views.AlarmKind.NO_ANSWER, self.robot, line, at_s, key="given_back")
             case events.PictureSeen(robot=robot, at_s=at_s):
                 seen = self._pictures.setdefault(robot, deque())
@@ -334,7 +334,7 @@ class ConsoleModel:
         return f"{who} {'lets you have' if heard.is_given else 'keeps'} {heard.robot}{reason}"
 
     def _is_held(self, now_s: float) -> bool:
-        """Return whether keys move a robot, as far as can be known now."""
+        """Return whether keys move a robot, as far as this console knows."""
         return self.held is not None and self.team.links.down_s(now_s) < 0
 
     def _lost_view(self, now_s: float) -> views.LostView | None:
@@ -345,7 +345,7 @@ class ConsoleModel:
         return msgspec.structs.replace(went, may_retake=is_up and self.asked is None)
 
     def _stale_line(self, now_s: float) -> str:
-        """Return what is wrong with the pictures of the robot that is held; empty if nothing is."""
+        """Return in one line the fault of the pictures of the robot held; empty: they are fresh."""
         if self.held is None or not self.sees:
             return ""
         seen = self._pictures.get(self.robot)
@@ -365,7 +365,7 @@ def _video(robot: str, seen: deque[events.PictureSeen], now_s: float) -> views.V
 
 
 def _slice_end(until_s: float, now_s: float) -> str:
-    """Return what is left of a slice, for people; empty: it has no end, or ends now."""
+    """Return the remaining seconds of a slice, for people; empty: it has no end, or ends now."""
     left_s = until_s - now_s
     if until_s < 0 or abs(left_s) < SLICE_TOLD_S:
         return ""

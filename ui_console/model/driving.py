@@ -1,10 +1,10 @@
-"""What a person wants of a robot, and for how long a pressed key counts.
+"""Drive commands of a person, and for how long a pressed key counts.
 
 Rules of this file: no bus, no clock; times are seconds of the machine, for hands do not speed up
 with the mission's clock.
 
-A terminal tells that a key is pressed, and again and again while it is held, never that it is let
-go. So a command stands for a moment after the last press and ends by itself (dead-man).
+A terminal reports each press of a key and its repeats while the key is held, never its release. So a command lasts for
+a moment after the last press and ends by itself (dead-man).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ REPEAT_EVERY_S = 0.1  # chosen: 10 Hz; commands end by themselves after 0.5 s at
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class DriveWish:
     """Turn the wheels at these speeds, rad/s, forward is positive."""
 
     left_rad_s: float
@@ -30,12 +30,12 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True)
-class Halt:
+class HaltWish:
     """Stop the wheels."""
 
 
 @dataclass(frozen=True, slots=True)
-class Jump:
+class JumpWish:
     """Jump once."""
 
 
@@ -46,7 +46,7 @@ class GiveBack:
 
 @dataclass(frozen=True, slots=True)
 class StopRobot:
-    """Emergency stop of one robot, whoever holds it."""
+    """Emergency stop of one robot, regardless of its holder."""
 
     robot: str
     reason: str = ""
@@ -59,15 +59,16 @@ class StopAll:
     reason: str = ""
 
 
-Command = Drive | Halt | Jump
+Command = DriveWish | HaltWish | JumpWish
+COMMAND_WORDS: dict[type[Command], str] = {DriveWish: "drive", HaltWish: "halt", JumpWish: "jump"}
 Wish = Command | GiveBack | StopRobot | StopAll
 
 Direction = Literal["forward", "backward", "left", "right"]
 
-STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages say what they want
+STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages send their wish
 
 
-def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> Drive:
+def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> DriveWish:
     """Return the wheel speeds for a stick or a drag pad.
 
     Args:
@@ -77,33 +78,33 @@ def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> Drive:
 
     Example:
         >>> drive_by_stick(1.0, 0.0, 4.0)
-        Drive(left_rad_s=4.0, right_rad_s=4.0)
+        DriveWish(left_rad_s=4.0, right_rad_s=4.0)
         >>> drive_by_stick(0.0, 1.0, 4.0)
-        Drive(left_rad_s=2.0, right_rad_s=-2.0)
+        DriveWish(left_rad_s=2.0, right_rad_s=-2.0)
     """
     forward, right = min(max(forward, -1.0), 1.0), min(max(right, -1.0), 1.0)
     left_share, right_share = forward + right / 2, forward - right / 2
     most = max(1.0, abs(left_share), abs(right_share))
-    return Drive(speed_rad_s * left_share / most, speed_rad_s * right_share / most)
+    return DriveWish(speed_rad_s * left_share / most, speed_rad_s * right_share / most)
 
 
-def drive_towards(direction: Direction, speed_rad_s: float) -> Drive:
+def drive_towards(direction: Direction, speed_rad_s: float) -> DriveWish:
     """Return the wheel speeds for a direction key; turns are on the spot, at half the speed.
 
     Example:
         >>> drive_towards("left", 4.0)
-        Drive(left_rad_s=-2.0, right_rad_s=2.0)
+        DriveWish(left_rad_s=-2.0, right_rad_s=2.0)
     """
     turn = speed_rad_s / 2
     match direction:
         case "forward":
-            return Drive(speed_rad_s, speed_rad_s)
+            return DriveWish(speed_rad_s, speed_rad_s)
         case "backward":
-            return Drive(-speed_rad_s, -speed_rad_s)
+            return DriveWish(-speed_rad_s, -speed_rad_s)
         case "left":
-            return Drive(-turn, turn)
+            return DriveWish(-turn, turn)
         case "right":
-            return Drive(turn, -turn)
+            return DriveWish(turn, -turn)
 
 
 class DriveSpan:
@@ -116,14 +117,14 @@ class DriveSpan:
         self._began_s: float | None = None
 
     def begins(self, command: Command, at_s: float) -> bool:
-        """Take in a command that was applied; return True if a drive begins with it."""
-        if self._began_s is not None or not isinstance(command, Drive):
+        """Take in an applied command; return True if a drive begins with it."""
+        if self._began_s is not None or not isinstance(command, DriveWish):
             return False
         self._began_s = at_s
         return True
 
     def ends(self, at_s: float) -> float | None:
-        """The wheels stand, or the robot is gone: return how long the drive took, seconds; None: there was none."""
+        """End the drive: the wheels stand, or the robot is gone. Return its duration, seconds; None: there was none."""
         began_s, self._began_s = self._began_s, None
         return None if began_s is None else max(0.0, at_s - began_s)
 
@@ -136,21 +137,21 @@ class DeadMan:
     """
 
     def __init__(self) -> None:
-        self._held: Drive | None = None
+        self._held: DriveWish | None = None
         self._pressed_s = self._until_s = self._next_s = 0.0
         self._repeats = 0
         self._must_halt = False
         self._keys, self._stick, self._jump = Grip(), Grip(), Grip()
 
-    # ------------------------------------------------------------------ the hands
-    def press(self, drive: Drive, now_s: float, lasts_s: float | None = None) -> bool:
-        """A key is down, for the first time or again; return whether that counts.
+    # ------------------------------------------------------------------ controls
+    def press(self, drive: DriveWish, now_s: float, lasts_s: float | None = None) -> bool:
+        """Take in that a key is down, for the first time or again; return whether that counts.
 
         Args:
-            drive: What it stands for.
+            drive: The command of the key.
             now_s: When.
-            lasts_s: How long that counts, for what says so again and again while it is held and tells when it is let
-                go; None: for a key, whose rhythm is found out.
+            lasts_s: How long the press counts, for a control that reports repeatedly while it is held and reports its
+                release; None: for a key, whose repeat rate is measured.
         """
         grip, silence_s = (self._keys, KEYS_LET_GO_S) if lasts_s is None else (self._stick, lasts_s)
         if not grip.press(now_s, silence_s):
@@ -167,23 +168,23 @@ class DeadMan:
         else:
             self._repeats, hold_s, self._next_s = 0, FIRST_HOLD_S, now_s
         self._held, self._pressed_s, self._until_s = drive, now_s, now_s + hold_s
-        self._must_halt = False  # what is held now comes in its place, and ends with one
+        self._must_halt = False  # the new press replaces the halt, and ends with one
         return True
 
     def press_jump(self, now_s: float) -> bool:
-        """The key or button for one jump is down, for the first time or again; return whether that counts."""
+        """Take in that the key for one jump is down, for the first time or again; return whether that counts."""
         return self._jump.press(now_s, KEYS_LET_GO_S)
 
     def stop(self) -> None:
-        """Nothing is held any more: a halt is due at once, also if nothing was.
+        """Take in that all controls are released: a halt is due at once, also if none was held.
 
-        A stick, pad or page says by this that it was let go; keys show it by a pause.
+        A stick, pad or page reports its release by this call; keys show theirs by a pause.
         """
         self._held, self._must_halt = None, True
         self._stick.let_go()
 
     def require_let_go(self) -> None:
-        """From now on presses move nothing until the control was let go; what is held now ends with a halt."""
+        """Ignore presses until the control was let go; the present drive ends with a halt."""
         self._must_halt = self._must_halt or self._held is not None
         self._held = None
         for grip in self._grips:
@@ -193,14 +194,14 @@ class DeadMan:
         """Return whether a control is held that has to be let go before it moves anything."""
         return any(grip.is_held_back(now_s) for grip in self._grips)
 
-    # ------------------------------------------------------------------ what is to be sent
-    def due(self, now_s: float) -> Drive | Halt | None:
+    # ------------------------------------------------------------------ commands to send
+    def due(self, now_s: float) -> DriveWish | HaltWish | None:
         """Return the command to send now, if one is due; asking counts as sending."""
         if self._held is not None and now_s >= self._until_s:
             self._held, self._must_halt = None, True
         if self._held is None:
             must_halt, self._must_halt = self._must_halt, False
-            return Halt() if must_halt else None
+            return HaltWish() if must_halt else None
         if now_s < self._next_s:
             return None
         self._next_s = now_s + REPEAT_EVERY_S
@@ -208,7 +209,7 @@ class DeadMan:
 
     @property
     def next_s(self) -> float | None:
-        """When something will be due next; None: not before a press."""
+        """When the next command is due; None: not before a press."""
         if self._must_halt:
             return 0.0
         return None if self._held is None else min(self._next_s, self._until_s)

@@ -1,4 +1,4 @@
-"""What a console hears: of its own robot, and of the whole mission; each event also as a line of JSON.
+"""Events of a console: of its own robot, and of the whole mission; each event also as a line of JSON.
 
 Rules of this file: no bus, no clock, no screen. Times are mission seconds.
 """
@@ -8,16 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 
 from backbone.component.messages import ComponentState, MissionTime, Parameters, SetParameter, Statistics, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal, code_of
-from backbone.mission_log import Log, PeopleKnown
+from backbone.mission_log.log import Log, PeopleKnown
+from backbone.mission_log.operators import OperatorActed
 from backbone.nameserver.messages import Components, Disappeared
-from backbone.operators import OperatorActed
 from backbone.picture.health import MissionHealth
 from backbone.picture.words import why_lost
 from backbone.rc_manager.messages import Leases
@@ -29,7 +28,7 @@ from ui_console.model.consent import Settled, Sought, Topic
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something happened at this mission time."""
+    """An event with its mission time."""
 
     at_s: float
 
@@ -37,7 +36,7 @@ class Event:
 # ---------------------------------------------------------------------- of its own robot
 @dataclass(frozen=True, slots=True)
 class Asked(Event):
-    """A robot was asked for."""
+    """A robot was requested."""
 
     robot: str
     kind: str
@@ -46,13 +45,13 @@ class Asked(Event):
 
 @dataclass(frozen=True, slots=True)
 class Granted(Event):
-    """The RCs are held; told again, with ``again``, after each suspension.
+    """The RCs are held; repeated, with ``again``, after each suspension.
 
     Attributes:
-        rcs: Kind → name of what is held.
+        rcs: Kind → name of each RC held.
         epochs: RC → epoch.
         until_s: The slice lasts at least until then.
-        asked_s: When it was asked for.
+        asked_s: When it was requested.
         again: True if it was held before.
     """
 
@@ -70,7 +69,7 @@ class Granted(Event):
 
 @dataclass(frozen=True, slots=True)
 class CommandApplied(Event):
-    """A robot did what it was told, perhaps clipped.
+    """A robot applied a command, perhaps clipped.
 
     Attributes:
         rc: The robot.
@@ -89,7 +88,7 @@ class CommandApplied(Event):
 
 @dataclass(frozen=True, slots=True)
 class CommandRefused(Event):
-    """Somebody said no; with ``ends_claim`` to the claim itself, so that nothing is waited for any more."""
+    """A peer refused; with ``ends_claim`` the claim itself was refused, so the console waits for nothing any more."""
 
     code: str
     detail: str
@@ -99,11 +98,11 @@ class CommandRefused(Event):
 
 @dataclass(frozen=True, slots=True)
 class LinkTrouble(Event):
-    """A peer did not answer: what was asked may or may not have happened.
+    """A peer did not answer: its action may or may not have happened.
 
     Attributes:
-        detail: What was not answered, for people.
-        command: The command of this console's hands that was not answered; empty: something else.
+        detail: The unanswered question, for people.
+        command: The unanswered drive command of this console's operator; empty: another message.
     """
 
     detail: str
@@ -111,7 +110,7 @@ class LinkTrouble(Event):
 
 
 def failed(at_s: float, error: Refusal | LinkError) -> CommandRefused | LinkTrouble:
-    """Return that something was refused, or not answered."""
+    """Return the event of a refusal, or of a missing answer."""
     if isinstance(error, Refusal):
         return CommandRefused(at_s, code_of(error), error.detail, error.remedy)
     return LinkTrouble(at_s, str(error))
@@ -123,8 +122,8 @@ class GivenBack(Event):
 
     Attributes:
         reason: Why.
-        confirmed: False if nobody confirmed it.
-        wanted: False if the operator did not ask for it: a robot that is lost.
+        confirmed: False if the ARC did not confirm it.
+        wanted: False if the operator did not release it: the robot was lost.
     """
 
     reason: str
@@ -134,7 +133,7 @@ class GivenBack(Event):
 
 @dataclass(frozen=True, slots=True)
 class LetGoNeeded(Event):
-    """A control that is held moves nothing before it is let go, or no longer so.
+    """A control that is held moves nothing before it is let go, or may move the robot again.
 
     Attributes:
         is_needed: True: let go, then press anew.
@@ -145,7 +144,7 @@ class LetGoNeeded(Event):
 
 @dataclass(frozen=True, slots=True)
 class MomentBegan(Event):
-    """A stop, a lift, a grant, a loss, or a broken link: what was pressed before it moves nothing any more."""
+    """A stop, a lift, a grant, a loss, or a broken link: earlier presses move nothing any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +160,7 @@ class Attention(Event):
     """The operator touched the console, or turned away from it.
 
     Attributes:
-        is_there: False: nobody is at the console.
+        is_there: False: the operator is away.
     """
 
     is_there: bool
@@ -169,13 +168,13 @@ class Attention(Event):
 
 @dataclass(frozen=True, slots=True)
 class ConsentAsked(Event):
-    """This console asked whether it may have what others hold, or lift what others stopped.
+    """This console asked other operators for a robot they hold, or to lift a stop they set.
 
     Attributes:
-        robot: What it is about.
-        of: Names of those who were asked.
-        until_s: Silence is a no from then on.
-        topic: What was asked for.
+        robot: The robot.
+        of: Names of the consoles asked.
+        until_s: The question times out then, which is a no.
+        topic: To have the robot, or to lift its stop.
     """
 
     robot: str
@@ -186,14 +185,14 @@ class ConsentAsked(Event):
 
 @dataclass(frozen=True, slots=True)
 class ConsentHeard(Event):
-    """Somebody who was asked decided, or did not in time.
+    """An operator answered this console's question, or it timed out.
 
     Attributes:
-        robot: What it was about.
-        user: Who decided.
-        is_given: True: it is being given back, or may move.
+        robot: The robot.
+        user: The person who decided.
+        is_given: True: the robot is being given back, or may move.
         reason: For people.
-        topic: What was asked for.
+        topic: To have the robot, or to lift its stop.
     """
 
     robot: str
@@ -225,7 +224,7 @@ Said = (
     | Suspended
     | Why
 )
-"""What components publish or answer, as it came over the bus."""
+"""Messages that components publish or answer, as they came over the bus."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +233,7 @@ class Heard(Event):
 
     Attributes:
         body: The message.
-        source: Address of the component that said it, where the message does not say of whom it speaks.
+        source: Address of the sender, for a message that does not name its component.
     """
 
     body: Said
@@ -248,7 +247,7 @@ class LinkHeard(Event):
     Attributes:
         is_up: Whether messages pass.
         latency_s: There and back, seconds of the machine; negative: not measured now.
-        until_s: The link counts as down if nothing more was heard of it by then.
+        until_s: The link counts as down if no newer measurement came by then.
     """
 
     is_up: bool
@@ -275,7 +274,7 @@ OwnEvent = (
 TeamEvent = Heard | LinkHeard
 ConsoleEvent = OwnEvent | TeamEvent
 
-_WORDS: dict[type[Any], str] = {
+_WORDS: dict[type[object], str] = {
     Suspended: "suspended",
     CommandApplied: "applied",
     CommandRefused: "refused",
@@ -340,9 +339,9 @@ def event_json(event: ConsoleEvent) -> bytes:
 
 
 FOR_SCRIPTS = (Schedule, StoryEvent, OperatorActed, StopState, Disappeared, ProcessFell, LinkTrouble, CommandRefused)
-"""What a program that watches a mission is told; the rest comes several times a second."""
+"""Events for a program that watches a mission; the other ones come several times a second."""
 
 
 def for_scripts(event: ConsoleEvent) -> list[bytes]:
-    """Return the event as one line of JSON if it is one for programs that watch, else none."""
+    """Return the event as one line of JSON if it is one for watching programs, else no line."""
     return [event_json(event)] if isinstance(said(event), FOR_SCRIPTS) else []

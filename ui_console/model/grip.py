@@ -1,10 +1,10 @@
-"""Whether one control is held, and whether it was let go since that was required.
+"""State of one control: held or not, and let go or not since that was required.
 
 Rules of this file: no bus, no clock; times are seconds of the machine.
 
-After a stop, a cut link or a change of holder a control that is still held must not move anything: only a hand that let
-go and presses anew means what happens now. Keys tell presses only, so a pause is what shows that they were let go;
-sticks, pads and pages also say it.
+After a stop, a cut link or a change of holder a control that is still held must not move anything: only an operator who
+let go and presses anew reacts to the present situation. Keys report presses only, so a pause shows their release;
+sticks, pads and pages report it.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import math
 class Grip:
     """One control of an operator.
 
-    Laws: after ``require_let_go`` no press counts until the control was let go; being let go is told, or is a silence
-    as long as the last press lasts.
+    Laws: after ``require_let_go`` no press counts until the control was let go; the release is reported, or is a
+    silence as long as the last press lasts.
     """
 
     def __init__(self) -> None:
@@ -24,18 +24,19 @@ class Grip:
         self._waits = False
 
     def require_let_go(self) -> None:
-        """From now on presses count for nothing until the control was let go."""
+        """Ignore presses until the control was let go."""
         self._waits = True
 
     def let_go(self) -> None:
-        """The control says that it is held no longer: the next press counts, unless that is required anew.
+        """Take in the release of the control: the next press counts, unless a release is required anew.
 
-        What was held a moment ago may still be when it is required right afterwards: screens say so for other reasons.
+        A control that was held a moment ago may still be held when a release is required right afterwards: screens also
+        report a release for other reasons.
         """
         self._waits = False
 
     def press(self, now_s: float, lasts_s: float) -> bool:
-        """The control is held, for the first time or still; return whether that counts.
+        """Take in that the control is held, for the first time or still; return whether that counts.
 
         Args:
             now_s: When.
@@ -48,10 +49,10 @@ class Grip:
         return counts
 
     def is_held_back(self, now_s: float) -> bool:
-        """Return whether it is held and has to be let go before it counts."""
+        """Return whether the control is held and has to be let go before it counts."""
         return self._waits and now_s < self._until_s
 
     @property
     def let_go_s(self) -> float | None:
-        """When a control that is held back counts as let go if nothing more is heard of it; None: none is."""
+        """When a control that is held back counts as let go if no press follows; None: it is not held back."""
         return self._until_s if self._waits and self._until_s > -math.inf else None

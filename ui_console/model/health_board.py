@@ -1,7 +1,7 @@
-"""What a console knows of the mission's health, and the alarms that follow from it.
+"""The mission's health as a console knows it, and the alarms that follow from it.
 
-Rules of this file: no bus, no clock, no screen; times are arguments. The launcher says every second how its mission
-is; a word that is too old counts no longer: then the mission is at best degraded, because the launcher is silent.
+Rules of this file: no bus, no clock, no screen; times are arguments. The launcher publishes the mission's health every
+second; a report that is too old counts no longer: then the mission is at best degraded, because the launcher is silent.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ REMEDY = "Look after the terminal of 'scout-backbone up'; 'scout-backbone down' 
 
 
 class HealthBoard:
-    """The newest word on the mission's health.
+    """The newest report on the mission's health.
 
     Args:
-        alarms: Where absences begin and end.
+        alarms: Book of the alarms for absences.
     """
 
     def __init__(self, alarms: AlarmBook) -> None:
@@ -27,24 +27,24 @@ class HealthBoard:
         self.rate = 1.0
         """Mission seconds per second of the machine."""
         self._said: MissionHealth | None = None
-        self._said_s: float | None = None  # or since when it is waited for
+        self._said_s: float | None = None  # or since when this console waits for the first report
         self._absent: frozenset[str] = frozenset()
 
     def take(self, said: MissionHealth, at_s: float) -> None:
-        """Take the launcher's word in."""
+        """Take the launcher's report in."""
         self._said, self._said_s = said, at_s
-        self._tell(said.absent, at_s)
+        self._raise_alarms(said.absent, at_s)
 
     def look(self, now_s: float) -> None:
-        """Find out whether the launcher is silent; its first word is waited for from the first look on."""
+        """Find out whether the launcher is silent; the wait for its first report begins with the first look."""
         if self._said_s is None:
             self._said_s = now_s
         silence = self._silence(now_s)
         if silence is not None and LAUNCHER_NAME not in self._absent:
-            self._tell([*(self._said.absent if self._said is not None else []), silence], now_s)
+            self._raise_alarms([*(self._said.absent if self._said is not None else []), silence], now_s)
 
     def view(self, now_s: float) -> HealthView | None:
-        """Return the word and one line for each absence; None: the launcher had no time yet to say anything."""
+        """Return the health and one line for each absence; None: the launcher had no time yet to report."""
         said, silence = self._said, self._silence(now_s)
         if silence is None:
             return HealthView(str(said.word), said.lines(now_s)) if said else None
@@ -57,8 +57,8 @@ class HealthBoard:
             return None
         return Absence(LAUNCHER_NAME, self._said_s, "it is silent, so what is shown may be old", "", REMEDY, vital=True)
 
-    def _tell(self, absent: list[Absence], at_s: float) -> None:
-        """Begin an alarm for each absence, and end those of what is back."""
+    def _raise_alarms(self, absent: list[Absence], at_s: float) -> None:
+        """Begin an alarm for each absence, and end the alarms of components that are back."""
         for absence in absent:
             what = "; ".join(part for part in (absence.cause, absence.doing) if part)
             line = f"{absence.name} is absent: {what}"

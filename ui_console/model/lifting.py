@@ -1,10 +1,10 @@
-"""Whose stop is it, and who is asked before it is lifted?
+"""Lifting a stop: its authors are asked first.
 
-Rules of this file: no bus, no clock, no screen. Why it is so: docs/decisions/0018.
+Rules of this file: no bus, no clock, no screen. The reasons: docs/decisions/0018.
 
-* To stop is one act, to lift another. A lift names the stop that was seen by its number: a newer one is never lifted.
-* Your own stop is lifted at once. Whoever else stopped the robot is asked first, each of them.
-* One no keeps the stop, and so does silence. Whoever left cannot be asked, and keeps no robot standing.
+* To stop is one act, to lift another. A lift names the stop on the screen by its number: a newer stop is never lifted.
+* An operator's own stop is lifted at once. Each other author of the stop is asked first.
+* One no keeps the stop, and so does silence. An author who left cannot be asked, and keeps no robot stopped.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from ui_console.model.consent import MAX_WHY, Consent
 
 
 class AskLift(Message, frozen=True):
-    """May this robot move again? Asked where it was stopped, and everywhere else if its author left that console.
+    """A console asks a stop's author whether the robot may move again: at the author's console, or everywhere.
 
     Attributes:
-        robot: Which.
-        author: Who stopped it: the one who decides.
-        console: By which console.
-        user: Who asks.
-        why: For people.
+        robot: The robot.
+        author: The person who stopped it and who decides.
+        console: The console by which the author stopped it.
+        user: The person who asks.
+        why: The reason, for people.
     """
 
     robot: Mention
@@ -42,19 +42,19 @@ class AskLift(Message, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class LiftNow:
-    """Nobody else has a say in it."""
+    """No other person has to be asked."""
 
 
 @dataclass(frozen=True, slots=True)
 class AskFirst:
-    """These decide; the stop is lifted if each of them says yes or has left."""
+    """These authors decide; the stop is lifted if each of them says yes or has left."""
 
     authors: tuple[Stopper, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class NotThatStop:
-    """The stop that was seen is not the one in force; nothing is lifted."""
+    """The stop on the screen is not the one in force; no stop is lifted."""
 
     line: str
 
@@ -63,12 +63,12 @@ LiftDecision = LiftNow | AskFirst | NotThatStop
 
 
 def decide_lift(stop: StopState, number: int, user: str, console: str) -> LiftDecision:
-    """Return what lifting this stop takes.
+    """Return how this stop is lifted.
 
     Args:
-        stop: How the robot is, as its RC says.
-        number: Of the stop that was seen on the screen.
-        user: Who wants to lift it.
+        stop: State of the robot's stop, as its RC reports.
+        number: Number of the stop on the screen.
+        user: The person who wants to lift it.
         console: Address of the console they sit at.
     """
     if not stop.is_stopped:
@@ -81,40 +81,40 @@ def decide_lift(stop: StopState, number: int, user: str, console: str) -> LiftDe
 
 
 def answer_of(author: Stopper, answers: Iterable[Consent]) -> Consent:
-    """Return what an author says who was asked at several consoles: one yes is a yes, and who is at none has left."""
+    """Return the answer of an author asked at several consoles: one yes is a yes; an author at none has left."""
     here = [answer for answer in answers if answer.is_here]
     left = Consent(True, author_name(author), "is not here any more", False)
     return next((answer for answer in here if answer.is_given), here[0] if here else left)
 
 
 def is_agreed(answers: Iterable[Consent]) -> bool:
-    """Return whether the stop is lifted after these answers of all who were asked."""
+    """Return whether the stop is lifted after these answers of all authors asked."""
     return all(answer.is_given for answer in answers)
 
 
 def authors(stop: StopState) -> tuple[Stopper, ...]:
-    """Return all who stopped the robot since it last moved, the first of them first."""
+    """Return all authors of stops since the robot last moved, the first of them first."""
     return Stopper(stop.by, stop.console), *stop.also
 
 
 def author_name(author: Stopper) -> str:
-    """Return what to call them, for people; consoles without a person by the console's name."""
+    """Return the author's name, for people; of a console without a person the console's name."""
     return component_of(author.by) if "/" in author.by else author.by
 
 
 def is_own(stop: StopState, user: str, console: str) -> bool:
-    """Return whether this operator stopped the robot, and nobody else did."""
+    """Return whether this operator alone stopped the robot."""
     return all(_is(author, user, console) for author in authors(stop))
 
 
 def lift_line(stop: StopState, user: str, console: str, is_there: Callable[[Stopper], bool]) -> str:
-    """Return in one line for people what it takes to lift the stop.
+    """Return in one line for people how the stop is lifted.
 
     Args:
         stop: In force.
-        user: Who may want to lift it.
+        user: The person who may want to lift it.
         console: Address of the console they sit at.
-        is_there: Says whether this author is there, as far as is known.
+        is_there: Returns whether this author is there, as far as is known.
     """
     match decide_lift(stop, stop.number, user, console):
         case AskFirst(others) if names := _names(author for author in others if is_there(author)):
@@ -127,7 +127,7 @@ def lift_line(stop: StopState, user: str, console: str, is_there: Callable[[Stop
 
 
 def question_line(user: str, robot: str, why: str) -> str:
-    """Return what an author is asked, in one sentence.
+    """Return the question to an author, in one sentence.
 
     Example:
         >>> question_line("ben", "scout1", "")

@@ -1,4 +1,4 @@
-"""Ways that messages go, and machines: the link to the hub, the RC manager's renewals, radios, hosts.
+"""Links and machines: the link to the hub, the RC manager's renewals, radios, hosts.
 
 Rules of this file: no bus, no clock, no screen; messages go in, views and alarms come out; times are arguments.
 """
@@ -20,10 +20,10 @@ NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped 
 
 
 class LinkBoard:
-    """What was heard of links and hosts.
+    """State of links and hosts, from messages.
 
     Args:
-        alarms: Where what is wrong with them begins and ends.
+        alarms: Book of the alarms for their faults.
     """
 
     def __init__(self, alarms: AlarmBook) -> None:
@@ -39,7 +39,7 @@ class LinkBoard:
 
     # ------------------------------------------------------------------ messages in
     def take_link(self, link: LinkHeard) -> None:
-        """Take in that the link came or went, or was measured."""
+        """Take in the state of the link, or a measurement of it."""
         if link.is_up:
             self._link_heard_s = link.at_s
             latency_s = link.latency_s if link.latency_s >= 0 else self._link.latency_s
@@ -49,13 +49,13 @@ class LinkBoard:
         self._alarms.hold(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
 
     def take_load(self, load: HostLoad, at_s: float) -> None:
-        """Take in how busy a host is."""
+        """Take in the load of a host."""
         self._hosts[load.host] = (at_s, load)
         line = f"{load.host} is busy at {load.cpu:.0%} of its {load.cores} cores"
         self._alarms.hold(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
 
     def take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
-        """Take in what a radio counted: packets that came too late are told of by their ARC."""
+        """Take in the counts of a radio: late packets raise an alarm of their ARC."""
         self._radios[radio] = values
         known = {(radio, name.removeprefix("overruns_")) for name in values}
         self._overruns = {key: count for key, count in self._overruns.items() if key[0] != radio or key in known}
@@ -72,7 +72,7 @@ class LinkBoard:
                 self._alarms.happened(AlarmKind.DEADLINE, arc, line, at_s, remedy, f"deadline:{radio}:{arc}")
 
     def take_leases(self, leases: Leases, at_s: float) -> None:
-        """Take in what the RC manager renewed."""
+        """Take in the leases the RC manager renewed."""
         self.leases, self._leases_s = leases, at_s
 
     def look(self, now_s: float) -> None:
@@ -81,16 +81,16 @@ class LinkBoard:
 
     # ------------------------------------------------------------------ views out
     def down_s(self, now_s: float) -> float:
-        """Return since when nothing is heard from the mission's hub; negative: the link is up."""
+        """Return since when the mission's hub is silent; negative: the link is up."""
         link = self._link
         return NONE_S if link.is_up and now_s <= link.until_s else self._link_heard_s
 
     def is_missing(self, rc: str) -> bool:
-        """Say whether the RC manager misses this RC."""
+        """Return whether the RC manager misses this RC."""
         return self.leases is not None and rc in self.leases.missing
 
     def is_host(self, name: str) -> bool:
-        """Say whether this is a machine of the mission."""
+        """Return whether this is a machine of the mission."""
         return name in self._hosts
 
     def hosts(self, now_s: float) -> list[HostView]:

@@ -1,30 +1,30 @@
-"""Without what a component cannot be well: by this alarms find the one cause that they share. Pure."""
+"""The components each component depends on: with them alarms find the cause they share. Pure."""
 
 from __future__ import annotations
 
 from backbone.component.messages import ComponentState
 from backbone.creator.messages import creator_name
+from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.people import is_console
 from backbone.scheduling.views import Schedule
 
 
 class Needs:
-    """What each component needs, as far as it was heard of."""
+    """The components each component needs, as far as messages name them."""
 
     def __init__(self) -> None:
         self._of: dict[str, frozenset[str]] = {}
 
     def heard(self, component: ComponentState) -> None:
-        """Take in on which machine a component runs, and for which console."""
+        """Take in the machine a component runs on, and the console it runs for."""
         name = component_of(component.address)
         needs = {component_of(component.requester)} if is_console(component.requester) else set[str]()
-        if not is_console(component.address):  # consoles are nobody's children
+        if not is_console(component.address):  # a console has no parent
             needs.add(creator_name(component.host))
         self._of[name] = frozenset(needs - {name})
 
     def forget(self, name: str) -> None:
-        """Forget one that left for good."""
+        """Forget a component that left for good."""
         self._of.pop(name, None)
 
     def of(self, name: str, schedule: Schedule | None) -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""Robots: who holds which, until when, who waits for it, and which stop is in force.
+"""Robots: the holder of each, the end of its slice, the waiting ARCs, and the stop in force.
 
 Rules of this file: no bus, no clock, no screen; messages go in, views and alarms come out; times are arguments.
 """
@@ -9,8 +9,8 @@ from collections.abc import Mapping
 
 from msgspec.structs import replace
 
+from backbone.mission_log.people import is_console, screens_of
 from backbone.naming import Subsystem, component_of
-from backbone.people import is_console, screens_of
 from backbone.picture.mission import MissionPicture
 from backbone.picture.words import because
 from backbone.rc_manager.messages import Leases
@@ -25,13 +25,13 @@ ROBOT_KIND = "scout"
 
 
 class RobotBoard:
-    """What is known of the robots.
+    """State of the robots, from messages.
 
     Args:
         picture: Of the mission.
-        alarms: Where stops begin and end.
-        links: Which RCs are missing.
-        lift_remedy: What an operator of this console does about a stop.
+        alarms: Book of the alarms for stops.
+        links: The RCs that are missing.
+        lift_remedy: Remedy for a stop, for an operator of this console.
     """
 
     def __init__(self, picture: MissionPicture, alarms: AlarmBook, links: LinkBoard, lift_remedy: str) -> None:
@@ -41,7 +41,7 @@ class RobotBoard:
 
     # ------------------------------------------------------------------ messages in
     def take_schedule(self, schedule: Schedule) -> None:
-        """Take in who holds what: a hold that is new counts as renewed when it began."""
+        """Take in the holders: a new hold counts as renewed when it began."""
         self._renewed = {
             (rc.rc, holder.arc, holder.epoch): self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
             for rc in schedule.rcs
@@ -49,12 +49,12 @@ class RobotBoard:
         }
 
     def take_leases(self, leases: Leases, at_s: float) -> None:
-        """Take in which holds were renewed."""
+        """Take in the holds that were renewed."""
         for lease in leases.leases:
             self._renewed[lease.rc, lease.arc, lease.epoch] = at_s
 
     def take_stop(self, stop: StopState, at_s: float) -> None:
-        """Take in that a robot was stopped, or may move again; what is older than what is known changes nothing."""
+        """Take in that a robot was stopped, or may move again; a message older than the last one changes nothing."""
         former = self._stops.get(stop.rc)
         if former is not None and (former.number, not former.is_stopped) > (stop.number, not stop.is_stopped):
             return
@@ -64,11 +64,11 @@ class RobotBoard:
         if stop.is_stopped:
             self._alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, self._lift_remedy)
         else:
-            self._alarms.retract(AlarmKind.STOPPED, stop.rc)  # who lifted it is in the log, and nothing is left to do
+            self._alarms.retract(AlarmKind.STOPPED, stop.rc)  # the log names who lifted it; nothing is left to do
 
     # ------------------------------------------------------------------ views out
     def views(self, now_s: float) -> list[RobotView]:
-        """Return the robots, sorted by name; none of them is anybody's own, and none has pictures."""
+        """Return the robots, sorted by name; none is marked as an operator's own, and none has pictures."""
         if self._picture.schedule is None:
             return []
         requests = {request.arc: request for request in self._picture.schedule.requests}
@@ -76,7 +76,7 @@ class RobotBoard:
         return [self._robot(rc, number, requests, now_s) for number, rc in enumerate(rcs, 1)]
 
     def names(self) -> list[str]:
-        """Return every robot heard of, in the schedule or as a component."""
+        """Return every known robot, from the schedule or from components."""
         schedule, there = self._picture.schedule, self._picture.components.values()
         in_schedule = {rc.rc for rc in (schedule.rcs if schedule else []) if rc.kind == ROBOT_KIND}
         return sorted(in_schedule | {component_of(one.address) for one in there if one.type == ROBOT_KIND})
@@ -90,10 +90,10 @@ class RobotBoard:
         """Return the same for a screen.
 
         Args:
-            robot: Which.
+            robot: The robot.
             now_s: Mission time.
-            user: Who looks at it; empty: nobody in particular.
-            console: Address of their console.
+            user: The person who looks at it; empty: no particular person.
+            console: Address of that person's console.
         """
         stop = self.stop_of(robot)
         if stop is None:
@@ -143,7 +143,7 @@ class RobotBoard:
         )
 
     def _is_there(self, author: Stopper) -> bool:
-        """Return whether who stopped a robot is there; True as long as nothing was heard of who is."""
+        """Return whether the author of a stop is there; True as long as no message names the operators there."""
         there = self._picture.components
         at = {author.console, *(screen.address for screen in screens_of(author.by, there.values()))} & there.keys()
         return any(there[one].state not in LEAVING for one in at) or not there

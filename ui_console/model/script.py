@@ -1,4 +1,4 @@
-"""Driving by a script: one JSON object a line, each with the time since the grant at which it holds.
+"""Driving by a script: one JSON object a line, each with the time since the grant from which it applies.
 
 ``{"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}`` drives until the next line, ``{"at_s": 1, "halt":
 true}`` stops, ``{"at_s": 2, "jump": true}`` jumps, ``{"at_s": 3, "release": true}`` gives the robot
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import msgspec
 
 from backbone.errors import Refusal
-from ui_console.model.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
+from ui_console.model.driving import REPEAT_EVERY_S, DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot, Wish
 
 
 class WrongScript(Refusal):
@@ -44,12 +44,12 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One line of a script: from this time since the grant, this is wanted.
+    """One line of a script: the wish from this time since the grant on.
 
     Attributes:
         at_s: That time.
-        wish: What is wanted.
-        at_once: True: if it comes from a pipe, it is wanted now.
+        wish: The command.
+        at_once: True: if it comes from a pipe, it applies now.
     """
 
     at_s: float
@@ -67,7 +67,7 @@ class ScriptReader:
         """Return the step of the next line, None for an empty one.
 
         Raises:
-            WrongScript: With the line's number and what is wrong with it.
+            WrongScript: A line is not valid; with its number and its fault.
         """
         self._number += 1
         if not text.strip():
@@ -96,16 +96,16 @@ class ScriptReader:
         if line.stop_all:
             return StopAll(line.reason)
         if line.halt:
-            return Halt()
+            return HaltWish()
         if line.jump:
-            return Jump()
+            return JumpWish()
         if line.release:
             return GiveBack()
         if line.left_rad_s is None or line.right_rad_s is None:
             raise self._wrong("left_rad_s and right_rad_s belong together")
         if not (math.isfinite(line.left_rad_s) and math.isfinite(line.right_rad_s)):
             raise self._wrong("a wheel speed is not finite")
-        return Drive(line.left_rad_s, line.right_rad_s)
+        return DriveWish(line.left_rad_s, line.right_rad_s)
 
     def _wrong(self, what: str) -> WrongScript:
         return WrongScript(f"script line {self._number}: {what}", line=self._number)
@@ -119,7 +119,7 @@ def read_script(text: str) -> list[Step]:
 
     Example:
         >>> read_script('{"at_s": 0, "halt": true}')
-        [Step(at_s=0.0, wish=Halt(), at_once=False)]
+        [Step(at_s=0.0, wish=HaltWish(), at_once=False)]
     """
     reader = ScriptReader()
     return [step for line in text.splitlines() if (step := reader.read(line)) is not None]
@@ -130,20 +130,20 @@ class ScriptPlayer:
 
     Laws: no command before its time; a drive is repeated until the next line, as commands end by
     themselves at the robot; nothing after ``GiveBack``, which comes exactly once; after ``require_let_go`` no drive and
-    no jump before a halt: what a hand does by letting go, a script does by that line.
+    no jump before a halt: in a script this line stands for letting go of a control.
     """
 
     def __init__(self, steps: list[Step] | None = None) -> None:
         self._steps = deque(steps or [])
         self._ended = steps is not None
-        self._drive: Drive | None = None
+        self._drive: DriveWish | None = None
         self._next_s = 0.0
         self._over = self.must_let_go = False
         self.held_back = 0
         """How many lines were left out because no halt came before them."""
 
     def require_let_go(self) -> None:
-        """From now on lines move nothing before one of them halts."""
+        """Ignore drives and jumps until a line halts."""
         self._drive, self.must_let_go = None, True
 
     @property
@@ -152,15 +152,15 @@ class ScriptPlayer:
         return self._over
 
     def add(self, step: Step) -> None:
-        """Another step arrived; one whose time has passed is due at once."""
+        """Add a step; a step whose time has passed is due at once."""
         self._steps.append(step)
 
     def end(self) -> None:
-        """No step will follow."""
+        """Note that no step will follow."""
         self._ended = True
 
     def due(self, since_grant_s: float) -> list[Wish]:
-        """Return what is to be done now, in order; asking counts as doing.
+        """Return the commands to send now, in order; a command returned counts as sent.
 
         Args:
             since_grant_s: Mission seconds since the grant.
@@ -168,13 +168,13 @@ class ScriptPlayer:
         wishes: list[Wish] = []
         while self._steps and self._steps[0].at_s <= since_grant_s and not self._over:
             wish = self._steps.popleft().wish
-            self.must_let_go = self.must_let_go and not isinstance(wish, Halt)
-            if self.must_let_go and isinstance(wish, Drive | Jump):
+            self.must_let_go = self.must_let_go and not isinstance(wish, HaltWish)
+            if self.must_let_go and isinstance(wish, DriveWish | JumpWish):
                 self.held_back += 1
                 continue
             self._over = isinstance(wish, GiveBack)
-            if isinstance(wish, Drive | Halt | GiveBack):
-                self._drive = wish if isinstance(wish, Drive) else None
+            if isinstance(wish, DriveWish | HaltWish | GiveBack):
+                self._drive = wish if isinstance(wish, DriveWish) else None
             self._next_s = since_grant_s + REPEAT_EVERY_S
             wishes.append(wish)
         if self._ended and not self._steps and not self._over:
@@ -187,7 +187,7 @@ class ScriptPlayer:
 
     @property
     def next_s(self) -> float | None:
-        """Seconds since the grant at which something is due next; None: not before another step arrives."""
+        """Seconds since the grant at which the next command is due; None: not before another step arrives."""
         if self._over:
             return None
         times = [self._steps[0].at_s] if self._steps else [0.0] if self._ended else []

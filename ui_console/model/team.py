@@ -1,10 +1,10 @@
-"""What is known of the whole mission: robots, behavior tree, schedule, alarms, links. The same for everybody who looks.
+"""Model of the whole mission: robots, behavior tree, schedule, alarms, links. The same for every operator.
 
 Rules of this file: no bus, no clock, no screen. Events go in, views come out; times are mission seconds, and *now* is
 an argument. Several consoles in one process may share one model.
 
-What only time can tell (a request that starves, a radio that is silent) is found by ``look``, which whoever shows the
-model calls before it shows it.
+``look`` raises the alarms that depend on time (a request that starves, a silent radio); a screen calls it before it
+takes a view.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from backbone.component.messages import (
     StoryEvent,
 )
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.mission_log import AskLog, Log, PeopleKnown
+from backbone.mission_log.log import AskLog, Log, PeopleKnown
+from backbone.mission_log.operators import OperatorActed
+from backbone.mission_log.people import is_console, screens_of
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.naming import Subsystem, component_of
-from backbone.operators import OperatorActed
-from backbone.people import is_console, screens_of
 from backbone.picture.health import MissionHealth
 from backbone.picture.mission import LOG_KEPT, MissionPicture, is_older
 from backbone.picture.words import because
@@ -49,27 +49,27 @@ from ui_console.model.tree_board import TreeBoard
 from ui_console.model.views import LEAVING, AlarmKind, AlarmView, HealthView, NodeView, ParameterView, Severity
 
 STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
-PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees
+PAST_S, NEXT_S = 60.0, 30.0  # chosen: as far as a person remembers, and as far as the schedule predicts
 
 
 class TeamModel:
-    """All that a console knows of the mission.
+    """The knowledge of a console about the mission.
 
     Args:
         mission: Its name.
-        lift_remedy: What an operator of this console does about a stop.
+        lift_remedy: Remedy for a stop, for an operator of this console.
     """
 
     def __init__(self, mission: str = "", lift_remedy: str = "Lift the stop when the robot may move.") -> None:
         self.picture = MissionPicture(mission)
-        """What everybody knows of it who listens."""
+        """The mission as every observer sees it."""
         self.alarms = AlarmBook()
         self.people = self.picture.people
-        """Who sits at which console."""
+        """The person at each console."""
         self.links = LinkBoard(self.alarms)
-        """Ways that messages go, and machines."""
+        """Links and machines."""
         self.robots = RobotBoard(self.picture, self.alarms, self.links, lift_remedy)
-        """Who holds which robot, and which stop is in force."""
+        """The holder of each robot, and its stop in force."""
         self._health = HealthBoard(self.alarms)
         self._timeline = Timeline(self.person)
         self._lost: dict[str, tuple[float, ComponentState]] = {}
@@ -81,7 +81,7 @@ class TeamModel:
 
     @property
     def schedule(self) -> Schedule | None:
-        """As last heard."""
+        """The newest schedule."""
         return self.picture.schedule
 
     # ------------------------------------------------------------------ events in
@@ -129,12 +129,12 @@ class TeamModel:
             case SetParameter():
                 self._take_change(said, source, at_s)
             case Why() | Suspended():
-                """Of one console, which keeps it."""
+                """A question for one console, which keeps it."""
             case _:
                 assert_never(said)
 
     def look(self, now_s: float) -> None:
-        """Find out what only time can tell."""
+        """Raise and end the alarms that depend on time."""
         self.alarms.look(now_s)
         self._health.look(now_s)
         self.links.look(now_s)
@@ -153,7 +153,7 @@ class TeamModel:
         """Return the name of the person at a console, also of one that has left; any other name stays as it is.
 
         Args:
-            console_name: Name or address of a console, or of what it claims.
+            console_name: Name or address of a console, or of its ARC.
         """
         return self.people.person(console_name)
 
@@ -175,15 +175,15 @@ class TeamModel:
         return self._timeline.view(now_s, PAST_S, NEXT_S)
 
     def health(self, now_s: float) -> HealthView | None:
-        """Return how the mission is; None: not known yet."""
+        """Return the mission's health; None: not known yet."""
         return self._health.view(now_s)
 
     def parameters(self) -> list[ParameterView]:
-        """Return the parameters of the components that were asked for theirs, by component and name."""
+        """Return the parameters of the components that answered with theirs, by component and name."""
         return [view for _, view in sorted(self._parameters.items())]
 
     def components(self) -> list[ComponentState]:
-        """Return the components that are there, by address, doing what they do by the names of people."""
+        """Return the components that are there, by address; their feedback names people."""
         return [replace(component, feedback=self.people.doing(component)) for component in self._shown()]
 
     def component(self, name: str) -> ComponentState | None:
@@ -193,12 +193,12 @@ class TeamModel:
     def log(
         self, count: int = LOG_KEPT, asked: AskLog | None = None, found: Sequence[StoryEvent] = ()
     ) -> list[StoryEvent]:
-        """Return the newest that happened, oldest first.
+        """Return the newest events, oldest first.
 
         Args:
             count: At most so many.
-            asked: Only what fits; None: all.
-            found: What the launcher's log has of it; what was heard here since comes after that.
+            asked: Only events that match; None: all.
+            found: Matching events of the launcher's log; newer events of this console follow them.
         """
         log = self.picture.log
         if asked is None:
@@ -225,7 +225,7 @@ class TeamModel:
         for arc in before - now:
             self.alarms.end(AlarmKind.STARVING, arc, schedule.at_s)
         for rc in schedule.rcs:
-            is_down = rc.state == "down" and rc.rc not in self._left  # who was told to end is not missed
+            is_down = rc.state == "down" and rc.rc not in self._left  # an RC that was stopped is not missed
             self.alarms.hold(is_down, AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
         self.robots.take_schedule(schedule)
 
@@ -257,7 +257,7 @@ class TeamModel:
         if component.state is LifeState.STOPPED:
             self._lost.pop(address, None)
             if known is None:
-                self.alarms.retract(AlarmKind.LOST, name)  # its last word came after the word that it is gone
+                self.alarms.retract(AlarmKind.LOST, name)  # its last state came after the message of its loss
             return
         if component.state is LifeState.FAILED:
             self.alarms.happened(AlarmKind.LOST, name, f"{name} failed: {component.feedback}", at_s)
@@ -283,8 +283,8 @@ class TeamModel:
         is_arc = name in self._arcs
         self._arcs.discard(name)
         if is_arc and is_console(component.requester):
-            return  # it ends with its console, which is told of
-        if is_arc or is_console(address):  # nobody restarts these by themselves, and nothing is left to be mended
+            return  # it ends with its console, which has an alarm of its own
+        if is_arc or is_console(address):  # no component restarts these, and nothing is left to be mended
             who = f"the console of {component.user}" if component.user else name
             line = f"{who} is lost: it ended without a word"
             self.alarms.happened(AlarmKind.LOST, name, line, at_s, severity=Severity.NOTICE)
@@ -294,14 +294,14 @@ class TeamModel:
         self.alarms.begin(AlarmKind.LOST, name, line, at_s)
 
     def _forget(self, name: str) -> None:
-        """Forget what was known of one that left for good: consoles and their ARCs come and go all day."""
+        """Forget a component that left for good: consoles and their ARCs come and go all day."""
         self._arcs.discard(name)
         self._needs.forget(name)
         self._tree.forget(name)
         for key in [key for key in self._parameters if key[0] == name]:
             del self._parameters[key]
 
-    # ------------------------------------------------------------------ what alarms are about
+    # ------------------------------------------------------------------ subjects of alarms
     def _explained_by(self, subject: str) -> frozenset[str]:
         return self._needs.of(subject, self.schedule)
 
@@ -329,9 +329,9 @@ class TeamModel:
         line = f"{fell.name} fell: {fell.how}; {again}{said}"
         self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, key=f"fell:{fell.name}", severity=severity)
 
-    # ------------------------------------------------------------------ what happened
+    # ------------------------------------------------------------------ changes of parameters
     def _take_change(self, change: SetParameter, address: str, at_s: float) -> None:
-        """Note who changed a parameter; its new value comes right after, at the same time."""
+        """Note the author of a change of a parameter; its new value comes right after, at the same time."""
         key = (component_of(address), change.name)
         before = self._parameters[key].value if key in self._parameters else ""
         self._parameters[key] = ParameterView(key[0], address, change.name, "", before, change.user, at_s)

@@ -1,10 +1,10 @@
-"""Who had which resource, who has it, who comes next: the schedule over time.
+"""The schedule over time: past, present and predicted holders of each resource.
 
 Rules of this file: no bus, no clock, no screen. Schedules go in, in the order of their times; a view comes out, and
 *now* is an argument.
 
-* Turns of a resource with one holder at a time never overlap, whatever the order in which things were heard.
-* A turn that was seen stays for ``HISTORY_S`` after its end, then it is forgotten.
+* Turns of a resource with one holder at a time never overlap, in any order of the messages.
+* A turn stays for ``HISTORY_S`` after its end, then it is forgotten.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from enum import StrEnum
 import msgspec
 from msgspec.structs import replace
 
+from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.people import is_console
 from backbone.scheduling.views import RcView, RequestView, Schedule
 
 HISTORY_S = 180.0  # chosen: several rounds of a mission whose turns are seconds
@@ -34,7 +34,7 @@ class Certainty(StrEnum):
 
 
 class SliceView(msgspec.Struct, frozen=True):
-    """Somebody's turn with a resource.
+    """A turn of one ARC with a resource.
 
     Attributes:
         who: Decision process.
@@ -65,7 +65,7 @@ class TimelineRow(msgspec.Struct, frozen=True):
 
 
 class TimelineView(msgspec.Struct, frozen=True):
-    """Who had which resource, who has it, who comes next."""
+    """Past, present and predicted holders of each resource."""
 
     from_s: float
     now_s: float
@@ -87,7 +87,7 @@ class Timeline:
     """The turns of every resource.
 
     Args:
-        person: Returns the name of the person at a console; who is there may be heard later than what they hold.
+        person: Returns the name of the person at a console, which may become known later than the console's hold.
     """
 
     def __init__(self, person: Callable[[str], str] = component_of) -> None:
@@ -96,7 +96,7 @@ class Timeline:
         self._at_s = 0.0
 
     def heard(self, schedule: Schedule) -> None:
-        """Take in a schedule; one that is older than the last changes nothing."""
+        """Take in a schedule; a schedule older than the last one changes nothing."""
         if schedule.at_s < self._at_s:
             return
         self._at_s = schedule.at_s
@@ -112,7 +112,7 @@ class Timeline:
                 row.past.popleft()
 
     def view(self, now_s: float, past_s: float, next_s: float) -> TimelineView:
-        """Return the part of it around now.
+        """Return the part of the timeline around now.
 
         Args:
             now_s: Mission time.
@@ -156,7 +156,7 @@ def _update(row: _Row, rc: RcView, requests: dict[str, RequestView], at_s: float
 def _begun(
     row: _Row, rc: RcView, key: tuple[str, int], since_s: float, requests: dict[str, RequestView], at_s: float
 ) -> SliceView:
-    """Return a turn that was not known; it cannot have begun before the last one ended, nor after it was told."""
+    """Return a new turn; it began neither before the last one ended nor after the schedule that has it."""
     arc, epoch = key
     earliest_s = 0.0 if rc.sharable else row.free_since_s
     from_s = min(max(since_s, earliest_s), max(at_s, earliest_s))

@@ -1,7 +1,7 @@
 """The behavior tree as a console's table shows it.
 
-Rules of this file: no bus, no clock, no screen. It remembers what schedules and stories tell of nodes; which nodes
-there are, and which are lost, it is told when it is looked at.
+Rules of this file: no bus, no clock, no screen. The board remembers the nodes' priorities from schedules and their ends
+from stories; the nodes that exist, and the lost ones, are arguments of a view.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.mission_log.people import People
 from backbone.naming import Subsystem, component_of
-from backbone.people import People
 from backbone.picture.words import because
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule
@@ -26,10 +26,10 @@ _STATE_OF_REQUEST = {
 
 
 class TreeBoard:
-    """What is known of the nodes.
+    """State of the nodes, from messages.
 
     Args:
-        people: Who sits at which console.
+        people: The person at each console.
     """
 
     def __init__(self, people: People) -> None:
@@ -38,21 +38,21 @@ class TreeBoard:
         self._priorities: dict[str, int] = {}
 
     def scheduled(self, schedule: Schedule) -> None:
-        """Take in the priorities of all nodes that asked for something."""
+        """Take in the priorities of all nodes with a request."""
         self._priorities |= _priorities(schedule.requests)
 
     def told(self, story: StoryEvent) -> None:
-        """Take in that a node finished, if it says so of itself."""
+        """Take in that a node finished, if this is its own report."""
         head, _, status = story.what.partition(": ")
         if head == "finished" and component_of(story.where) == story.subject and status in ("success", "failure"):
             self._finished[story.subject] = (story.at_s, NodeState(status))
 
     def begins(self, name: str) -> None:
-        """Forget how a node of this name finished: another life of it begins."""
+        """Forget the end of a node of this name: another life of it begins."""
         self._finished.pop(name, None)
 
     def forget(self, name: str) -> None:
-        """Forget one that left for good."""
+        """Forget a node that left for good."""
         self._finished.pop(name, None)
         self._priorities.pop(name, None)
 
@@ -63,8 +63,8 @@ class TreeBoard:
 
         Args:
             components: Of the mission; behaviors among them are nodes.
-            lost: Since when which addresses are lost.
-            schedule: As last heard.
+            lost: Address of each lost node → since when.
+            schedule: The newest.
         """
         requests = {component_of(request.owner): request for request in (schedule.requests if schedule else [])}
         nodes = {node.address: node for node in components if node.address.startswith(f"{Subsystem.MISSION_CONTROL}/")}

@@ -1,13 +1,12 @@
-"""What screens show, as plain values: messages by the names of people, and a struct for each other kind of row.
+"""Content of screens as plain values: messages by the names of people, and a struct for each other kind of row.
 
-Times ending in ``_s`` are mission seconds; ages, and what is left, are seconds counted from the view's ``now_s``. A
-negative time, age or rest means that there is none.
+Times ending in ``_s`` are mission seconds; ages and remaining times are seconds counted from the view's ``now_s``. A
+negative time, age or remaining time means that there is none.
 """
 
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any
 
 import msgspec
 
@@ -18,52 +17,52 @@ from backbone.wire import plain
 from ui_console.model.timeline import TimelineView
 
 NONE_S = -1.0
-"""In place of a time, an age or a rest: there is none."""
+"""In place of a time, an age or a remaining time: there is none."""
 
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
-"""States of a component that is not missed when it is gone."""
+"""States of a component whose end raises no alarm."""
 
 
 class Severity(StrEnum):
     """How much an alarm matters, most first."""
 
-    ALARM = "alarm"  # a robot may do what it should not, or nothing any more
+    ALARM = "alarm"  # a robot may do something it should not, or nothing any more
     WARNING = "warning"  # the mission goes on, less well
     NOTICE = "notice"  # an operator should know
 
 
 class AlarmKind(StrEnum):
-    """What an alarm is about."""
+    """Subject of an alarm."""
 
     STOPPED = "stopped"  # an operator stopped a robot
-    LOST = "lost"  # a component is gone that nobody ended
+    LOST = "lost"  # a component ended without a request to stop
     ABSENT = "absent"  # a component is wanted and absent
     UNSAFE = "unsafe"  # an RC did not reach its safe state
     RC_DOWN = "rc_down"  # the RC manager cannot reach an RC
     LINK = "link"  # this console has no link to the hub
-    STALE_VIDEO = "stale_video"  # the picture driven by is old
+    STALE_VIDEO = "stale_video"  # the picture the operator drives by is old
     STARVING = "starving"  # a request waits long and no end is in sight
     DEADLINE = "deadline"  # packets on a radio come too late
     OVERLOAD = "overload"  # a host has no time to spare
-    TAKEN = "taken"  # this console's robot went to somebody else
-    REFUSED = "refused"  # somebody said no to this console
-    NO_ANSWER = "no_answer"  # somebody did not answer this console
+    TAKEN = "taken"  # another ARC got this console's robot
+    REFUSED = "refused"  # a component refused a request of this console
+    NO_ANSWER = "no_answer"  # a component did not answer this console
     NOT_RECORDED = "not_recorded"  # the trace of the schedule cannot be written any more
-    VISITOR = "visitor"  # somebody who was not let in, or misbehaves, at the web console
+    VISITOR = "visitor"  # a client of the web console failed to authenticate, or broke the protocol
 
 
 class StopView(msgspec.Struct, frozen=True):
     """An operator's stop that is in force.
 
     Attributes:
-        number: To lift it by.
-        reason: As given.
-        age_s: For how long.
+        number: A lift names the stop by it.
+        reason: As its author gave it.
+        age_s: Age of the stop.
         is_confirmed: False if the wheels may still turn for a moment.
-        by_user: Who stopped it first, for people.
-        also: Who else stopped it since, for people.
-        is_mine: True if this operator stopped it, and nobody else.
-        lift_line: What lifting it needs, for people.
+        by_user: Its first author, for people.
+        also: Further authors since, for people.
+        is_mine: True if this operator is its only author.
+        lift_line: How it is lifted, for people.
     """
 
     number: int
@@ -82,7 +81,7 @@ class VideoView(msgspec.Struct, frozen=True):
     Attributes:
         robot: The robot.
         age_s: Since the newest was taken.
-        rate_hz: How many arrived a second lately.
+        rate_hz: Pictures a second, lately.
         latency_s: From capture to here, of the newest.
         is_stale: True: do not drive by it.
     """
@@ -101,7 +100,7 @@ class RobotView(msgspec.Struct, frozen=True):
         robot: Its name.
         number: Its place in the list, from 1; the key that picks it.
         is_up: False if its RC cannot be reached.
-        holder: Decision process that has it; empty: nobody.
+        holder: Decision process that holds it; empty: none.
         arc: The holder's ARC.
         is_console: True if the holder is a console.
         is_mine: True if this console has it.
@@ -112,10 +111,10 @@ class RobotView(msgspec.Struct, frozen=True):
         lease_left_s: Until the hold ends unless it is renewed.
         lease_age_s: Since the last renewal was heard.
         because: Why the holder has it.
-        waiting: Who wants it, the next first.
+        waiting: Decision processes that wait for it, the next first.
         stop: The operator's stop in force; None: it may move.
         video: Its pictures; None: this console gets none.
-        feedback: What its RC says.
+        feedback: Feedback of its RC.
     """
 
     robot: str
@@ -139,7 +138,7 @@ class RobotView(msgspec.Struct, frozen=True):
 
 
 class NodeState(StrEnum):
-    """How a node of the behavior tree is."""
+    """State of a node of the behavior tree."""
 
     RUNNING = "running"  # holds its ARC, or needs none
     WAITING = "waiting"  # wants its ARC
@@ -159,10 +158,10 @@ class NodeView(msgspec.Struct, frozen=True):
         parent: Name of its parent; empty for a root.
         depth: 0 for a root.
         priority: Among its siblings, as far as it is known; None: nothing at or below it ever asked for an ARC.
-        state: How it is.
+        state: Its state.
         since_s: Since when.
-        feedback: What it says it is doing.
-        arc: What it claims; empty: nothing yet.
+        feedback: Its activity, in its own words.
+        arc: The ARC it claims; empty: none yet.
         because: Why its ARC waits or runs.
     """
 
@@ -182,22 +181,22 @@ class AlarmView(msgspec.Struct, frozen=True):
     """One alarm.
 
     Attributes:
-        key: What it is acknowledged by.
-        kind: What it is about.
+        key: Key to acknowledge it.
+        kind: Its subject.
         severity: How much it matters.
         subject: Name to ask ``why`` about.
-        line: What happened.
-        remedy: What to do about it now; empty: nothing, or it is over.
+        line: The event or condition, for people.
+        remedy: An action against it; empty: none is needed, or it is over.
         first_s: When it happened first.
         last_s: When it happened last, or since when it has been over.
         count: How often.
         is_active: True while it is so; False: it is over, or was an event.
-        acknowledged_by: Who has seen it; empty: nobody.
+        acknowledged_by: The person who acknowledged it; empty: none.
         while_away: True if it came while the operator was away and is not acknowledged.
-        where: Where to look, for people: what the subject is, on which machine; empty: nowhere.
+        where: Type and machine of the subject, for people; empty: unknown.
         robot: The robot it is about, whose row and picture to show; empty: none.
-        also: What follows from the same cause, one line each.
-        keys: What this line and those are acknowledged by.
+        also: Consequences of the same cause, one line each.
+        keys: Keys to acknowledge this line and its consequences.
     """
 
     key: str
@@ -219,18 +218,18 @@ class AlarmView(msgspec.Struct, frozen=True):
 
 
 class HostView(msgspec.Struct, frozen=True):
-    """One machine of the mission: what its creator said, so many seconds ago."""
+    """One machine of the mission: its creator's report, and the report's age."""
 
     load: HostLoad
     age_s: float
 
 
 class LinkView(msgspec.Struct, frozen=True):
-    """A way that messages go.
+    """A link.
 
     Attributes:
         name: ``hub``; ``commands`` to this console's robot; a radio's name.
-        is_up: False if nothing passes.
+        is_up: False if no message passes.
         latency_s: There and back.
         feedback: More about it for people.
     """
@@ -242,7 +241,7 @@ class LinkView(msgspec.Struct, frozen=True):
 
 
 class ParameterView(msgspec.Struct, frozen=True):
-    """One parameter of a component, as last heard.
+    """One parameter of a component, by its newest report.
 
     Attributes:
         component: Name of the component.
@@ -250,8 +249,8 @@ class ParameterView(msgspec.Struct, frozen=True):
         name: Name of the parameter.
         value: As JSON.
         before: As JSON, before the change that this console saw; empty: it saw none.
-        changed_by: Who changed it.
-        changed_s: When.
+        changed_by: Author of the change.
+        changed_s: Time of the change.
     """
 
     component: str
@@ -264,14 +263,14 @@ class ParameterView(msgspec.Struct, frozen=True):
 
 
 class ConsentView(msgspec.Struct, frozen=True):
-    """Somebody asks for what this console holds, or to lift what its operator stopped.
+    """An operator asks for the robot this console holds, or to lift a stop of this console's operator.
 
     Attributes:
-        user: Who.
-        robot: For what.
-        why: Why, for people.
-        left_s: Seconds until silence is a no.
-        others: How many more ask.
+        user: The operator who asks.
+        robot: The robot.
+        why: The reason, for people.
+        left_s: Seconds until the question times out, which is a no.
+        others: Number of further questions.
         topic: ``take``: to have the robot; ``lift``: to let it move again.
         line: The question in one sentence, for people.
     """
@@ -286,13 +285,13 @@ class ConsentView(msgspec.Struct, frozen=True):
 
 
 class LostView(msgspec.Struct, frozen=True):
-    """A robot that this operator held, and that went without their asking for it.
+    """A robot that this operator held and lost without releasing it.
 
     Attributes:
-        robot: Which.
-        why: For people.
-        at_s: When.
-        may_retake: True if taking it can be offered: it is there, and this console does not ask for one already.
+        robot: The robot.
+        why: The reason, for people.
+        at_s: Time of the loss.
+        may_retake: True if the screen offers to take it back: it is there, and this console has no request.
     """
 
     robot: str
@@ -302,27 +301,27 @@ class LostView(msgspec.Struct, frozen=True):
 
 
 class OwnView(msgspec.Struct, frozen=True):
-    """What this console wants and has.
+    """The robot this console wants or holds, and its operator's state.
 
     Attributes:
         console: Its name.
-        user: Who sits at it.
+        user: The person at it.
         robot: Robot wanted or held; empty: any, or none.
         is_held: True: keys move it; never while the link is down.
         is_asked: True: it is wanted.
         status: In one line: whether it is held, and if not, why.
         epoch: Of the grant; 0: none.
         until_s: End of the slice.
-        taken_because: Why and by whom it was taken, while it is.
-        applied: The last command that was applied, for people.
+        taken_because: While another ARC has the robot: the reason, and that ARC's owner.
+        applied: The last command applied, for people.
         stop: The stop in force on the robot held; None: it may move.
         away_since_s: Since when the operator is away.
-        consent: What this operator is asked; None: nothing.
-        asked: In one line what came of asking others; empty: nobody was asked.
+        consent: The question this operator is to answer; None: none.
+        asked: In one line the answers of other operators to this console's questions; empty: none was asked.
         other_screens: Where else the same person sits, one line each: one person with several screens.
         must_let_go: True: a control is held that moves nothing before it is let go and pressed anew.
-        lost: The robot that went without the operator asking for it, until they take one or dismiss it.
-        link_down_s: Since when this console hears nothing from the mission's hub; negative: the link is up.
+        lost: The robot lost without a release, until the operator takes one or dismisses it.
+        link_down_s: Since when the mission's hub is silent; negative: the link is up.
         moment: Grows with each stop, lift, grant and loss; a press that began at an earlier one moves nothing.
     """
 
@@ -348,11 +347,11 @@ class OwnView(msgspec.Struct, frozen=True):
 
 
 class HealthView(msgspec.Struct, frozen=True):
-    """How the mission is.
+    """The mission's health.
 
     Attributes:
         word: ``ok``, ``degraded`` or ``failed``.
-        lines: What is wanted and absent, since when, why, and what is done about it; one line each.
+        lines: One line for each wanted and absent component: since when, why, and its remedy.
     """
 
     word: str
@@ -360,7 +359,7 @@ class HealthView(msgspec.Struct, frozen=True):
 
 
 class ConsoleView(msgspec.Struct, frozen=True):
-    """All that a console shows at one moment."""
+    """Content of a console at one moment."""
 
     mission: str
     now_s: float
@@ -379,6 +378,6 @@ class ConsoleView(msgspec.Struct, frozen=True):
     health: HealthView | None = None
 
 
-def view_json(view: Any) -> bytes:
+def view_json(view: object) -> bytes:
     """Return any view as JSON, messages in it too with their fields by name."""
     return msgspec.json.encode(plain(view))

@@ -1,8 +1,8 @@
-"""What a console claims, by its parameters."""
+"""The claim of a console, from its parameters."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -23,8 +23,8 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
         kind: Component type of the ARC.
         priority: Among the consoles and the mission; larger is higher.
         minimum_runtime_s: Shortest useful time, seconds; only matters beside equals.
-        away_after_s: The robot is given back when its operator touched nothing for so long, so that it goes on with
-            useful work; seconds of the machine; 0: never.
+        away_after_s: The console gives the robot back after so long without a touch of its operator, so that the robot
+            goes on with useful work; seconds of the machine; 0: never.
     """
 
     robot: str = ""
@@ -37,8 +37,8 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
         """Return the name of the ARC of the console whose bus this is."""
         return arc_name(bus, self.kind)
 
-    def claim(self, address: str) -> dict[str, Any]:
-        """Return what the ARC of the console at this address is started with."""
+    def claim(self, address: str) -> dict[str, object]:
+        """Return the parameters of the ARC of the console at this address."""
         return claim_parameters(
             address,
             path=[PathNode(component_of(address), self.priority)],

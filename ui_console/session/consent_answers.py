@@ -1,4 +1,4 @@
-"""The questions that one person is asked by others, until each is answered; the rules are in ``consent``."""
+"""The questions of other operators to one person, until each is answered; the rules are in ``consent``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from backbone.bus.interface import Clock
-from backbone.operators import OperatorAction
+from backbone.mission_log.operators import OperatorAction
 from ui_console.model.consent import CONSENT_WITHIN_S, Consent, ConsentDesk, Settled, Sought, Topic
 from ui_console.model.events import ConsoleEvent
 
@@ -20,20 +20,20 @@ _ACTIONS = {
 
 
 class Acted(Protocol):
-    """Keeps that a person did something."""
+    """Records an action of a person."""
 
     def __call__(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
-        """Let the mission know."""
+        """Publish the action to the mission."""
 
 
 class ConsentAnswers:
-    """Shows one person what others ask, and hands their answers back.
+    """Shows one person the questions of others, and returns that person's answers.
 
     Args:
-        user: Who is asked.
+        user: The person asked.
         clock: The mission's time.
-        show: Called with what that person's screens are to show.
-        acted: Keeps what they decided.
+        show: Called with each event for that person's screens.
+        acted: Records the person's decisions.
     """
 
     def __init__(self, user: str, clock: Clock, show: Callable[[ConsoleEvent], None], acted: Acted) -> None:
@@ -41,17 +41,17 @@ class ConsentAnswers:
         self._desk = ConsentDesk(user)
         self._answers: dict[tuple[str, Topic], asyncio.Future[Consent]] = {}
         self.yield_robot: Callable[[list[Settled]], None] = self.settle
-        """Called with what was settled when the robot that is held here is let go; calls ``settle`` when it is."""
+        """Called with the settled questions if the robot has to be released; it calls ``settle`` after that."""
 
     async def seek(self, asker: str, user: str, robot: str, why: str, topic: Topic) -> Consent:
-        """Have the person decide; silence is a no.
+        """Ask the person for a decision; silence is a no.
 
         Args:
             asker: Address of the console that asks.
-            user: Who sits there.
-            robot: What it is about.
-            why: For people.
-            topic: What is asked for.
+            user: The person at that console.
+            robot: The robot.
+            why: The reason, for people.
+            topic: To have the robot, or to lift its stop.
 
         Raises:
             Refusal: See ``ConsentDesk.open_question``.
@@ -70,7 +70,7 @@ class ConsentAnswers:
             return Consent(False, self._user, "no answer")
 
     def decide(self, is_given: bool, reason: str = "") -> None:
-        """Answer the first question; with a yes for the robot it is given back."""
+        """Answer the first question; a yes for the robot gives it back."""
         settled = self._desk.decide(is_given, reason)
         if not settled:
             return
@@ -83,16 +83,16 @@ class ConsentAnswers:
             self.settle(settled)
 
     def ended(self, is_given: bool, reason: str) -> None:
-        """Answer all who want the robot: nothing is held any more.
+        """Answer all questions for the robot: this console holds none any more.
 
         Args:
-            is_given: True: it was given back; False: somebody else has it now.
+            is_given: True: it was given back; False: another ARC has it now.
             reason: For people.
         """
         self.settle(self._desk.ended(is_given, reason))
 
     def settle(self, settled: list[Settled]) -> None:
-        """Hand the answers back, and take the questions from the screens."""
+        """Return the answers, and remove the questions from the screens."""
         for one in settled:
             answer = self._answers.pop((one.sought.asker, one.sought.topic), None)
             if answer is not None and not answer.done():

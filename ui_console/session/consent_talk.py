@@ -1,6 +1,6 @@
-"""The talk about one console's robot: may I have it, asked and answered over the bus; the rules are in ``consent``.
+"""Consent over the bus: consoles ask each other for a robot; the rules are in ``consent``.
 
-Both sides are here, for a console that waits today holds tomorrow.
+Both sides are here, for a console that waits today holds a robot tomorrow.
 """
 
 from __future__ import annotations
@@ -8,14 +8,13 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Any
 
+from backbone.addresses import RC_MANAGER
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, NoResponder, Refusal
+from backbone.mission_log.operators import OperatorAction
+from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.operators import OperatorAction
-from backbone.people import is_console
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from ui_console.model.consent import (
@@ -23,25 +22,25 @@ from ui_console.model.consent import (
     MAX_WHY,
     AskConsent,
     Consent,
-    NobodyToAsk,
+    NoOperatorToAsk,
     Settled,
     Topic,
     require_console,
 )
 from ui_console.model.events import ConsentAsked, ConsentHeard, failed
 from ui_console.session.feed import REPLY_TIME_S
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What a console waits for.
+    """The claim of a console that waits.
 
     Attributes:
         arc: Name of its ARC.
         robot: The robot it wishes; empty: any.
-        called: What the robot is called, for people.
-        since_s: When it was asked for.
+        called: Name of the robot, for people.
+        since_s: When the console requested it.
     """
 
     arc: str
@@ -51,25 +50,25 @@ class Claim:
 
 
 class ConsentTalk:
-    """The questions a console asks, and those it is asked.
+    """The questions a console asks, and the questions it answers.
 
     Args:
-        console: Whose they are.
+        console: The console.
         give_back: Gives the robot back for the reason it is called with; returns when that is done.
     """
 
-    def __init__(self, console: Observer[Any], give_back: Callable[[str], Awaitable[None]]) -> None:
+    def __init__(self, console: AnyObserver, give_back: Callable[[str], Awaitable[None]]) -> None:
         self._console, self._give_back = console, give_back
         console.answers.yield_robot = self._begin_to_yield
         self._unanswered = 0
 
-    # ------------------------------------------------------------------ who waits
+    # ------------------------------------------------------------------ the side that waits
     def begin_ask(self, claim: Claim | None, why: str = "") -> None:
-        """Ask whoever holds what is waited for; what they say is shown. Nothing if they are being asked.
+        """Ask the consoles that hold the robot, and show their answers; do nothing while such a question is open.
 
         Args:
-            claim: What is waited for; None: nothing.
-            why: For people; empty: how long it has been waited for.
+            claim: The claim that waits; None: none does.
+            why: The reason, for people; empty: how long the console has waited.
         """
         if self._unanswered == 0:
             self._unanswered = 1
@@ -84,7 +83,7 @@ class ConsentTalk:
             self._unanswered = 0
             console.show(failed(now_s(), error))
             return
-        assert claim is not None  # noqa: S101  who waits for nothing was refused
+        assert claim is not None  # noqa: S101  without a claim the question was refused
         self._unanswered = len(holders)
         names = [component_of(holder) for holder in holders]
         why = (why or f"waits since {now_s() - claim.since_s:.0f} s")[:MAX_WHY]
@@ -94,15 +93,15 @@ class ConsentTalk:
         await asyncio.gather(*(self._ask_one(holder, question) for holder in holders))
 
     async def _who_holds(self, claim: Claim | None) -> list[str]:
-        """Return the addresses of the consoles that hold the robot, or else stand directly in the way.
+        """Return the addresses of the consoles that hold the robot, or else block the claim directly.
 
         Raises:
-            NobodyToAsk: There is none, or nothing is waited for.
+            NoOperatorToAsk: No console blocks the claim, or there is no claim.
             LinkError: The RC manager did not answer.
         """
         console = self._console
         if claim is None:
-            raise NobodyToAsk(f"{console.user} does not wait for a robot", remedy="Take the robot first.")
+            raise NoOperatorToAsk(f"{console.user} does not wait for a robot", remedy="Take the robot first.")
         schedule = await console.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
         owners = {request.arc: request.owner for request in schedule.requests}
         arcs = {arc for one in schedule.requests if one.arc == claim.arc for arc in one.blockers}
@@ -110,8 +109,8 @@ class ConsentTalk:
         blockers = {owners[arc] for arc in arcs - {claim.arc} if arc in owners}
         consoles = sorted(at for at in blockers if is_console(at) and at != console.address)
         if not consoles:
-            names = ", ".join(sorted(map(component_of, blockers))) or "nobody"
-            raise NobodyToAsk(f"no operator stands in the way of {console.user}, but {names}")
+            names = ", ".join(sorted(map(component_of, blockers))) or "no component"
+            raise NoOperatorToAsk(f"no operator blocks the claim of {console.user}, but {names}")
         return consoles
 
     async def _ask_one(self, holder: str, question: AskConsent) -> None:
@@ -133,13 +132,13 @@ class ConsentTalk:
         now_s = console.clock.now_s()
         console.show(ConsentHeard(now_s, question.robot, consent.user, consent.is_given, consent.reason))
 
-    # ------------------------------------------------------------------ who holds
+    # ------------------------------------------------------------------ the side that holds
     async def seek(self, asker: str, asked: AskConsent, at_once: Consent | None) -> Consent:
-        """Have the operator, who holds the robot, decide; silence is a no.
+        """Ask the operator, who holds the robot, for a decision; silence is a no.
 
         Args:
             asker: Address of the console that asks.
-            asked: What it asked.
+            asked: The question.
             at_once: The answer if the operator need not be asked.
 
         Raises:
@@ -155,6 +154,6 @@ class ConsentTalk:
         self._console.start_task(self._yield_to(settled), "consent")
 
     async def _yield_to(self, settled: list[Settled]) -> None:
-        """Give the robot back, then say so: who was let have it finds it free."""
+        """Give the robot back, then answer: the asker finds the robot free."""
         await self._give_back(f"{settled[0].sought.user} may have it")
         self._console.answers.settle(settled)

@@ -1,8 +1,8 @@
-"""The feed of a console: listens to what exists on the bus and hands it to the pure model as events.
+"""The feed of a console: subscribes to the mission on the bus and passes it to the pure model as events.
 
-One feed serves any number of views in a process. It claims nothing, asks little (who is there, once; what a round trip
-takes every ``LINK_EVERY_S``, what the radios counted every ``PULSE_S``), and carries out an operator's verbs that need
-no grant.
+One feed serves any number of views in a process. It claims nothing, asks little (the list of components, once; the
+round-trip time every ``LINK_EVERY_S``, the radios' counts every ``PULSE_S``), and carries out an operator's verbs that
+need no grant.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import logging
 import time
 from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import Any
 
+from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.messages import (
     AskParameters,
@@ -32,18 +32,16 @@ from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.mission_log import AskLog, AskPeople, Log, PeopleKnown
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.mission_log.log import AskLog, AskPeople, Log, PeopleKnown
+from backbone.mission_log.operators import OperatorActed
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents, Resolve, Resolved
-from backbone.naming import LAUNCHER, Subsystem, component_of
-from backbone.operators import OperatorActed
+from backbone.naming import Subsystem, component_of
 from backbone.picture.health import MissionHealth
 from backbone.picture.mission import LOG_KEPT
 from backbone.picture.reasons import reasons_for
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.views import Schedule
-from backbone.wire import Envelope
+from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said, failed
 from ui_console.model.robot_board import ROBOT_KIND
@@ -51,9 +49,9 @@ from ui_console.model.robot_board import ROBOT_KIND
 log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long for a picture
-LINK_FRESH_S = 0.8  # chosen: what is older than a second says so, and drawing that takes a moment; machine seconds
-LINK_EVERY_S = 0.3  # chosen: an answer may be lost before what is shown counts as old; machine seconds
-PULSE_S = 2.0  # chosen: a link that got slow is seen soon, and asking costs nothing to speak of; machine seconds
+LINK_FRESH_S = 0.8  # chosen: a view older than a second is marked, and drawing that takes a moment; machine seconds
+LINK_EVERY_S = 0.3  # chosen: one answer may be lost before the view counts as old; machine seconds
+PULSE_S = 2.0  # chosen: a link that got slow is seen soon, and a question costs almost nothing; machine seconds
 
 LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link; machine seconds
 
@@ -68,10 +66,10 @@ class LogAway(Refusal):
 
 
 class ConsoleFeed:
-    """Tells what happens in a mission.
+    """Turns the messages of a mission into events.
 
     Args:
-        bus: Of the component it belongs to.
+        bus: Of its component.
         clock: The mission's time.
         show: Called in the event loop with each event, in order.
     """
@@ -83,25 +81,25 @@ class ConsoleFeed:
         self._robots: set[str] = set()
         self._listing = asyncio.Event()
         self.listed = asyncio.Event()
-        """Set once all were asked how things are, and answered or did not."""
+        """Set once every component answered the first questions, or did not in time."""
         self._is_up = True
 
     # ------------------------------------------------------------------ listening
     def listen(self) -> None:
-        """Begin to listen; once, before ``run``."""
+        """Subscribe; once, before ``run``."""
         bus = self._bus
         bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard, latest=True)
         bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard, latest=True)
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard)
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
         bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard, latest=True)
-        bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard)
+        bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_nameserver)
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard, latest=True)
         watch_stops(bus, self._hear)
         bus.watch_link(self._heard_link)
 
     async def run(self) -> None:
-        """Ask for how things are, now and whenever the link is back, and feel the mission's pulse; until cancelled."""
+        """Ask for the mission's state, now and whenever the link is back, and measure the link; until cancelled."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self._list_when_due(), name="feed:list")
             group.create_task(self._feel_link(), name="feed:link")
@@ -109,23 +107,23 @@ class ConsoleFeed:
 
     # ------------------------------------------------------------------ verbs of an operator
     async def stop_robots(self, robots: Iterable[str], reason: str = "", user: str = "") -> list[str]:
-        """Stop these robots, all at once, whoever holds them; return those that did not confirm it."""
+        """Stop these robots, all at once, regardless of their holders; return the robots that did not confirm it."""
         wanted = sorted(set(robots))
         answers = await asyncio.gather(*(self._stop(robot, reason, user) for robot in wanted))
         return [robot for robot, is_stopped in zip(wanted, answers, strict=True) if not is_stopped]
 
     @property
     def robots(self) -> frozenset[str]:
-        """Every robot heard of so far."""
+        """Every robot known so far."""
         return frozenset(self._robots)
 
     async def find_robots(self) -> frozenset[str]:
-        """Return every robot of the mission, also those not heard of yet."""
+        """Return every robot of the mission, also robots not known so far."""
         return self.robots | set(map(component_of, await self._list_of(Subsystem.RESOURCE_POOL, ROBOT_KIND)))
 
     async def ask_stop(self, robot: str) -> StopState | None:
-        """Return whether an operator's stop keeps the robot from moving; None: its RC did not say."""
-        with self._told():
+        """Return the state of the robot's stop; None: its RC did not answer."""
+        with self._showing_failure():
             stop = await ask_stop(self._bus, robot)
             self._hear(stop)
             return stop
@@ -137,7 +135,7 @@ class ConsoleFeed:
 
     async def lift(self, stop: StopState, user: str = "") -> bool:
         """Let a robot move again; return whether it may."""
-        with self._told():
+        with self._showing_failure():
             self._hear(await lift_stop(self._bus, stop, user))
             return True
         return False
@@ -149,10 +147,10 @@ class ConsoleFeed:
         except Refusal as refusal:
             return [refusal.detail, refusal.remedy]
         except LinkError as error:
-            return [f"nobody answers: {error}"]
+            return [f"no component answers: {error}"]
 
     async def search_log(self, asked: AskLog) -> Log:
-        """Return what the mission's log has of this, as far back as the launcher keeps it.
+        """Return the matching events of the mission's log, as far back as the launcher keeps it.
 
         Raises:
             LogAway: The launcher did not answer.
@@ -164,16 +162,16 @@ class ConsoleFeed:
             raise LogAway(f"the launcher, which keeps the log, did not answer: {error}") from error
 
     async def ask_parameters(self, name: str) -> bool:
-        """Have a component tell its parameters; return whether it did."""
-        with self._told():
+        """Ask a component for its parameters; return whether it answered."""
+        with self._showing_failure():
             address = await self._resolve(name)
             self._hear(await self._bus.ask(address, AskParameters(), Parameters, within_s=REPLY_TIME_S), address)
             return True
         return False
 
-    async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
-        """Have a component run with another value; return whether it does."""
-        with self._told():
+    async def set_parameter(self, name: str, parameter: str, value: object, user: str = "") -> bool:
+        """Set a parameter of a component; return whether the component applied it."""
+        with self._showing_failure():
             address = await self._resolve(name)
             change = SetParameter(parameter, value, user or self._bus.source)
             answer, now_s = await self._bus.ask(address, change, Parameters, within_s=REPLY_TIME_S), self._clock.now_s()
@@ -183,12 +181,12 @@ class ConsoleFeed:
         return False
 
     # ------------------------------------------------------------------ within
-    def _told(self) -> _Answered:
-        """Have the console told of a refusal or a silence, which ends what stands in here."""
+    def _showing_failure(self) -> _Answered:
+        """Show a refusal or a missing answer, which ends the block."""
         return _Answered(lambda error: self._show(failed(self._clock.now_s(), error)))
 
     async def _stop(self, robot: str, reason: str, user: str) -> bool:
-        with self._told():
+        with self._showing_failure():
             try:
                 self._hear(await stop_robot(self._bus, robot, reason, user))
             except LinkError as error:
@@ -202,7 +200,7 @@ class ConsoleFeed:
 
     async def _list_of(self, subsystem: Subsystem, kind: str = "") -> list[str]:
         """Return the addresses of these components; none if the nameserver did not answer."""
-        with self._told():
+        with self._showing_failure():
             question = ListComponents(subsystem=str(subsystem), type=kind)
             listing = await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)
             return [component.address for component in listing.components]
@@ -217,7 +215,7 @@ class ConsoleFeed:
             self.listed.set()
 
     async def _list(self) -> None:
-        with self._told():
+        with self._showing_failure():
             listing = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
             self._hear(listing)
             at = [component.address for component in listing.components]
@@ -226,25 +224,25 @@ class ConsoleFeed:
             await asyncio.gather(*map(self._ask_how_it_went, behaviors), *map(self._ask_stop, robots), self._ask_log())
 
     async def _ask_schedule(self) -> None:
-        with self._told():
+        with self._showing_failure():
             self._hear(await self._bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S))
 
     async def _ask_how_it_went(self, behavior: str) -> None:
-        """Hear of what a behavior finished before this console listened."""
-        with _quietly(behavior, "did not tell its story"):
+        """Show the end of a behavior that finished before this console subscribed."""
+        with _quietly(behavior, "did not answer with its story"):
             story = await self._bus.ask(behavior, AskStory(), Story, within_s=REPLY_TIME_S)
             for event in story.events:
                 if event.what.startswith("finished: "):
                     self._hear(event)
 
     async def _ask_log(self) -> None:
-        """Hear of what happened before this console listened, or while its link was away."""
-        with _quietly("the launcher", "did not tell what happened"):
+        """Show the events from before this console subscribed, or from the time its link was down."""
+        with _quietly("the launcher", "did not answer with its log"):
             self._hear(await self._bus.ask(LAUNCHER, AskPeople(), PeopleKnown, within_s=REPLY_TIME_S))
             self._hear(await self._bus.ask(LAUNCHER, AskLog(most=LOG_KEPT), Log, within_s=REPLY_TIME_S))
 
     async def _ask_stop(self, robot: str) -> None:
-        with _quietly(robot, "did not say whether it is stopped"):  # a robot of another make may know no such stop
+        with _quietly(robot, "did not answer with its stop"):  # a robot of another make may know no such stop
             self._hear(await ask_stop(self._bus, robot))
 
     async def _feel_link(self) -> None:
@@ -274,14 +272,19 @@ class ConsoleFeed:
 
     async def _count(self, radio: str) -> None:
         address = f"{Subsystem.RESOURCE_POOL}/{radio}"
-        with _quietly(radio, "did not tell its counters"):
+        with _quietly(radio, "did not answer with its counters"):
             self._hear(await self._bus.ask(address, AskStatistics(), Statistics, within_s=REPLY_TIME_S), address)
 
-    def _heard(self, envelope: Envelope[Any]) -> None:
+    def _heard_nameserver(self, envelope: Envelope[Message]) -> None:
         match envelope.body:
             case Appeared(component=component):
                 self._hear(component)
-            case Leases():  # they count from when they were said
+            case Disappeared() as disappeared:
+                self._hear(disappeared)
+
+    def _heard(self, envelope: Envelope[Said]) -> None:
+        match envelope.body:
+            case Leases():  # they count from the time they were sent
                 self._show(Heard(envelope.stamp_s, envelope.body))
             case OperatorActed():
                 self._hear(envelope.body, envelope.source)
@@ -289,7 +292,7 @@ class ConsoleFeed:
                 self._hear(envelope.body)
 
     def _hear(self, said: Said, source: str = "") -> None:
-        """Take in of whom more can be heard, and show what was said."""
+        """Subscribe to a component that a message names, and show the message."""
         match said:
             case ComponentState():
                 self._meet(said)
@@ -302,7 +305,7 @@ class ConsoleFeed:
         self._show(Heard(self._clock.now_s(), said, source))
 
     def _meet(self, component: ComponentState) -> None:
-        """Listen to creators, which tell of their hosts and of what fell."""
+        """Subscribe to creators, which publish the load of their hosts and the processes that fell."""
         address = component.address
         if component.type == CREATOR and address not in self._hosts:
             self._hosts[address] = [
@@ -320,10 +323,10 @@ class ConsoleFeed:
 
 
 class _Answered:
-    """Ends what stands in it at a refusal or a silence.
+    """Ends its block at a refusal or a missing answer.
 
     Args:
-        failed: Called with that.
+        failed: Called with the error.
     """
 
     def __init__(self, failed: Callable[[Refusal | LinkError], None]) -> None:
@@ -335,7 +338,7 @@ class _Answered:
     def __exit__(
         self, _kind: type[BaseException] | None, error: BaseException | None, _at: TracebackType | None
     ) -> bool:
-        """Swallow what ``failed`` was called with, and nothing else."""
+        """Swallow the error that ``failed`` was called with, and no other."""
         if isinstance(error, Refusal | LinkError):
             self._failed(error)
             return True
@@ -343,5 +346,5 @@ class _Answered:
 
 
 def _quietly(name: str, what: str) -> _Answered:
-    """Log a refusal or a silence, which ends what stands in here, and go on without the answer."""
+    """Log a refusal or a missing answer, which ends the block, and go on without the answer."""
     return _Answered(lambda error: log.info("%s %s: %s", name, what, error))

@@ -1,10 +1,10 @@
 """Driving by a gamepad: a stick that counts only while the dead-man button is held.
 
-``Stick`` is pure: what the device says goes in, what is wanted comes out. ``play_gamepad`` is the loop around it. The
+``Stick`` is pure: events of the device go in, drive commands come out. ``play_gamepad`` is the loop around it. The
 device is read through evdev, which is an extra (``pip install 'scout-backbone[gamepad]'``, Linux only).
 
-A gamepad tells when a button is let go; one that is unplugged or out of range tells nothing, so what is wanted is said
-again every ``SAY_EVERY_S`` and ends by itself.
+A gamepad reports when a button is let go; a gamepad that is unplugged or out of range reports nothing, so the drive
+command is repeated every ``SAY_EVERY_S`` and ends by itself.
 """
 
 from __future__ import annotations
@@ -13,11 +13,16 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Mapping
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Protocol
 
 from backbone.errors import Refusal
 from backbone.waiting import end_tasks, set_within
-from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
+
+try:
+    import evdev
+except ImportError:  # an extra that few machines have
+    evdev = None
 
 log = logging.getLogger(__name__)
 
@@ -30,7 +35,7 @@ SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``; machine seconds
 
 
 class PadWish(StrEnum):
-    """What a button asks for."""
+    """Action of a button."""
 
     JUMP = "jump"
     TAKE = "take"
@@ -64,16 +69,16 @@ class GamepadEvent(Protocol):
 
 
 class Gamepad(Protocol):
-    """What is used of evdev's ``InputDevice``."""
+    """The used part of evdev's ``InputDevice``."""
 
     def async_read_loop(self) -> AsyncIterator[GamepadEvent]:
-        """Yield what it says; raise ``OSError`` when it is gone."""
+        """Yield its events; raise ``OSError`` when it is gone."""
 
 
 class Stick:
-    """Turns what the device says into what is wanted.
+    """Turns events of the device into drive commands.
 
-    Law: without the dead-man button nothing drives, wherever the stick is.
+    Law: without the dead-man button the robot does not drive, in any position of the stick.
 
     Args:
         ranges: Axis → least and largest value.
@@ -85,7 +90,7 @@ class Stick:
         self._held: set[int] = set()
 
     def feel(self, event: GamepadEvent) -> PadWish | None:
-        """Take in one event; return what a button that was just pressed asks for."""
+        """Take in one event; return the action of a button that was just pressed."""
         if event.type == EV_ABS and event.code in self._at and event.code in self._ranges:
             least, most = self._ranges[event.code]
             share = 2 * (event.value - least) / max(1, most - least) - 1
@@ -99,8 +104,8 @@ class Stick:
             return BUTTONS.get(event.code)
         return None
 
-    def wanted(self, speed_rad_s: float) -> Drive | None:
-        """Return what is wanted now; None: the dead-man button is not held."""
+    def wanted(self, speed_rad_s: float) -> DriveWish | None:
+        """Return the drive command now; None: the dead-man button is not held."""
         if not self._held:
             return None
         return drive_by_stick(-self._at[ABS_Y], self._at[ABS_X], speed_rad_s)
@@ -112,10 +117,8 @@ def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
     Raises:
         NoGamepad: There is none, or none that can be read.
     """
-    try:
-        import evdev  # noqa: PLC0415  an extra that few machines have
-    except ImportError as error:
-        raise NoGamepad(f"evdev is not installed: {error}") from None
+    if evdev is None:
+        raise NoGamepad("evdev is not installed")
     for path in evdev.list_devices():
         device = evdev.InputDevice(path)
         can = device.capabilities()
@@ -130,7 +133,7 @@ async def play_gamepad(
     device: Gamepad,
     stick: Stick,
     *,
-    hold: Callable[[Drive, float], None],
+    hold: Callable[[DriveWish, float], None],
     stop: Callable[[], None],
     wish: Callable[[PadWish], None],
     speed_rad_s: Callable[[], float],
@@ -140,8 +143,8 @@ async def play_gamepad(
     Args:
         device: Already open.
         stick: Fresh.
-        hold: Called again and again while the dead-man button is held, with how long that counts.
-        stop: Called when it is let go.
+        hold: Called repeatedly while the dead-man button is held, with the time a call counts.
+        stop: Called when the button is let go.
         wish: Called for each button pressed.
         speed_rad_s: Returns the speed of the wheels at full forward.
     """
@@ -178,8 +181,8 @@ async def play_gamepad(
 
 
 def buttons_help() -> list[str]:
-    """Return for people what the gamepad's buttons do."""
-    names: dict[int, Any] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
+    """Return the actions of the gamepad's buttons, for people."""
+    names: dict[int, str] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
     return [
         "shoulder button held: the left stick drives",
         *(f"{names[code]}: {wish}" for code, wish in BUTTONS.items()),

@@ -5,30 +5,30 @@ from __future__ import annotations
 import asyncio
 import sys
 from pathlib import Path
-from typing import Any
 
+from backbone.command_line.where import Where
 from backbone.component.component import NoParameters
-from backbone.endings import ExitCode, say
+from backbone.launcher.endings import ExitCode, say
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent, for_scripts
 from ui_console.model.script import Step, WrongScript, read_script
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
-from ui_console.session.joining import Where, end_on_signals, join, write_line
-from ui_console.session.observer import Observer, nobody_here
+from ui_console.session.joining import end_on_signals, join, write_line
+from ui_console.session.observer import Observer, no_person_here
 from ui_console.session.scripted import ScriptDriver, feed_from
 from ui_console.session.teleoperation import Teleoperation
 
 STANDARD_INPUT = "-"
 
 
-async def drive_by_script(where: Where, wished: dict[str, Any], user: str, script: str, within_s: float) -> int:
+async def drive_by_script(where: Where, wished: dict[str, object], user: str, script: str, within_s: float) -> int:
     """Drive a robot by a script; return the command's exit code.
 
     Args:
         where: The mission.
         wished: Parameters of ``Teleoperation``.
-        user: Who drives, for the record.
+        user: The driver, for the record.
         script: File of JSON lines; ``-``: standard input.
         within_s: Mission seconds the grant may take; 0: any time.
     """
@@ -53,7 +53,7 @@ async def drive_by_script(where: Where, wished: dict[str, Any], user: str, scrip
 
 
 async def watch_as_json(where: Where, user: str) -> int:
-    """Write what happens as JSON lines until a signal ends it; return the command's exit code."""
+    """Write the events as JSON lines until a signal ends it; return the command's exit code."""
 
     def show(event: ConsoleEvent) -> None:
         for line in for_scripts(event):
@@ -61,7 +61,7 @@ async def watch_as_json(where: Where, user: str) -> int:
 
     joining = await join(where)
     console: Observer[NoParameters] = Observer(
-        joining.launch, await joining.open_bus(), joining.clock, show=show, user=user, answers_of=nobody_here
+        joining.launch, await joining.open_bus(), joining.clock, show=show, user=user, answers_of=no_person_here
     )
     interrupted = end_on_signals(console)
     await console.run()
@@ -69,7 +69,7 @@ async def watch_as_json(where: Where, user: str) -> int:
 
 
 async def look_once(where: Where, user: str) -> int:
-    """Write all that screens show now as one JSON object; return the command's exit code."""
+    """Write the present content of the screens as one JSON object; return the command's exit code."""
     joining = await join(where)
     launch, clock = joining.launch, joining.clock
     model = ConsoleModel(launch.name, user, TeamModel(launch.mission), sees=False)

@@ -1,4 +1,4 @@
-"""How a console's process joins a mission: who it is there, its clock, its bus, and the signals that end it."""
+"""How a console's process joins a mission: its name there, its clock, its bus, and the signals that end it."""
 
 from __future__ import annotations
 
@@ -10,35 +10,18 @@ import socket
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.cli import read_secret_option
+from backbone.command_line.where import Where
 from backbone.component.launch import Launch
-from backbone.mission_connection import clock_elsewhere
+from backbone.launcher.mission_connection import clock_elsewhere
 from backbone.naming import Subsystem
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's
-
-
-@dataclass(frozen=True)
-class Where:
-    """Which mission a console joins.
-
-    Attributes:
-        mission: Its name; None: the one that is up on this machine.
-        connect: Endpoint of its hub, for a mission elsewhere, which then has a name.
-        secret_file: File with that mission's secret.
-    """
-
-    mission: str | None
-    connect: str | None
-    secret_file: Path | None
 
 
 @dataclass(frozen=True)
@@ -46,9 +29,9 @@ class Joining:
     """A console that has not opened its bus yet.
 
     Attributes:
-        launch: Who it is.
+        launch: Its identity.
         clock: The mission's clock.
-        secret: What the mission's hub asks for.
+        secret: The secret of the mission's hub.
     """
 
     launch: Launch
@@ -59,15 +42,15 @@ class Joining:
         """Return the bus once the hub has answered.
 
         Args:
-            launch: Who joins; None: this console.
+            launch: Identity of the component that joins; None: this console.
         """
         who = launch or self.launch
         config = client_config(who.endpoint, self.secret)
         return await ZenohBus.open_when_up(who.mission, who.address, self.clock, config)
 
 
-async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joining:
-    """Return who this process is in the mission.
+async def join(where: Where, parameters: dict[str, object] | None = None) -> Joining:
+    """Return the identity of this process in the mission.
 
     Args:
         where: The mission.
@@ -85,7 +68,7 @@ async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joinin
         mission, endpoint, secret = found.mission, found.endpoint, run_files.secret(found)
         clock, host = MissionClock(found.clock_origin_monotonic_s, found.clock_rate), found.host
     else:
-        endpoint, host, secret = connect, socket.gethostname(), read_secret_option(where.secret_file)
+        endpoint, host, secret = connect, socket.gethostname(), where.secret()
         clock = await clock_elsewhere(mission, connect, f"{Subsystem.UI_CONSOLE}/{name}", secret)
     launch = Launch(
         mission,
@@ -102,13 +85,13 @@ async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joinin
     return Joining(launch, clock, secret)
 
 
-def end_on_signals(console: Observer[Any]) -> Callable[[], bool]:
-    """Have the console end in good order on SIGINT and SIGTERM; return whether SIGINT came."""
+def end_on_signals(console: AnyObserver) -> Callable[[], bool]:
+    """Make SIGINT and SIGTERM end the console in good order; the result returns whether SIGINT came."""
     return _end_on(console.end, signal.SIGINT, signal.SIGTERM)
 
 
 def end_server_on_signals(end: Callable[[str], None]) -> Callable[[], bool]:
-    """Have a server end in good order on SIGINT, SIGTERM and SIGHUP; return whether SIGINT came.
+    """Make SIGINT, SIGTERM and SIGHUP end a server in good order; the result returns whether SIGINT came.
 
     A SIGHUP that ``nohup`` ignores stays ignored.
 
@@ -138,7 +121,7 @@ def write_line(line: bytes) -> None:
 
 
 def _name_elsewhere(host: str) -> str:
-    """Return a console's name that those of other machines do not have: processes are numbered anew on each.
+    """Return a console's name that no console of another machine has: each machine numbers its processes anew.
 
     Example:
         >>> _name_elsewhere("Lab PC.local").rpartition("-")[0]

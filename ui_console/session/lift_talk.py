@@ -1,4 +1,4 @@
-"""Lifting a stop over the bus: who set it is asked where the rules in ``lifting`` say so, then it is lifted or kept."""
+"""Lifting a stop over the bus: if the rules in ``lifting`` require it, its authors are asked first."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol, assert_never
 
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, NoResponder, Refusal
-from backbone.operators import OperatorAction
+from backbone.mission_log.operators import OperatorAction
 from resource_pool.arc_client import OtherStop, Stopper, StopState
 from ui_console.model.consent import CONSENT_WITHIN_S, Consent, Topic
 from ui_console.model.events import CommandRefused, ConsentAsked, ConsentHeard, ConsoleEvent
@@ -24,7 +24,7 @@ from ui_console.model.lifting import (
 )
 from ui_console.session.feed import ConsoleFeed
 
-ANSWER_TIME_S = CONSENT_WITHIN_S + 1.0  # chosen: who is asked answers by itself before
+ANSWER_TIME_S = CONSENT_WITHIN_S + 1.0  # chosen: the console asked answers by itself before
 LOOK_AGAIN = "Look who stopped the robot and why, then lift that stop if it may move."
 
 
@@ -44,30 +44,30 @@ class Speaks(Protocol):
 
     @property
     def address(self) -> str:
-        """See above."""
+        """Address of this console."""
 
     def acted(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
-        """Publish what the operator did."""
+        """Publish the operator's action."""
 
 
 class LiftTalk:
-    """Lifts the stops that one person wants lifted; what others say to it is shown to that person.
+    """Lifts stops for one person, and shows that person the other authors' answers.
 
     Args:
-        console: By which it is done.
-        user: Who wants it.
-        show: Called with what that person's screens are to show.
+        console: The person's console.
+        user: The person.
+        show: Called with each event for that person's screens.
     """
 
     def __init__(self, console: Speaks, user: str, show: Callable[[ConsoleEvent], None]) -> None:
         self._console, self._user, self._show = console, user, show
 
     async def lift(self, robot: str, number: int) -> bool:
-        """Let the robot move again if nobody who stopped it minds; return whether it may.
+        """Let the robot move again if every other author of its stop agrees; return whether it may move.
 
         Args:
-            robot: Which.
-            number: Of the stop that was seen.
+            robot: The robot.
+            number: Number of the stop on the screen.
         """
         stop = await self._console.feed.ask_stop(robot)
         if stop is None:
@@ -94,7 +94,7 @@ class LiftTalk:
         return is_agreed(answers)
 
     async def _ask_one(self, robot: str, author: Stopper) -> Consent:
-        """Ask an author where they stopped the robot, or else wherever they sit now."""
+        """Ask an author at the console that stopped the robot, or else at the author's present consoles."""
         question = AskLift(robot, author.by, author.console, self._user)
         answers = [await self._ask_at(author.console, question)]
         if not answers[0].is_here:
@@ -109,7 +109,7 @@ class LiftTalk:
             return await self._console.bus.ask(console, question, Consent, within_s=ANSWER_TIME_S)
         except NoResponder:
             return Consent(False, question.author, "is not here", is_here=False)
-        except LinkError:  # it may be a console at which they sit
+        except LinkError:  # the author may sit at this console
             return Consent(False, question.author, "does not answer", is_here=console == question.console)
         except Refusal as refusal:
             return Consent(False, question.author, refusal.detail, is_here=console == question.console)

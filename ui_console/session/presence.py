@@ -1,48 +1,48 @@
-"""Whether somebody is at a console: what they touch says so, and a long silence that nobody is."""
+"""Presence of a console's operator: a touch shows it, a long silence shows the absence."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from backbone.waiting import set_within
 from ui_console.model.events import Attention
 
 if TYPE_CHECKING:
-    from ui_console.session.observer import Observer
+    from ui_console.session.observer import AnyObserver
 
 
 class Presence:
-    """Tells when the operator turns away and comes back.
+    """Shows when the operator turns away and comes back.
 
     Args:
-        console: At which they sit.
+        console: The operator's console.
     """
 
-    def __init__(self, console: Observer[Any]) -> None:
+    def __init__(self, console: AnyObserver) -> None:
         self._console = console
         self._touched = asyncio.Event()
         self._is_there = True
 
     def touch(self) -> None:
-        """The operator is there."""
-        self._tell(True)
+        """Note that the operator is there."""
+        self._show(True)
         self._touched.set()
 
     def leave(self) -> None:
-        """The operator turned away."""
-        self._tell(False)
+        """Note that the operator turned away."""
+        self._show(False)
 
     async def run(self, away_after_s: float, away: Callable[[], Awaitable[None]]) -> None:
-        """Call ``away`` whenever nothing was touched for so long, machine seconds; until cancelled."""
+        """Call ``away`` after each so many machine seconds without a touch; until cancelled."""
         while True:
             self._touched.clear()
             if not await set_within(self._touched, away_after_s):
                 await away()
                 await self._touched.wait()
 
-    def _tell(self, is_there: bool) -> None:
+    def _show(self, is_there: bool) -> None:
         if is_there is not self._is_there:
             self._is_there = is_there
             self._console.show(Attention(self._console.clock.now_s(), is_there))

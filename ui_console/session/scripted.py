@@ -7,14 +7,14 @@ import os
 import threading
 from collections.abc import Callable
 
-from backbone.endings import ExitCode
 from backbone.errors import Refusal
+from backbone.launcher.endings import ExitCode
 from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
 from backbone.waiting import set_within
 from resource_pool.arc_client import StopState, Suspended, SwappedOut
 from ui_console.model import events
-from ui_console.model.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
+from ui_console.model.driving import DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.session.teleoperation import Teleoperation
 
@@ -27,7 +27,7 @@ class ScriptDriver:
     """Plays one script on one console.
 
     Args:
-        write: Gets each line of JSON, without its end; must hand it on at once.
+        write: Called with each line of JSON, without its end; must write it at once.
         steps: The whole script; None: steps come by ``feed``.
         within_s: Mission seconds the grant may take; 0: any time.
     """
@@ -46,8 +46,8 @@ class ScriptDriver:
         self._stopped = self._is_unanswered = False
 
     def show(self, event: events.ConsoleEvent) -> None:
-        """Write the event, if it is one for scripts; commands without an answer are one line until there is one."""
-        if isinstance(event, _FOR_SCREENS_ONLY) or self._is_told(event):
+        """Write the event if it is one for scripts; unanswered commands are one line until an answer comes."""
+        if isinstance(event, _FOR_SCREENS_ONLY) or self._is_repeated(event):
             return
         said = events.said(event)
         if isinstance(said, Suspended) and said.reason in UNDECIDED:
@@ -61,14 +61,14 @@ class ScriptDriver:
 
     @property
     def must_halt(self) -> bool:
-        """Whether its lines move nothing before one that halts."""
+        """Whether drives and jumps are ignored until a line halts."""
         return self._player.must_let_go
 
-    def _is_told(self, event: events.ConsoleEvent) -> bool:
-        """Take note of a silence and of its end; return whether the script knows of this silence."""
+    def _is_repeated(self, event: events.ConsoleEvent) -> bool:
+        """Note a missing answer, and the next answer; return True for a missing answer after another one."""
         if isinstance(event, events.LinkTrouble) and event.command:
-            is_told, self._is_unanswered = self._is_unanswered, True
-            return is_told
+            was_unanswered, self._is_unanswered = self._is_unanswered, True
+            return was_unanswered
         if isinstance(events.said(event), events.CommandApplied | events.Granted | Suspended):
             self._is_unanswered = False
         return False
@@ -110,7 +110,7 @@ class ScriptDriver:
         await self._play(console, console.clock.now_s())
 
     def exit_code(self, console: Teleoperation) -> int:
-        """Return what the command ends with: 0 only if the robot was granted and given back cleanly."""
+        """Return the command's exit code: 0 only if the robot was granted and given back cleanly."""
         if self._wrong is not None:
             return ExitCode.USAGE
         if console.refusal is not None or self._failed or self._player.held_back:
@@ -123,23 +123,23 @@ class ScriptDriver:
             self._news.clear()
             since_s, next_s = clock.now_s() - granted_s, self._player.next_s
             if next_s is not None and abs(since_s - next_s) < INSTANT_S:
-                since_s = next_s  # what was waited for is due, however the times were rounded
+                since_s = next_s  # the step is due now, regardless of rounding
             for wish in self._player.due(since_s):
                 match wish:
                     case GiveBack():
-                        self._tell_wrong(clock.now_s())
+                        self._show_wrong_line(clock.now_s())
                         await console.give_back("the script is over")
                         return
                     case StopRobot() | StopAll():
                         await self._stop(console, wish)
-                    case Jump():
+                    case JumpWish():
                         await console.do(wish)
-                    case Drive() | Halt() if console.is_held:
+                    case DriveWish() | HaltWish() if console.is_held:
                         await console.do(wish)
             await self._wait_news(console, granted_s)
 
     def _begin_stops(self) -> None:
-        """Carry out the emergency stops that count at once, if there is a console to do it by yet."""
+        """Carry out the emergency stops that count at once, if the console is there yet."""
         if self._console is None or not self._console.is_ready:
             return
         stops, self._stops = self._stops, []
@@ -147,7 +147,7 @@ class ScriptDriver:
             self._console.start_task(self._stop(self._console, stop), "stop")
 
     async def _stop(self, console: Teleoperation, stop: StopRobot | StopAll) -> None:
-        """Stop one robot or all; one that does not confirm it is told, and the script failed."""
+        """Stop one robot or all; if a robot does not confirm its stop, the script shows that and fails."""
         if isinstance(stop, StopRobot):
             is_sure = await console.stop_robot(stop.robot, stop.reason)
         else:
@@ -155,22 +155,22 @@ class ScriptDriver:
         self._failed = self._failed or not is_sure
 
     async def _wait_news(self, console: Teleoperation, granted_s: float) -> None:
-        """Return when the next step is due or another one arrived."""
+        """Return once the next step is due or another one arrived."""
         next_s = self._player.next_s
         wait_s = None
         if next_s is not None:
             wait_s = max(0.0, granted_s + next_s - console.clock.now_s()) / console.clock.rate
         await set_within(self._news, wait_s)
 
-    def _tell_wrong(self, now_s: float) -> None:
+    def _show_wrong_line(self, now_s: float) -> None:
         if self._wrong is not None:
             self._write(events.event_json(events.failed(now_s, self._wrong)))
 
 
 def feed_from(descriptor: int, feed: Callable[[str | None], None]) -> None:
-    """Hand the lines read from a file descriptor to ``feed`` in this event loop, then None.
+    """Call ``feed`` in this event loop with each line read from a file descriptor, then with None.
 
-    The thread that reads dies with the process: a pipe that stays open holds nothing up.
+    The thread that reads dies with the process: a pipe that stays open delays nothing.
     """
     loop = asyncio.get_running_loop()
 

@@ -1,41 +1,41 @@
-"""Hears of every stop and lift of the robot that a console holds."""
+"""Subscription to the stops and lifts of the robot that a console holds."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from backbone.bus.interface import Subscription
 from backbone.errors import LinkError, Refusal
 from resource_pool.arc_client import StopState, ask_stop, watch_stops
 
 if TYPE_CHECKING:
-    from ui_console.session.observer import Observer
+    from ui_console.session.observer import AnyObserver
 
 log = logging.getLogger(__name__)
 
-LEARN_WITHIN_S = 0.3  # chosen: many times what an answer takes, less than an ARC waits until its notice is noted
+LEARN_WITHIN_S = 0.3  # chosen: many times the time of an answer, less than an ARC waits for the reply to its notice
 
 
 class StopEar:
-    """Listens for one robot at a time.
+    """Subscribes to one robot at a time.
 
     Args:
-        console: Which holds it.
-        heard: Called with each state, the one in force at the beginning included.
+        console: The console that holds it.
+        heard: Called with each state, with the one in force at the beginning too.
     """
 
-    def __init__(self, console: Observer[Any], heard: Callable[[StopState], None]) -> None:
+    def __init__(self, console: AnyObserver, heard: Callable[[StopState], None]) -> None:
         self._console, self._heard = console, heard
         self._listening: Subscription | None = None
         self._robot, self._known = "", asyncio.Event()
 
     async def listen(self, robot: str) -> None:
-        """Hear of this robot from now on, and of no other; return when it is known how it is, or soon.
+        """Subscribe to this robot alone; return when its state is known, or after a short time-out.
 
-        When: as early as it is known which robot it will be, so that nobody waits for the answer when it is granted.
+        When: as soon as the robot of the claim is known, so that the grant does not wait for the answer.
         """
         if self._listening is None or robot != self._robot:
             self.close()
@@ -45,7 +45,7 @@ class StopEar:
         await self._known.wait()
 
     def close(self) -> None:
-        """Hear of none."""
+        """Unsubscribe."""
         if self._listening is not None:
             self._listening.close()
             self._listening = None
@@ -55,6 +55,6 @@ class StopEar:
             async with asyncio.timeout(LEARN_WITHIN_S):
                 self._heard(await ask_stop(self._console.bus, robot))
         except (Refusal, LinkError, TimeoutError) as error:  # a robot of another make may know no such stop
-            log.info("%s did not say whether it is stopped: %s", robot, error)
+            log.info("%s did not answer with its stop: %s", robot, error)
         finally:
             known.set()

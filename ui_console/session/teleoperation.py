@@ -1,18 +1,17 @@
 """Teleoperation: a person's hold on one robot.
 
-Claims an ARC as a behavior does, with a priority of its own beside the mission's, and gives it back
-on request, at its end, or by its death, which the ARC sees. Faces (terminal, script) hear events
-through ``show`` and pictures through ``see``, and call the verbs. What the hands want goes through
-``controls``, what operators say to each other about the robot through ``consent_talk``.
+The console claims an ARC as a behavior does, with a priority of its own beside the mission's, and gives it back on
+request, at its end, or by its death, which the ARC sees. Faces (terminal, script) receive events through ``show`` and
+pictures through ``see``, and call the verbs. Commands go through ``controls``, the operators' questions about the robot
+through ``consent_talk``.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from collections.abc import Awaitable, Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -20,12 +19,12 @@ from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
-from backbone.operators import OperatorAction
-from backbone.wire import Envelope, Message
+from backbone.mission_log.operators import OperatorAction
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
-from ui_console.model.driving import Command, Drive, Halt, Jump
+from ui_console.model.driving import Command, DriveWish, HaltWish, JumpWish
 from ui_console.model.lifting import AskLift
 from ui_console.model.robot_board import ROBOT_KIND
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
@@ -47,17 +46,17 @@ class Teleoperation(Observer[TeleoperationParameters]):
     Args:
         show: Called with each event, in order.
         see: Called with the newest picture; pictures of earlier grants never arrive.
-        work: Run once the console is ready, instead of waiting for somebody to end it; its end is the console's.
+        work: Run once the console is ready, instead of a wait for a request to end; its end ends the console.
         takes: Claim at once.
-        watches: Also tell what happens to others.
-        keeps_arc: Keep the ARC when the robot is given back, so that it is there at once when it is taken again.
-        signs_in: Tell the mission that its operator came and left; False where somebody else does.
-        user: Who drives, for the record; empty: the console's name.
-        answers: What its operator is asked, if several consoles are one person's; None: something of its own.
+        watches: Also show events of other components.
+        keeps_arc: Keep the ARC when the robot is given back, so that the next take needs no start of an ARC.
+        signs_in: Publish that its operator came and left; False if another component does.
+        user: The driver, for the record; empty: the console's name.
+        answers: The questions to its operator, if several consoles are one person's; None: new ones.
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent | AskHandOver | AskLift
+    accepts: ClassVar[Accepts | None] = ArcNotice | AskConsent | AskHandOver | AskLift
 
     def __init__(
         self,
@@ -78,7 +77,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
         self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
         self._arc: ArcClient | None = None
-        self._claimed: tuple[str, dict[str, Any]] | None = None
+        self._claimed: tuple[str, dict[str, object]] | None = None
         self._rests = False
         self._keeping: asyncio.Task[None] | None = None
         self._frames: Subscription | None = None
@@ -113,7 +112,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         return self.state is LifeState.READY
 
     def take(self) -> None:
-        """Claim the robot unless it is claimed; if it is just being given back, right afterwards."""
+        """Claim the robot unless it is claimed; if its release is under way, right afterwards."""
         if self._giving_back.locked():
             self._takes_next = True
             self._decided.clear()
@@ -126,9 +125,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not self._rests:
             self._arc = ArcClient(self.bus, wished.arc(self.bus), self)
         arc, self._claimed, self._is_asking = self._arc, claim, True
-        assert arc is not None  # noqa: S101  what rests is there
+        assert arc is not None  # noqa: S101  an ARC that rests exists
         self._controls.connect(arc)
-        self._ear.close()  # what it told the last ARC is news to this one
+        self._ear.close()  # the state it reported to the last ARC is new to this one
         if wished.robot:
             self.start_task(self._ear.listen(wished.robot), "stop")
         if self._see is not None:
@@ -140,9 +139,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._keeping = self.start_task(self._keep(arc, rested), "arc")
 
     async def switch(self, robot: str) -> None:
-        """Claim another robot in place of the one that is claimed, which is stopped and given back first.
+        """Claim another robot in place of the present one, which is stopped and given back first.
 
-        Asked for several in a row, it claims the last.
+        After several calls in a row the console claims the last robot.
         """
         self._next_robot = robot
         async with self._switching:
@@ -154,16 +153,16 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.take()
 
     def touch(self) -> None:
-        """The operator is there; driving says so by itself."""
+        """Note that the operator is there; driving shows that by itself."""
         self._presence.touch()
 
     def leave(self) -> None:
-        """The operator turned away, or the window is no longer in front: the wheels stop, and nothing held counts."""
+        """Stop the wheels and ignore held controls: the operator turned away, or the window is no longer in front."""
         self._presence.leave()
         self.require_let_go()
 
     def require_let_go(self) -> None:
-        """From now on what is held moves nothing until it was let go and pressed anew; wheels that turn stop.
+        """Stop the wheels; a control that is held moves nothing until it was let go and pressed anew.
 
         When: a dialog opens or closes. Stops, lifts, grants, and the loss of robot or link require it anyway.
         """
@@ -173,33 +172,33 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Return when the claim was granted.
 
         Raises:
-            Refusal: It was refused.
+            Refusal: The claim was refused.
         """
         await self._decided.wait()
         if self.refusal is not None:
             raise self.refusal
 
-    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
-        """A drive key is down: the command repeats until the hold ends, then the wheels stop.
+    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
+        """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
         Args:
-            drive: What the key stands for.
-            lasts_s: How long that counts, machine seconds, for what says it again while it is held; None: as for keys.
+            drive: The command of the key.
+            lasts_s: How long the press counts, machine seconds, for a control that repeats while held; None: as keys.
         """
         self.touch()
         self._controls.hold(drive, lasts_s)
 
     def stop(self) -> None:
-        """Stop the wheels now; sticks, pads and pages say by this that they were let go."""
+        """Stop the wheels now; sticks, pads and pages report their release by this call."""
         self._controls.stop()
 
     def jump(self) -> None:
-        """The key for one jump is down: jump, unless it has to be let go first."""
+        """Take in that the key for one jump is down: jump, unless it has to be let go first."""
         if self._controls.press_jump() and self.is_held:
             self.start_task(self._jump(), "jump")
 
     async def do(self, command: Command) -> bool:
-        """Have one command carried out and tell what became of it; return True if it was applied."""
+        """Send one command and show its outcome; return True if it was applied."""
         return not self._rests and await self._controls.do(command)
 
     def begin_release(self) -> None:
@@ -233,11 +232,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self._frames = None
         if self._is_asking:
             self._is_asking, self.given_back = False, confirmed
-            self._tell_given_back(reason, confirmed=confirmed, wanted=wanted)
+            self._record_given_back(reason, confirmed=confirmed, wanted=wanted)
 
     async def _let_go(self, arc: ArcClient, reason: str, *, for_good: bool) -> bool:
-        """Have the ARC rest if it is kept, else end it; return whether it confirmed that."""
-        if self._keeps_arc and arc.granted is not None and not for_good:  # one that waits could just be granted
+        """Rest the ARC if the console keeps it, else end it; return whether the ARC confirmed that."""
+        if self._keeps_arc and arc.granted is not None and not for_good:  # an ARC that waits could just be granted
             try:
                 await arc.rest()
             except (LinkError, Refusal) as error:
@@ -255,24 +254,24 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._arc, self._rests = None, False
         return confirmed
 
-    def _tell_given_back(self, reason: str, *, confirmed: bool, wanted: bool) -> None:
+    def _record_given_back(self, reason: str, *, confirmed: bool, wanted: bool) -> None:
         self._ear.close()
-        self._controls.tell_drive_ended(self._holding, reason)
+        self._controls.record_drive_end(self._holding, reason)
         self.answers.ended(True, reason)
         robot, self._holding = self._holding or self.parameters.robot or ANY_ROBOT, ""
-        self.acted(OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which nobody confirmed'}")
+        self.acted(OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which its ARC did not confirm'}")
         self.report("holds no robot")
         self.show(events.GivenBack(self.clock.now_s(), reason, confirmed, wanted))
 
     # ------------------------------------------------------------------ consent
     def begin_ask_consent(self, why: str = "") -> None:
-        """Ask whoever holds what this console waits for; what they say is shown. Nothing if they are being asked."""
+        """Ask the consoles that hold the robot, and show their answers; do nothing while such a question is open."""
         robot, is_waiting = self.parameters.robot, self._is_asking and not self.is_held
         claim = Claim(self.parameters.arc(self.bus), robot, robot or ANY_ROBOT, self._asked_s)
         self._consent.begin_ask(claim if is_waiting else None, why)
 
     def _consent_at_once(self) -> Consent | None:
-        """Return what is said to who asks for the robot if there is nothing that the operator could decide."""
+        """Return the answer to a question for the robot if it needs no decision; None: the operator decides."""
         if not self.is_held:
             return Consent(not self._is_asking, self.user, "holds nothing")
         return Consent(False, self.user, "a script drives") if self._work is not None else None
@@ -290,7 +289,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.start_task(self._work_and_end(self._work), "work")
         await self.watch()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC's notices, and other consoles that ask for the robot or to lift a stop."""
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once())
@@ -312,7 +311,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         await super().drain()
 
     async def connect(self) -> None:
-        """Listen to what the mission tells, and to the own link."""
+        """Subscribe to the mission's messages, and to this console's link."""
         await super().connect()
         self.bus.watch_link(lambda _is_up: self.require_let_go())
 
@@ -326,15 +325,15 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     # ------------------------------------------------------------------ the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
-        """Tell it; see ``ArcListener``."""
+        """Show the grant; see ``ArcListener``."""
         if self._keeping is None:
             log.info("%s was granted after it was given back", notice.arc)
-            return  # its wish for no time reached the RC manager later than its turn did; that takes the RCs back
+            return  # the RC manager granted before it got the withdrawal; it revokes the RCs then
         robot = notice.rcs.get(ROBOT_KIND, "no robot")
         self.require_let_go()
         await self._ear.listen(robot)
         if not self.is_held or self._arc is None or self._arc.epochs != notice.epochs:
-            return  # it went again meanwhile
+            return  # the ARC lost it again meanwhile
         again, self._grants = self._grants > 0, self._grants + 1
         self.report(f"drives {robot}")
         if not again:
@@ -345,27 +344,27 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     async def arc_suspending(self, notice: Suspending) -> None:  # noqa: ARG002  one command needs no deadline
         """Stop the wheels within the deadline; see ``ArcListener``."""
-        await self.do(Halt())
+        await self.do(HaltWish())
 
     async def arc_suspended(self, notice: Suspended) -> None:
-        """Tell it; see ``ArcListener``."""
+        """Show the loss; see ``ArcListener``."""
         self.require_let_go()
         if self._keeping is not None:
             because = f"{notice.reason} by {notice.by}" if notice.by else notice.reason
             self.answers.ended(False, f"it was lost: {because}")
-            self._controls.tell_drive_ended(self._holding, because)
+            self._controls.record_drive_end(self._holding, because)
             self.report(f"waits: {because}")
             self.show(events.Heard(self.clock.now_s(), notice))
 
     def _heard_stop(self, state: StopState) -> None:
-        """The robot that is held was stopped or may move again: whoever drives it has to know that first."""
+        """Show that the robot held was stopped or may move again: its driver has to know that first."""
         if self._arc is not None and self._arc.heard_stop(state):
             self.require_let_go()
         if not self._watches and state.number > 0:  # 0: it never was stopped
             self.show(events.Heard(self.clock.now_s(), state))
 
     async def _keep(self, arc: ArcClient, rested: ArcClient | None) -> None:
-        """Keep the ARC as it was claimed; one that rested and cannot be used any more is ended first."""
+        """Keep the ARC as it was claimed; first end an ARC that rested and cannot be used any more."""
         assert self._claimed is not None  # noqa: S101  made in take
         kind, parameters = self._claimed
         rests, self._rests = self._rests, False
@@ -386,14 +385,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.show(events.PictureSeen(self.clock.now_s(), frame.captured_s, frame.robot))
             self._see(frame)
 
-    # ------------------------------------------------------------------ hands
+    # ------------------------------------------------------------------ away, and jumps
     async def _go_away(self) -> None:
-        """Let the robot go on with useful work when nobody drives it."""
+        """Let the robot go on with useful work while its operator is away."""
         self.leave()
         await self.give_back(f"{self.user} is away", wanted=False)
 
     async def _jump(self) -> None:
-        await self.do(Jump())
+        await self.do(JumpWish())
 
     async def _work_and_end(self, work: Callable[[Teleoperation], Awaitable[None]]) -> None:
         await work(self)

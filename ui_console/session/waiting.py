@@ -1,41 +1,40 @@
-"""While a console waits for a robot: why it does, and whether the same person holds it at another screen."""
+"""While a console waits for a robot: the reason, and a hold of the same person at another screen."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import Any
 
+from backbone.addresses import RC_MANAGER
 from backbone.errors import LinkError, Refusal
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy
 from backbone.scheduling.views import Why
 from ui_console.model.events import Heard
 from ui_console.session.feed import REPLY_TIME_S
 from ui_console.session.hand_over import HandOver
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 log = logging.getLogger(__name__)
 
 
 class Waiting:
-    """Asks again whenever the schedule changed.
+    """Asks anew after each change of the schedule.
 
     Args:
-        console: Which waits.
-        hand_over: The talk with this person's other screens.
+        console: The console that waits.
+        hand_over: Messages with this person's other screens.
         waits_for: Returns the robot that the console waits for, and since when; None: it waits no more.
     """
 
     def __init__(
-        self, console: Observer[Any], hand_over: HandOver, waits_for: Callable[[], tuple[str, float] | None]
+        self, console: AnyObserver, hand_over: HandOver, waits_for: Callable[[], tuple[str, float] | None]
     ) -> None:
         self._console, self._hand_over, self._waits_for = console, hand_over, waits_for
         self._asking: asyncio.Task[None] | None = None
 
     def ask(self, arc: str) -> None:
-        """Ask why this ARC waits, if it does, unless the answer to that is still to come."""
+        """Ask why this ARC waits, if it does, unless an answer is still under way."""
         if self._asking is None and self._waits_for() is not None:
             self._asking = self._console.start_task(self._ask(arc), "why")
 

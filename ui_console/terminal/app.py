@@ -1,4 +1,4 @@
-"""What the keys of the console in a terminal do; what they want of the robot is in the session."""
+"""Actions of the terminal console's keys; the session carries out those that concern the robot."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from textual import work
 from textual.events import AppBlur, AppFocus, Key, MouseDown
 from textual.widgets import Input
 
-from backbone.endings import ExitCode
 from backbone.errors import Refusal
+from backbone.launcher.endings import ExitCode
 from ui_console.model.driving import Direction, drive_towards
 from ui_console.model.views import AlarmView
 from ui_console.session.gamepad import buttons_help
-from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading, RobotPicker
+from ui_console.terminal.dialogs import Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker
 from ui_console.terminal.display import ConsoleDisplay
 from ui_console.terminal.keys import keys_help, stop_meant
 from ui_console.terminal.lines import robot_rows
-from ui_console.terminal.log_search import SEARCH_HELP, Found, read_search
+from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
 from ui_console.terminal.tables import FIXED, PanelName
 from ui_console.terminal.widgets import DrivePad, Panel
 
@@ -32,7 +32,7 @@ class ConsoleApp(ConsoleDisplay):
     """One console's screen, and its keys."""
 
     def _open(self, dialog: Dialog[A], answered: Callable[[A], object] | None = None) -> None:
-        """Open a dialog; what is held down then, or when it closes, drives no more until it was let go."""
+        """Open a dialog; a key held at its opening or closing drives no more until it was let go."""
 
         def closed(answer: A | None) -> None:
             self._session.require_let_go()
@@ -44,31 +44,31 @@ class ConsoleApp(ConsoleDisplay):
 
     @work
     async def _begin(self, act: Callable[[], Awaitable[object]]) -> None:
-        """Do this while keys are heard."""
+        """Run this in a task, so that keys go on to work."""
         await act()
 
     # ------------------------------------------------------------------ keys that drive
     def on_key(self, _event: Key) -> None:
-        """Take note that somebody is there."""
+        """Note that the operator is there."""
         self._session.touch()
 
     def on_mouse_down(self, _event: MouseDown) -> None:
-        """Take note that somebody is there."""
+        """Note that the operator is there."""
         self._session.touch()
 
     def on_input_changed(self, _event: Input.Changed) -> None:
-        """Take note that somebody is there: a field keeps the keys to itself."""
+        """Note that the operator is there: a field keeps the keys to itself."""
         self._session.touch()
 
     def action_drive(self, direction: Direction) -> None:
         """Drive while the key is held; the session ends it when no repeat comes."""
         self._session.hold(drive_towards(direction, self.speed_rad_s))
 
-    def on_drive_pad_held(self, message: DrivePad.Held) -> None:
-        """Drive as the pad says."""
+    def on_drive_pad_dragged(self, message: DrivePad.Dragged) -> None:
+        """Drive by the pad."""
         self._session.hold(message.drive, message.lasts_s)
 
-    def on_drive_pad_let_go(self, _message: DrivePad.LetGo) -> None:
+    def on_drive_pad_released(self, _message: DrivePad.Released) -> None:
         """Stop the wheels now."""
         self._session.stop()
 
@@ -102,31 +102,31 @@ class ConsoleApp(ConsoleDisplay):
             self._session.release()
 
     def action_ask_consent(self) -> None:
-        """Ask the operator who holds what this one waits for."""
+        """Ask the operator who holds the robot this one waits for."""
         self._session.ask_consent()
 
     def action_ask_consent_because(self) -> None:
-        """The same, with a sentence that says why."""
-        self._open(Question("may I have it, because"), self._session.ask_consent)
+        """Ask the same, with a reason."""
+        self._open(LineQuestion("may I have it, because"), self._session.ask_consent)
 
     def action_decide(self, is_given: bool) -> None:
-        """Let the operator who asks have the robot, or keep it."""
+        """Give the robot to the operator who asks, or keep it."""
         self._session.decide(is_given)
 
     def on_app_blur(self, _event: AppBlur) -> None:
-        """Stop the wheels when the window is left: no key release would be heard there."""
+        """Stop the wheels when the window is left: it gets no key events after that."""
         if self.drives:
             self.screen_stack[0].query_one(DrivePad).let_go()
             self._session.leave()
 
     def on_app_focus(self, _event: AppFocus) -> None:
-        """Take note that somebody is there again."""
+        """Note that the operator is there again."""
         if self.drives:
             self._session.touch()
 
     # ------------------------------------------------------------------ emergency stop
     def action_stop_robot(self) -> None:
-        """Stop this robot, whoever holds it."""
+        """Stop this robot, regardless of its holder."""
         robot = self._robot_meant()
         if not robot:
             self.notify("which robot? move to its row first, or stop all with X", severity="warning")
@@ -136,13 +136,13 @@ class ConsoleApp(ConsoleDisplay):
         self._begin(partial(self._stop_robot, robot))
 
     def action_stop_all(self) -> None:
-        """Stop all robots, whoever holds them."""
+        """Stop all robots, regardless of their holders."""
         self._session.touch()
         self._session.stop()
         self._begin(self._stop_all)
 
     def action_lift(self) -> None:
-        """Show whose stop is meant and why it was set, and lift it if another key says so."""
+        """Show the stop with its authors and reason, and lift it if another key confirms that."""
         robots = {robot.robot: robot for robot in self._view.robots} if self._view is not None else {}
         stopped = [name for name, robot in robots.items() if robot.stop is not None]
         meant = stop_meant(stopped, **self._robots_at_hand())
@@ -171,7 +171,7 @@ class ConsoleApp(ConsoleDisplay):
 
     # ------------------------------------------------------------------ which robot
     def action_choose_robot(self, number: int) -> None:
-        """Take the robot of this number in place of the one that is held."""
+        """Take the robot of this number in place of the one held."""
         robots = self._view.robots if self._view is not None else []
         if number <= len(robots):
             self._begin(partial(self._session.switch, robots[number - 1].robot))
@@ -199,7 +199,7 @@ class ConsoleApp(ConsoleDisplay):
         self._panel().move(steps)
 
     def action_why(self) -> None:
-        """Say why what the cursor is on is as it is; of an alarm, also where to look."""
+        """Show why the row under the cursor is as it is; of an alarm, also its place."""
         row = self._panel().row
         if row is not None and row.subject:
             where = next((alarm.where for alarm in self._alarms() if alarm.key == row.key), "")
@@ -210,7 +210,7 @@ class ConsoleApp(ConsoleDisplay):
         self._open(Reading(f"why {subject}?", [*first, *await self._session.why(subject)]))
 
     def action_acknowledge(self) -> None:
-        """A robot that was lost is known to be; else the alarm the cursor is on was seen, or the first of the list."""
+        """Acknowledge the loss of a robot, else the alarm under the cursor, or the first of the list."""
         if self._knew_of_lost():
             return
         shown = self._alarms()
@@ -220,13 +220,13 @@ class ConsoleApp(ConsoleDisplay):
             self.redraw()
 
     def action_acknowledge_all(self) -> None:
-        """All alarms were seen, and that a robot was lost."""
+        """Acknowledge all alarms, and the loss of a robot."""
         self._knew_of_lost()
         self._session.acknowledge("")
         self.redraw()
 
     def _knew_of_lost(self) -> bool:
-        """Note that the operator knows of a robot that was lost; return whether one was."""
+        """Acknowledge the loss of a robot; return whether one was lost."""
         is_lost = self._view is not None and self._view.own.lost is not None
         if is_lost:
             self._session.dismiss_lost()
@@ -237,7 +237,7 @@ class ConsoleApp(ConsoleDisplay):
         return self._view.alarms if self._view is not None else []
 
     def action_ask_parameters(self) -> None:
-        """Have the component the cursor is on tell its parameters."""
+        """Ask the component under the cursor for its parameters."""
         subject = self._subject()
         if subject:
             self._ask_parameters(subject)
@@ -249,7 +249,7 @@ class ConsoleApp(ConsoleDisplay):
         self.redraw()
 
     def action_edit(self) -> None:
-        """Change the parameter the cursor is on."""
+        """Change the parameter under the cursor."""
         row = self._panel().row
         if self.chosen is not PanelName.PARAMETERS or row is None or self._view is None:
             return
@@ -259,7 +259,7 @@ class ConsoleApp(ConsoleDisplay):
         parameter = found[0]
 
         self._open(
-            Question(f"{parameter.component}.{parameter.name} =", parameter.value),
+            LineQuestion(f"{parameter.component}.{parameter.name} =", parameter.value),
             lambda text: self._begin(partial(self._set, parameter.component, parameter.name, text)),
         )
 
@@ -269,15 +269,15 @@ class ConsoleApp(ConsoleDisplay):
         self.redraw()
 
     def action_search(self) -> None:
-        """Show what the mission's log has of something, however long ago, and what comes of it from now on."""
+        """Show the events of the mission's log that match a search, and matching events from now on."""
         before = self._found.line if self._found is not None else ""
-        self._open(Question("search the log", before, SEARCH_HELP), self._search)
+        self._open(LineQuestion("search the log", before, SEARCH_HELP), self._search)
 
     @work(group="search", exclusive=True)
     async def _search(self, line: str) -> None:
         question = read_search(line)
         try:
-            found = Found(" ".join(line.split()), *await self._session.search_log(question)) if question else None
+            found = LogResult(" ".join(line.split()), *await self._session.search_log(question)) if question else None
         except Refusal as refusal:
             self.notify(f"{refusal.detail}. {refusal.remedy}", severity="warning", markup=False)
             return
@@ -290,19 +290,19 @@ class ConsoleApp(ConsoleDisplay):
         self.screen.toggle_class("-bare")
 
     def action_keys(self) -> None:
-        """Say what the keys do."""
+        """Show the keys and their actions."""
         shown = keys_help(self.profile, self.get_key_display)
         if self._has_gamepad:
             shown += ["", "gamepad", *buttons_help()]
         self._open(Reading("keys", shown))
 
     def action_interrupt(self) -> None:
-        """Leave as Ctrl-C leaves any program."""
+        """Leave with the exit code of Ctrl-C."""
         self.exit(return_code=ExitCode.INTERRUPTED)
 
 
 def read_value(text: str) -> object:
-    """Return what was typed as JSON, or as the text it is.
+    """Return the typed value, decoded as JSON if it is JSON, else as text.
 
     Example:
         >>> read_value("0.5"), read_value("true"), read_value("scout1")

@@ -1,4 +1,4 @@
-"""What covers the screen for a moment: pick a robot, read a reason, change a parameter, lift a stop.
+"""Dialogs over the screen: pick a robot, read a reason, change a parameter, lift a stop.
 
 Drive keys do nothing meanwhile, so the wheels stop by themselves. The keys of the emergency stop work here too, also
 while a line is typed.
@@ -31,7 +31,7 @@ Dialog OptionList { height: auto; max-height: 20; }
 Dialog VerticalScroll { height: auto; max-height: 100%; }
 Dialog .remark { color: $text-muted; }
 """
-READ_S = 0.5  # chosen: nobody reads a line faster
+READ_S = 0.5  # chosen: people need longer to read a line
 FIELD_REMARK = "x and X stop robots here too; ctrl+x types an x"
 
 
@@ -42,11 +42,11 @@ class Dialog(ModalScreen[T]):
 
     @property
     def subject(self) -> str:
-        """The name the dialog's cursor is on; empty: it has no cursor."""
+        """The name under the dialog's cursor; empty: it has no cursor."""
         return ""
 
     def answer(self, result: T | None) -> None:
-        """Close with this answer; of several that keys pressed in a burst give, the first counts."""
+        """Close with this answer; of several answers from a burst of keys the first counts."""
         if self.is_active:
             self.dismiss(result)
 
@@ -61,7 +61,7 @@ class Field(Input):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+x", "type_x", "type an x", show=False)]
 
     def check_consume_key(self, key: str, character: str | None) -> bool:
-        """Say whether the key is text; the keys of the emergency stop never are."""
+        """Return whether the key is text; the keys of the emergency stop never are."""
         return key not in STOP_KEYS and super().check_consume_key(key, character)
 
     def action_type_x(self) -> None:
@@ -78,7 +78,7 @@ class RobotPicker(Dialog[str]):
 
     @property
     def subject(self) -> str:
-        """The robot the cursor is on; empty before the list is there."""
+        """The robot under the cursor; empty before the list is there."""
         chosen = [options.highlighted for options in self.query(OptionList)]
         return "".join(self._robots[number].subject for number in chosen if number is not None)
 
@@ -110,13 +110,13 @@ class Reading(Dialog[None]):
                 yield Static(Text("\n".join(self._lines)), id="reading")
 
 
-class Question(Dialog[str]):
-    """Ask for one line; answers what was typed.
+class LineQuestion(Dialog[str]):
+    """Ask for one line; answers with the typed line.
 
     Args:
-        title: What is asked.
-        value: What stands there at first.
-        remark: What may be typed.
+        title: The question.
+        value: The line at first.
+        remark: Help on the line's format.
     """
 
     def __init__(self, title: str, value: str = "", remark: str = "") -> None:
@@ -139,7 +139,7 @@ class Question(Dialog[str]):
 
 
 class LiftQuestion(Dialog[int]):
-    """Ask whether a stop is to be lifted, by another key than the one that asked; answers the number of that stop.
+    """Ask whether to lift a stop, by another key than the one that opened this; answers with the stop's number.
 
     Args:
         robot: Which robot.
@@ -175,7 +175,7 @@ class LiftQuestion(Dialog[int]):
             shown.update(self._text())
 
     def action_lift(self) -> None:
-        """Answer, unless the stop has just become another one, which nobody can have read yet."""
+        """Answer, unless the dialog shows this stop for less than ``READ_S``, too short to read it."""
         if asyncio.get_running_loop().time() - self._changed_s >= READ_S:
             self.answer(self._stop.number)
 

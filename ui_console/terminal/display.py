@@ -1,11 +1,11 @@
-"""What the console in a terminal shows: live picture, who holds what and why, the keys that matter now.
+"""Screen of the terminal console: live picture, holders with reasons, the keys that matter now.
 
-Widgets are thin: what they show is in ``ConsoleModel``, which keys there are in ``keys``.
+Widgets are thin: ``ConsoleModel`` has their content, ``keys`` the keys.
 """
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 from rich.text import Text
@@ -24,7 +24,7 @@ from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, has, hints, robot_meant
 from ui_console.terminal.lines import Row, table_rows
-from ui_console.terminal.log_search import FOUND_SHOWN, Found
+from ui_console.terminal.log_search import FOUND_SHOWN, LogResult
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName
 from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
@@ -32,16 +32,16 @@ from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
 REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
-LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which nothing old looks fresh
+LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which an old view must be marked
 SPEED_RAD_S = 4.0  # chosen: a walk
 NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are both too small
 
 
 class ConsoleDisplay(EndingApp):
-    """One console's screen, without what its keys do.
+    """One console's screen, without the actions of its keys.
 
     Args:
-        session: What keys do.
+        session: Carries out the keys' actions.
         profile: How it looks.
         has_pixels: True if the terminal shows real pixels.
         is_bare: True to begin with the picture alone, for a head-mounted display.
@@ -104,7 +104,7 @@ class ConsoleDisplay(EndingApp):
         self.speed_rad_s = SPEED_RAD_S
         self.chosen = PanelName.ROBOTS
         self._turn = PanelName.SCHEDULE
-        self._found: Found | None = None
+        self._found: LogResult | None = None
         self._view: ConsoleView | None = None
 
     @property
@@ -112,7 +112,7 @@ class ConsoleDisplay(EndingApp):
         """Whether this console may drive."""
         return self.profile is not Profile.MONITOR
 
-    # ------------------------------------------------------------------ what is shown
+    # ------------------------------------------------------------------ content
     def compose(self) -> ComposeResult:
         """Lay out: first lines, picture and drag pad left, tables right, keys below."""
         yield Static(id="status")
@@ -146,11 +146,11 @@ class ConsoleDisplay(EndingApp):
         self.call_after_refresh(self.redraw)
 
     def on_unmount(self, _event: Unmount) -> None:
-        """Let the session know before anything else is done about what ended the screen."""
+        """Notify the session first of all that the screen ended."""
         self._session.closed()
 
     def redraw(self) -> None:
-        """Show what the model says now."""
+        """Show the model's present content."""
         main = self._main()
         if main is None:
             return
@@ -171,13 +171,13 @@ class ConsoleDisplay(EndingApp):
         self.redraw_video()
 
     def redraw_if_cut(self) -> None:
-        """Show at once that the link is down, or up again: nothing looks fresh that is not."""
+        """Show at once that the link is down, or up again, so that no old view looks fresh."""
         shown = self._view is not None and self._view.own.link_down_s >= 0
         if (self._session.model.team.links.down_s(self._session.now_s()) >= 0) is not shown:
             self.redraw()
 
     def redraw_video(self) -> None:
-        """Show the newest picture, or why there is none to drive by."""
+        """Show the newest picture, or the reason why there is none to drive by."""
         main = self._main()
         if self._view is None or self.profile is not Profile.TERMINAL or main is None:
             return
@@ -188,7 +188,7 @@ class ConsoleDisplay(EndingApp):
             remark = own.status
         main.query_one(Video).look(remark)
 
-    def _main(self) -> Screen[Any] | None:
+    def _main(self) -> Screen[object] | None:
         """Return the screen behind all dialogs; None while it is just being taken down."""
         screens = self.screen_stack if self.is_running else []
         return screens[0] if screens and screens[0].query("#status") else None
@@ -197,7 +197,7 @@ class ConsoleDisplay(EndingApp):
         """Hide the keys that this profile does not have."""
         return has(self.profile, action)
 
-    def _show_head(self, main: Screen[Any], view: ConsoleView) -> None:
+    def _show_head(self, main: Screen[object], view: ConsoleView) -> None:
         first = head(view, self.size.width, self.profile, self.speed_rad_s)
         main.query_one("#status", Static).update(first.status, layout=False)
         say = main.query_one("#say", Static)
@@ -214,7 +214,7 @@ class ConsoleDisplay(EndingApp):
         rows = table_rows(name, view, panel.content_size.width)
         panel.show_rows(rows, is_chosen=is_chosen, nothing=NOTHING[name])
 
-    # ------------------------------------------------------------------ what is meant
+    # ------------------------------------------------------------------ the robot a key means
     def _panel(self) -> Panel:
         return self.screen_stack[0].query_one(f"#{self.chosen}" if self.chosen in FIXED else "#turn", Panel)
 

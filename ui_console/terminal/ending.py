@@ -1,4 +1,4 @@
-"""How the screen of a terminal ends: what crashed stays a crash, and keys typed ahead of an end do nothing."""
+"""End of a terminal's screen: a crash keeps its exit code, and keys typed ahead of the end do nothing."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ class EndingApp(App[None]):
     _is_ending = False
 
     def exit(self, result: None = None, return_code: int = 0, message: Any = None) -> None:
-        """End; what ended by a crash keeps its code."""
+        """End; after a crash its exit code stays."""
         self._is_ending = True
         super().exit(result, return_code or self.return_code or 0, message)
 
     async def on_event(self, event: Event) -> None:
-        """Take in what happens; once it ends, no key or mouse any more: they would meet no screen."""
+        """Take in an event; once the screen ends, drop keys and mouse events: there is no screen for them."""
         if not (self._is_ending and isinstance(event, InputEvent)):
             await super().on_event(event)

@@ -1,7 +1,7 @@
 """Notice that the terminal has gone away: its window was closed, its connection cut.
 
-A terminal that is the process's own kills it with a signal. One that merely was its standard input does
-not, and reading from it then returns at once, for ever.
+The controlling terminal of a process ends it with a signal. A terminal that is only its standard input does not, and
+reading from it then returns at once, for ever.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ class HangupWatch:
     """Calls back, in the event loop, when the other end of a terminal is closed.
 
     Args:
-        descriptor: Of the terminal; what it sends is left to whoever reads it.
+        descriptor: Of the terminal; the watch reads none of its input.
         gone: Called once.
     """
 
@@ -24,7 +24,7 @@ class HangupWatch:
         self._loop = asyncio.get_running_loop()
         self._poll: select.epoll | None = select.epoll()
         try:
-            self._poll.register(descriptor, 0)  # hang-up and error are told in any case, input is not
+            self._poll.register(descriptor, 0)  # reports hang-up and error in any case, and no input
         except PermissionError:  # a file: it never hangs up
             self.close()
             return

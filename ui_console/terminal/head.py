@@ -1,7 +1,7 @@
-"""The first lines: whether the robot is held, how the mission is, and what the operator must know or answer now.
+"""The first lines: hold of the robot, health of the mission, and notices and questions to the operator.
 
-Rules of this file: a view and a width in, rich texts out. What does not fit beside what weighs more is told shorter or
-left out; nothing is cut in the middle. What asks for an answer has a line of its own, which wraps.
+Rules of this file: a view and a width in, rich texts out. A fact that does not fit beside heavier ones is shortened or
+left out; no fact is cut in the middle. A question has a line of its own, which wraps.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Head:
 
     Attributes:
         status: One line of facts.
-        says: What the operator must know or answer now, the most urgent first.
+        says: Notices and questions to the operator, the most urgent first.
     """
 
     status: Text
@@ -43,9 +43,9 @@ class _Fact:
     """A part of the first line.
 
     Attributes:
-        weight: Where room is short, those of more weight stay.
-        text: As it is told where there is room.
-        short: As it is told elsewhere.
+        weight: If room is short, facts of more weight stay.
+        text: The long form, if there is room.
+        short: The short form.
     """
 
     weight: int
@@ -57,9 +57,9 @@ def head(view: ConsoleView, columns: int, profile: Profile, speed_rad_s: float) 
     """Return the first lines of a console.
 
     Args:
-        view: What it shows.
-        columns: How wide it is.
-        profile: How it looks.
+        view: Its content.
+        columns: Its width.
+        profile: Its look.
         speed_rad_s: Of the drive keys.
     """
     facts = list(_facts(view, profile, speed_rad_s))
@@ -109,7 +109,7 @@ def _says(view: ConsoleView, profile: Profile) -> Iterator[Text]:
         yield Text(f"{own.consent.line} [g: yes, n: no; {own.consent.left_s:.0f} s{others}]", ASKING)
     if own.asked:
         yield Text(own.asked, ASKING)
-    if own.is_asked:  # a console that only watches says so in its first line
+    if own.is_asked:  # the first line of a console that only watches has that already
         yield from (Text(screen, "bold") for screen in own.other_screens)
     if own.must_let_go:
         yield Text("let go, then press anew", ASKING)
@@ -149,7 +149,7 @@ def _fitted(facts: Sequence[_Fact], columns: int) -> tuple[Text, bool]:
         longer = {**shown, number: facts[number].text}
         if number in shown and _width(list(longer.values())) <= columns:
             shown = longer
-    if 0 not in shown:  # not even the shortest of what matters most fits
+    if 0 not in shown:  # not even the short form of the heaviest fact fits
         cut = facts[0].short.copy()
         cut.truncate(columns, overflow="ellipsis")
         return cut, False

@@ -1,4 +1,4 @@
-"""Keys of the terminal console: what each does, which console has it, and which of them its last line names.
+"""Keys of the terminal console: their actions, the consoles that have them, and the keys in the last line.
 
 Rules of this file: no screen; a view and a width in, texts out.
 """
@@ -19,7 +19,7 @@ MOST_PICKED_BY_KEY = 9
 STOP_KEYS = frozenset({"x", "X"})
 """Keys of the emergency stop: no dialog and no field takes them for anything else."""
 ARRIVES_AS = frozenset({"alt+x", "alt+shift+x", "shift+x", "alt+q"})
-"""What they arrive as when escape was pressed a tenth of a second before, and from terminals that tell keys apart."""
+"""The same keys a tenth of a second after escape, and from terminals that report modifiers."""
 
 DRIVE_KEYS = [
     Binding("up,w", "drive('forward')", "drive forward while held"),
@@ -82,11 +82,11 @@ DRIVES = frozenset(
         "ask_consent_because",
     }
 )
-"""Actions of those who may drive."""
+"""Actions of consoles that may drive."""
 STOPS = frozenset({"stop_robot", "stop_all", "lift", "decide"})
-"""Actions every console has: to stop, to lift, and to be asked before somebody else lifts."""
+"""Actions of every console: stop, lift, and answer another operator who wants to lift."""
 PENDANT_DOES = STOPS | {"drive", "stop", "take_or_release", "keys", "quit", "interrupt"}
-"""Four keys to drive, one to stop the wheels, one to take and release, and those of the emergency stop."""
+"""Four keys to drive, one to stop the wheels, one to take and release, and the keys of the emergency stop."""
 
 
 def has(profile: Profile, action: str) -> bool:
@@ -97,10 +97,10 @@ def has(profile: Profile, action: str) -> bool:
 
 
 def keys_help(profile: Profile, name_of: Callable[[Binding], str]) -> list[str]:
-    """Return what each key of this profile does, a line each, those of the emergency stop first.
+    """Return the action of each key of this profile, a line each, the keys of the emergency stop first.
 
     Args:
-        profile: Whose keys.
+        profile: The profile.
         name_of: Names a key for people.
     """
     keys: dict[str, list[str]] = {}
@@ -116,19 +116,19 @@ def action_of(binding: Binding) -> str:
 
 
 def robot_meant(*, held: str, placed: str, wanted: str, shown: str) -> str:
-    """Return the robot that a stop is for, the operator's own first; empty: there is no saying.
+    """Return the robot that a stop is for, the operator's own first; empty: the keys do not show it.
 
     Args:
         held: The robot in hand.
-        placed: The robot whose row the operator moved the cursor to.
+        placed: The robot in the row to which the operator moved the cursor.
         wanted: The robot this console asks for.
-        shown: The robot the cursor happens to be on.
+        shown: The robot under a cursor that the operator did not move.
     """
     return held or placed or wanted or shown
 
 
 def stop_meant(stopped: Sequence[str], *, held: str, placed: str, wanted: str, shown: str) -> str:
-    """Return the stopped robot that is meant to move again, the row's first; empty: none of these is stopped."""
+    """Return the stopped robot that a lift is for, the row's first; empty: none of these is stopped."""
     meant = next((robot for robot in (placed, held, wanted, shown) if robot in stopped), "")
     return meant or (stopped[0] if len(stopped) == 1 else "")
 
@@ -139,10 +139,10 @@ class Hint:
     """A key that the last line names.
 
     Attributes:
-        key: As people call it.
-        words: What it does now.
-        action: What a click on it does; empty: nothing.
-        weight: Where room is short, those of more weight stay.
+        key: Its name, for people.
+        words: Its action now, for people.
+        action: Action of a click on it; empty: none.
+        weight: If room is short, hints of more weight stay.
         style: Of the key.
     """
 
@@ -157,11 +157,11 @@ STOP_STYLE = "bold white on red"
 
 
 def hints(view: ConsoleView, profile: Profile, meant: str) -> list[Hint]:
-    """Return the keys that matter now, in the order in which they are shown.
+    """Return the keys that matter now, in the order on the screen.
 
     Args:
-        view: What the console shows.
-        profile: How it looks.
+        view: Content of the console.
+        profile: Its look.
         meant: The robot that a stop is for.
     """
     found = [Hint("x", f"STOP {meant or 'ROBOT'}", "stop_robot", 9, STOP_STYLE)]

@@ -1,6 +1,6 @@
-"""Views as styled lines of text; what a terminal shows besides the picture.
+"""Views as styled lines of text: a terminal's content besides the picture.
 
-Pure: a view and a width in, rich texts out. A row that can be asked ``why`` names its subject.
+Pure: a view and a width in, rich texts out. A row with a ``why`` names its subject.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ ALARM_STYLES = {views.Severity.ALARM: "bold red", views.Severity.WARNING: "yello
 BUSY_CPU = 0.8  # chosen: from here on a host's load is shown in yellow
 NAME_COLUMNS = 10
 BEYOND_S = 1.0  # chosen: a slice that ends now is not beyond it yet
-HANG = 2  # chosen: a line that goes on is set off from the next row
+HANG = 2  # chosen: the second line of a row is set off from the next row
 LEAST_COLUMNS = 12  # chosen: below, no line is worth folding
-HELD_ELSEWHERE = "hold to lift"  # what a page needs; a terminal has a second key for it
-_PAPER = Console(file=io.StringIO())  # Rich wants one to fold text, and asks it nothing
+HELD_ELSEWHERE = "hold to lift"  # a gesture of pages; a terminal has a second key for it
+_PAPER = Console(file=io.StringIO())  # Rich needs a console to fold text, and writes nothing to it
 SLICE_MARKS = {Certainty.PAST: "▄", Certainty.NOW: "█", Certainty.NEXT: "░"}
 SLICE_COLORS = ("cyan", "green", "magenta", "yellow", "blue", "bright_cyan", "bright_green", "bright_magenta")
 
@@ -47,7 +47,7 @@ class Row:
     """One row of a table.
 
     Attributes:
-        key: Stays the same while the row is about the same thing.
+        key: Stays the same while the row is about the same subject.
         subject: Name to ask ``why`` about; empty: there is nothing to ask.
         text: One line, or more.
     """
@@ -63,9 +63,9 @@ def laid_out(rows: Sequence[Row], here: str | None, columns: int, room: int) -> 
 
     Args:
         rows: From top to bottom.
-        here: Key of the row the cursor is on; None: it is elsewhere.
-        columns: How wide a line may be.
-        room: How many lines there are.
+        here: Key of the row under the cursor; None: the cursor is elsewhere.
+        columns: Width of a line.
+        room: Number of lines.
     """
     folded = [_folded(row.text, columns) for row in rows]
     if sum(map(len, folded)) <= room:
@@ -98,9 +98,9 @@ def table_rows(name: PanelName, view: views.ConsoleView, columns: int) -> list[R
     """Return the rows of a table.
 
     Args:
-        name: Which.
-        view: What the console shows.
-        columns: How wide the table is, for what is drawn to scale.
+        name: The table.
+        view: Content of the console.
+        columns: Width of the table, for drawings to scale.
     """
     now_s = view.now_s
     match name:
@@ -127,13 +127,13 @@ def table_rows(name: PanelName, view: views.ConsoleView, columns: int) -> list[R
 
 
 def robot_rows(robots: list[views.RobotView], now_s: float) -> list[Row]:
-    """Return two lines for each robot: who has it, and for how long, who comes next."""
+    """Return two lines for each robot: its holder, the remaining time, and the next one."""
     wide = max((len(robot.robot) for robot in robots), default=0)
     return [Row(f"robot:{robot.robot}", robot.robot, _robot(robot, now_s, wide)) for robot in robots]
 
 
 def lift_lines(stop: views.StopView) -> list[str]:
-    """Return whose stop is about to be lifted, since when, why it was set, and what lifting it takes."""
+    """Return the lines about a stop that is about to be lifted: its author, age, reason, and how it is lifted."""
     also = f"; since then also by {', '.join(stop.also)}" if stop.also else ""
     reason = [f"because: {stop.reason}"] if stop.reason else []
     takes = [] if stop.lift_line == HELD_ELSEWHERE else [stop.lift_line]
@@ -141,7 +141,7 @@ def lift_lines(stop: views.StopView) -> list[str]:
 
 
 def _timeline_rows(timeline: TimelineView, columns: int) -> list[Row]:
-    """Return one bar for each resource: filled who had it and has it, shaded who comes next; ``│`` is now."""
+    """Return one bar for each resource: filled past and present holders, shaded predicted ones; ``│`` is now."""
     people = sorted({one.who for row in timeline.rows for one in row.slices})
     colors = {who: SLICE_COLORS[number % len(SLICE_COLORS)] for number, who in enumerate(people)}
     wide = max(10, columns - NAME_COLUMNS - 1)
@@ -184,7 +184,7 @@ def _robot(robot: views.RobotView, now_s: float, wide: int) -> Text:
 
 
 def _robot_facts(robot: views.RobotView, now_s: float) -> Iterator[str]:
-    """Yield what else is known of a robot, what matters most first: where room is short, the end is cut."""
+    """Yield further facts of a robot, the most important first: if room is short, the end is cut."""
     if robot.stop is not None:
         yield robot.stop.reason or f"since {robot.stop.age_s:.0f} s"
     if robot.holder and robot.until_s >= 0:
@@ -277,7 +277,7 @@ def _component(component: ComponentState) -> Text:
 def _bar(slices: list[SliceView], timeline: TimelineView, columns: int, colors: dict[str, str]) -> Text:
     scale = columns / (timeline.to_s - timeline.from_s)
     cells: list[tuple[str, str]] = [(" ", "")] * columns
-    for one in slices:  # past ones first, so that what is now is drawn over the rest of them
+    for one in slices:  # past ones first, so that the present one is drawn over the rest of them
         first = int((max(one.from_s, timeline.from_s) - timeline.from_s) * scale)
         last = max(first + 1, int((min(one.to_s, timeline.to_s) - timeline.from_s) * scale))
         for column in range(max(0, first), min(columns, last)):

@@ -1,6 +1,6 @@
-"""What an operator types to find something in the log, and what was found.
+"""An operator's search in the log, and its result.
 
-Pure: a line in, a question out. Words that belong together need no quotes: all that is no field is one text.
+Pure: a line in, a question out. Words that belong together need no quotes: all words that are no field are one text.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backbone.component.messages import LogLevel
-from backbone.log_question import LogQuestion
-from backbone.mission_log import AskLog, Log
+from backbone.mission_log.log import AskLog, Log
+from backbone.mission_log.question import LogQuestion
 from backbone.spoken import counted
 
 SEARCH_HELP = f"words, and robot:NAME person:NAME level:{'|'.join(LogLevel)} since:5m until:14:05; nothing: all"
@@ -18,8 +18,8 @@ _FIELDS = {*LogQuestion.__struct_fields__} - {"text"}
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What a search found.
+class LogResult:
+    """Result of a search.
 
     Attributes:
         line: As typed.
@@ -33,10 +33,10 @@ class Found:
 
     @property
     def title(self) -> str:
-        """What stands over the table.
+        """Title of the table.
 
         Example:
-            >>> Found("robot:scout1", AskLog(robot="scout1"), Log([])).title
+            >>> LogResult("robot:scout1", AskLog(robot="scout1"), Log([])).title
             'log: robot:scout1 (0 events)'
         """
         count = len(self.log.events) + self.log.left_out
@@ -45,7 +45,7 @@ class Found:
 
 
 def read_search(line: str) -> LogQuestion | None:
-    """Return what was asked for; None: all.
+    """Return the typed question; None: all events.
 
     Example:
         >>> asked = read_search("person:anna was stopped")

@@ -1,15 +1,15 @@
-"""Consoles with a screen in a terminal: one that drives, one that watches."""
+"""Consoles with a screen in a terminal: one drives, the other watches."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from backbone.command_line.where import Where
 from backbone.component.component import NoParameters
-from backbone.endings import ExitCode
+from backbone.launcher.endings import ExitCode
 from ui_console.model.profile import Profile
 from ui_console.session.gamepad import find_gamepad
-from ui_console.session.joining import Where, end_on_signals, join
+from ui_console.session.joining import end_on_signals, join
 from ui_console.session.observer import Observer
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.terminal.session import TerminalSession
@@ -17,14 +17,14 @@ from ui_console.terminal.session import TerminalSession
 
 @dataclass(frozen=True)
 class Looks:
-    """How a console with a screen looks, and who sits at it.
+    """Look of a console with a screen, and its person.
 
     Attributes:
-        profile: Which of the screens.
-        user: Who sits at it.
-        sees: Whether pictures come to this machine.
-        is_bare: Whether it begins with the picture alone.
-        has_gamepad: Whether the gamepad of this machine drives, too.
+        profile: The screen.
+        user: The person at it.
+        sees: True: pictures come to this machine.
+        is_bare: True: it begins with the picture alone.
+        has_gamepad: True: the gamepad of this machine drives, too.
     """
 
     profile: Profile
@@ -34,13 +34,13 @@ class Looks:
     has_gamepad: bool
 
 
-async def drive_by_hand(where: Where, wished: dict[str, Any], looks: Looks) -> int:
+async def drive_by_hand(where: Where, wished: dict[str, object], looks: Looks) -> int:
     """Drive a robot by keys; return the command's exit code.
 
     Args:
         where: The mission.
         wished: Parameters of ``Teleoperation``.
-        looks: How the screen looks.
+        looks: Look of the screen.
 
     Raises:
         Refusal: The claim was refused, and no other claim followed.
@@ -75,7 +75,7 @@ async def drive_by_hand(where: Where, wished: dict[str, Any], looks: Looks) -> i
 
 
 async def watch_on_screen(where: Where, user: str) -> int:
-    """Show what happens until a key or a signal ends it; return the command's exit code."""
+    """Show the mission until a key or a signal ends it; return the command's exit code."""
     joining = await join(where)
     launch = joining.launch
     session = TerminalSession(launch.name, launch.mission, user, sees=False)

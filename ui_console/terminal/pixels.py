@@ -2,8 +2,7 @@
 
 The picture is sent once as PNG under an image number; the cells it covers hold placeholder characters whose color
 names that image. A new picture replaces the old one under the same number, so no cell changes and nothing flickers.
-Terminals that know nothing of it get half blocks, as does everything inside a multiplexer, which would swallow the
-picture.
+Terminals without this protocol get half blocks, as do terminals inside a multiplexer, which would drop the picture.
 
 Source: kitty, "Terminal graphics protocol", sections "The transmission medium" and "Unicode placeholders".
 """
@@ -36,7 +35,7 @@ MOST_ROWS = len(ROW_MARKS)
 
 
 def can_show_pixels(environment: Mapping[str, str]) -> bool:
-    """Say whether the terminal of this environment shows pictures by this protocol.
+    """Return whether the terminal of this environment shows pictures by this protocol.
 
     Example:
         >>> can_show_pixels({"TERM": "xterm-kitty"}), can_show_pixels({"TERM": "xterm-256color"})
@@ -52,7 +51,7 @@ def can_show_pixels(environment: Mapping[str, str]) -> bool:
 
 
 def send(picture: NDArray[np.uint8], columns: int, rows: int) -> Segment:
-    """Return what makes the terminal show this picture wherever the placeholders stand.
+    """Return the escape sequence that shows this picture at the placeholders.
 
     Args:
         picture: Grey levels 0 to 255, shape (height, width), row 0 on top.
@@ -70,7 +69,7 @@ def send(picture: NDArray[np.uint8], columns: int, rows: int) -> Segment:
 
 
 def row_of_cells(row: int, columns: int) -> Segment:
-    """Return one row of placeholders; only the first says which row it is, the others follow from it."""
+    """Return one row of placeholders; the first names the row, the others follow from it."""
     return Segment(PLACEHOLDER + ROW_MARKS[row] + PLACEHOLDER * (columns - 1), _STYLE)
 
 

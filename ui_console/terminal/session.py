@@ -6,18 +6,18 @@ import asyncio
 import os
 import sys
 from collections.abc import Callable, Coroutine, Mapping
-from typing import Any, assert_never
+from typing import assert_never
 
 from textual import pilot as textual_pilot
 
-from backbone.endings import ExitCode
+from backbone.launcher.endings import ExitCode
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent
 from ui_console.model.profile import Profile
 from ui_console.model.team import TeamModel
 from ui_console.session.gamepad import Gamepad, PadWish, Stick, play_gamepad
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.hangup import HangupWatch
@@ -25,17 +25,17 @@ from ui_console.terminal.pixels import can_show_pixels
 from ui_console.terminal.verbs import Session
 
 LIFT_REMEDY = "When the robot may move, press c, then l."
-Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
+Pilot = Callable[[textual_pilot.Pilot[object]], Coroutine[object, None, None]]
 
 
 class TerminalSession(Session):
-    """Hands what a component hears to the model, and what keys want to the component.
+    """Passes a component's events to the model, and the keys' commands to the component.
 
     Args:
         name: Name of the console.
         mission: Name of the mission.
-        user: Who sits at it, for people and for the record.
-        profile: How the screen looks.
+        user: The person at it, for people and for the record.
+        profile: Look of the screen.
         is_bare: True to begin with the picture alone.
         sees: True if pictures are to come.
         gamepad: Device to drive by, with the ranges of its stick.
@@ -64,20 +64,20 @@ class TerminalSession(Session):
         self._frame = frame
 
     async def run(
-        self, console: Observer[Any], *, pilot: Pilot | None = None, size: tuple[int, int] = (120, 40)
+        self, console: AnyObserver, *, pilot: Pilot | None = None, size: tuple[int, int] = (120, 40)
     ) -> ExitCode:
-        """Show the screen until a key or the component ends it; both have ended afterwards, the component first.
+        """Show the screen until a key or the component ends it; the component ends first, then the screen.
 
         Args:
             console: The component.
-            pilot: Presses the keys, on a screen nobody sees, in place of a person at a terminal.
+            pilot: Presses the keys on a screen without a terminal, in place of a person.
             size: Columns and lines of the pilot's screen.
 
         Returns:
-            How the screen ended; a screen that crashed has said why by now.
+            Outcome of the screen; a crash has been printed by now.
 
         Raises:
-            BaseException: What ended the component, if that was a bug or a refusal.
+            BaseException: The bug or refusal that ended the component.
         """
         self._console = console
         screen = ConsoleApp(
@@ -134,7 +134,7 @@ class TerminalSession(Session):
                 assert_never(wish)
 
     @staticmethod
-    async def _on_terminal(screen: ConsoleApp, console: Observer[Any]) -> None:
+    async def _on_terminal(screen: ConsoleApp, console: AnyObserver) -> None:
         """Run the screen; a terminal that goes away ends the console and with it the hold on the robot."""
 
         def gone() -> None:

@@ -1,4 +1,4 @@
-"""The tables of the terminal console, and what each says where it shows nothing."""
+"""The tables of the terminal console, each with its text for an empty table."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class PanelName(StrEnum):
 NOTHING = {
     PanelName.ROBOTS: "no robot is known yet",
     PanelName.TREE: "no behavior is known yet",
-    PanelName.SCHEDULE: "nobody asks",
+    PanelName.SCHEDULE: "no requests",
     PanelName.TIMELINE: "nothing was held yet",
     PanelName.ALARMS: "none",
     PanelName.LINKS: "nothing is known yet",
     PanelName.PARAMETERS: "i on a row elsewhere asks for its parameters, e here changes one",
-    PanelName.COMPONENTS: "nobody is known yet",
+    PanelName.COMPONENTS: "no component is known yet",
     PanelName.LOG: "nothing yet",
 }
 FIXED = (PanelName.ROBOTS, PanelName.ALARMS)
-"""Tables that are always to be seen; the others take turns between them."""
+"""Tables that are always on the screen; the others take turns between them."""

@@ -22,7 +22,7 @@ STYLES_KEPT = 4096  # chosen: all pairs of 24 greys are 576
 
 
 def shrink(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.uint8]:
-    """Return the picture in grey steps for that many cells, each pixel the mean of what it covers.
+    """Return the picture in grey steps for that many cells, each pixel the mean of its area.
 
     Args:
         picture: Grey levels 0 to 255, shape (height, width), row 0 on top.
@@ -40,7 +40,7 @@ def shrink(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.ui
     height, width = picture.shape
     top = np.arange(2 * rows) * height // (2 * rows)
     left = np.arange(columns) * width // columns
-    # reduceat gives the single element where two neighbors share a start, which is what enlarging needs.
+    # reduceat returns the single element where two neighbors share a start, as enlarging needs.
     sums = np.add.reduceat(np.add.reduceat(picture.astype(np.uint32), top, axis=0), left, axis=1)
     tall = np.maximum(1, np.diff(np.append(top, height)))
     wide = np.maximum(1, np.diff(np.append(left, width)))

@@ -1,4 +1,4 @@
-"""Widgets of the terminal console; what they show is worked out elsewhere."""
+"""Widgets of the terminal console; other files make their content."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from backbone.spoken import counted
-from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
 from ui_console.terminal.keys import Hint, key_lines
 from ui_console.terminal.lines import Row, laid_out
 from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send
@@ -29,7 +29,7 @@ OLD = Style(bold=True, color="white", bgcolor="red")
 
 
 class Video(Widget):
-    """The newest picture, as large as fits; an old one is dark and says so, for it must not look alive.
+    """The newest picture, as large as fits; an old one is dark and has a remark, for it must not look alive.
 
     Args:
         newest: Returns the newest picture, grey levels, shape (height, width), or None.
@@ -44,10 +44,10 @@ class Video(Widget):
         self._remark = ""
 
     def look(self, remark: str = "") -> None:
-        """Take the newest picture; redraw if there is anything new.
+        """Take the newest picture; redraw if anything changed.
 
         Args:
-            remark: Why what is shown is not to be driven by; empty: it is.
+            remark: Why the operator must not drive by this picture; empty: the operator may.
         """
         picture = self._newest()
         if self.size.width == 0 or self.size.height == 0:
@@ -85,10 +85,10 @@ class Video(Widget):
 
 
 class Panel(Static):
-    """Rows, one of which the cursor is on.
+    """Rows with a cursor.
 
     Args:
-        name: What is above it, and its id.
+        name: Its title, and its id.
     """
 
     def __init__(self, name: str) -> None:
@@ -102,21 +102,21 @@ class Panel(Static):
 
     @property
     def row(self) -> Row | None:
-        """The row the cursor is on: the first until it was moved, and when its row has gone."""
+        """The row under the cursor: the first until the cursor was moved, and when its row has gone."""
         return self.placed or (self._rows[0] if self._rows else None)
 
     @property
     def placed(self) -> Row | None:
-        """The row the cursor was moved to; None: it was not, or that row has gone."""
+        """The row to which the cursor was moved; None: it was not, or that row has gone."""
         return next((row for row in self._rows if row.key == self._key), None)
 
     def show_rows(self, rows: Sequence[Row], *, is_chosen: bool, nothing: str) -> None:
-        """Show these rows; the cursor stays where it was, if that is still there.
+        """Show these rows; the cursor stays on its row, if that is still there.
 
         Args:
             rows: From top to bottom.
             is_chosen: True: the keys for rows mean this panel.
-            nothing: What to say if there are none.
+            nothing: Text if there are none.
         """
         self._rows, self._is_chosen, self._nothing = rows, is_chosen, nothing
         self._draw()
@@ -152,7 +152,7 @@ class Panel(Static):
             self.update(drawn, layout=grew)
 
     def _room(self) -> int:
-        """Return for how many lines there is room: as high as it may grow, or as it is."""
+        """Return the number of lines: its largest height, or its present one."""
         most = self.styles.max_height
         lines = int(most.value) - self.gutter.height if most is not None else self.content_size.height
         return max(1, lines)
@@ -169,21 +169,21 @@ class KeyLine(Static):
 class DrivePad(Widget):
     """A square to drag in with the mouse: farther up is faster, sideways turns; letting go stops the wheels.
 
-    The only control of a terminal that tells when it is let go, apart from a gamepad.
+    The only control of a terminal that reports its release, apart from a gamepad.
 
     Args:
         speed_rad_s: Returns the speed at the upper edge.
     """
 
-    class Held(Message):
-        """It is being dragged; said again every ``SAY_EVERY_S``."""
+    class Dragged(Message):
+        """The pad is being dragged; repeated every ``SAY_EVERY_S``."""
 
-        def __init__(self, drive: Drive) -> None:
+        def __init__(self, drive: DriveWish) -> None:
             super().__init__()
             self.drive, self.lasts_s = drive, STICK_LASTS_S
 
-    class LetGo(Message):
-        """It was let go."""
+    class Released(Message):
+        """The pad was let go."""
 
     def __init__(self, speed_rad_s: Callable[[], float]) -> None:
         super().__init__(id="pad")
@@ -193,14 +193,14 @@ class DrivePad(Widget):
         self.border_title = "drag to drive"
 
     def on_mouse_down(self, event: events.MouseDown) -> None:
-        """Begin to drive, and say again and again what is wanted while it is held."""
+        """Begin to drive, and repeat the command while the pad is held."""
         self.capture_mouse()
         self._drag(event)
         if self._saying is None:
             self._saying = self.set_interval(SAY_EVERY_S, self._say)
 
     def on_mouse_move(self, event: events.MouseMove) -> None:
-        """Drive another way."""
+        """Change the command."""
         if self._at is not None:
             self._drag(event)
 
@@ -210,11 +210,11 @@ class DrivePad(Widget):
         self._let_go()
 
     def on_mouse_release(self, _event: events.MouseRelease) -> None:
-        """Stop: the mouse went to somebody else."""
+        """Stop: another widget or window captured the mouse."""
         self._let_go()
 
     def let_go(self) -> None:
-        """Stop: the window was left, and who lets the mouse go there tells nobody."""
+        """Stop: the window was left, and the pad gets no release of the mouse there."""
         self.release_mouse()
         self._let_go()
 
@@ -240,7 +240,7 @@ class DrivePad(Widget):
 
     def _say(self) -> None:
         if self._at is not None:
-            self.post_message(self.Held(drive_by_stick(*self._at, self._speed_rad_s())))
+            self.post_message(self.Dragged(drive_by_stick(*self._at, self._speed_rad_s())))
 
     def _let_go(self) -> None:
         if self._saying is not None:
@@ -249,4 +249,4 @@ class DrivePad(Widget):
         if self._at is not None:
             self._at = None
             self.refresh()
-            self.post_message(self.LetGo())
+            self.post_message(self.Released())

@@ -1,4 +1,4 @@
-"""HTTPS: nobody on the way reads the token or drives, and browsers lend the page what they keep for safe ones."""
+"""HTTPS: TLS keeps the token secret and the commands authentic, and browsers offer the page their guarded features."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ class NoCertificate(Refusal):
 
 
 def encryption_with(certificate: str, key: str) -> ssl.SSLContext:
-    """Return what a server encrypts with, TLS 1.2 or newer.
+    """Return the TLS context of a server, TLS 1.2 or newer.
 
     Args:
-        certificate: PEM file with the certificate and those of the authorities between.
+        certificate: PEM file with the certificate and the intermediate ones.
         key: PEM file with its key; empty: the certificate's file has it too.
 
     Raises:
-        NoCertificate: A file cannot be read, has no such thing, wants a password, or the two do not belong together.
+        NoCertificate: A file cannot be read, lacks its certificate or key, wants a password, or the two do not match.
     """
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     try:
         context.load_cert_chain(certificate, key or None, password="")  # else it would ask at the terminal
-    except OSError as error:  # also what OpenSSL says
+    except OSError as error:  # errors of OpenSSL too
         why = error.strerror or str(error)
         raise NoCertificate(f"cannot serve with {certificate} and {key or 'the key in it'}: {why}") from error
     return context

@@ -1,4 +1,4 @@
-"""What a page found in the mission's log, handed out in parts.
+"""Result of a search in the mission's log, sent in parts.
 
 Rules of this file: no socket, no bus, no clock. A part is small, so that no answer delays the pictures and beats of the
 same page: ten thousand events are two megabytes, which a slow link carries in twenty seconds.
@@ -6,12 +6,10 @@ same page: ten thousand events are two megabytes, which a slow link carries in t
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
-from backbone.log_lines import timed_event_json
-from backbone.mission_log import Log
+from backbone.mission_log.lines import timed_event_json
+from backbone.mission_log.log import Log
 from backbone.moments import Now
 
 PART_EVENTS = 100  # chosen: more than a screen shows
@@ -24,22 +22,22 @@ class FoundLog:
     Args:
         number: Of the search; the page compares it with its newest.
         log: The launcher's answer.
-        now: When it came.
+        now: Time of the answer.
     """
 
     def __init__(self, number: int, log: Log, now: Now) -> None:
         self.number = number
         self._log, self._now = log, now
 
-    def part(self, first: int) -> dict[str, Any]:
+    def part(self, first: int) -> dict[str, object]:
         """Return some events, the newest first.
 
         Args:
-            first: How many newer ones the page has.
+            first: Number of newer events that the page has.
 
         Returns:
-            ``events`` with these; ``total``, how many there are; ``left_out``, how many older fit too; ``since_s``,
-            what was before is not kept; ``asked_s``, when it was asked.
+            ``events`` with these; ``total``, their number in the answer; ``left_out``, the number of older matches;
+            ``since_s``, begin of the kept log; ``asked_s``, time of the question.
         """
         events: list[msgspec.Raw] = []
         size = 0

@@ -1,4 +1,4 @@
-"""What all browsers share: one ear on the mission, one model of it, and one copy of each robot's pictures."""
+"""Shared by all browsers: one subscription to the mission, one model of it, and one copy of each robot's pictures."""
 
 from __future__ import annotations
 
@@ -8,19 +8,17 @@ import logging
 import os
 import re
 from collections.abc import Awaitable, Callable
-from typing import Any
 
 import msgspec
 import numpy as np
 
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.keys import Conversation
-from backbone.log_lines import event_json
+from backbone.mission_log.lines import event_json
+from backbone.mission_log.operators import OperatorAction
 from backbone.naming import Subsystem, address
-from backbone.operators import OperatorAction
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
@@ -30,9 +28,9 @@ from ui_console.model.robot_board import ROBOT_KIND
 from ui_console.model.team import TeamModel
 from ui_console.model.views import AlarmKind
 from ui_console.session.consent_answers import ConsentAnswers
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver, Observer
 from ui_console.session.teleoperation import Teleoperation
-from ui_console.web.door import Fault, Offence, Welcome
+from ui_console.web.login import ProtocolViolation, ViolationKind, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
 from ui_console.web.pictures import jpeg, packet
@@ -40,10 +38,10 @@ from ui_console.web.protocol import Intent
 
 log = logging.getLogger(__name__)
 
-OWN_EVERY_S = 0.25  # chosen: people read no faster; what happens to their own robot is told at once
-TEAM_EVERY = 4  # chosen: every so many of those the tables of the whole mission, which cost more
-TOLD_EVERY_S = 10.0  # chosen: a visitor that offends a thousand times a second fills no recording
-MAX_USER_IN_NAME = 24  # chosen: leaves room for what makes a component's name its own, and its ARC's
+OWN_EVERY_S = 0.25  # chosen: people read no faster; events of their own robot are shown at once
+TEAM_EVERY = 4  # chosen: the tables of the whole mission cost more, so every fourth refresh has them
+TOLD_EVERY_S = 10.0  # chosen: a client with a thousand violations a second fills no recording
+MAX_USER_IN_NAME = 24  # chosen: leaves room for the unique part of a component's name, and its ARC's
 
 LIFT_REMEDY = "When the robot may move, hold “Hold to lift” on its picture."
 Join = Callable[[Launch], Awaitable[Bus]]
@@ -53,12 +51,12 @@ class WebHub:
     """Serves any number of operators from one process.
 
     Args:
-        launch: Of the component that listens to the mission; operators' consoles are launched like it.
+        launch: Of the component that subscribes to the mission; operators' consoles are launched like it.
         bus: Of that component.
         clock: The mission's time.
         join: Opens a bus for one more component of this process.
         kind: Component type of the ARCs that operators claim.
-        away_after_s: A robot is given back when its operator touched nothing for so long; 0: never.
+        away_after_s: A console gives its robot back after so long without a touch of its operator; 0: never.
     """
 
     def __init__(
@@ -66,10 +64,10 @@ class WebHub:
     ) -> None:
         self.clock = clock
         self.team = TeamModel(launch.mission, LIFT_REMEDY)
-        self.observer: Observer[NoParameters] = Observer(
+        self.observer: AnyObserver = Observer(
             launch, bus, clock, show=self._heard, signs_in=False, user=launch.name, answers_of=self._answers_of
         )
-        self.guests: dict[Operator, None] = {}
+        self.clients: dict[Operator, None] = {}
         self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False, alarms=self.team.alarms)
         self._launch, self._bus, self._join = launch, bus, join
         self._kind, self._away_after_s = kind, away_after_s
@@ -77,70 +75,70 @@ class WebHub:
         self._streams: dict[str, tuple[str, Subscription]] = {}
         self._numbers: dict[str, int] = {}
         self._consoles = itertools.count(1)
-        self._somebody = asyncio.Event()
-        self._told_s: dict[Fault, float] = {}
+        self._has_operators = asyncio.Event()
+        self._told_s: dict[ViolationKind, float] = {}
         self.pictures_packed = 0
-        """How many pictures were made into JPEG."""
+        """Number of pictures encoded as JPEG."""
 
     # ------------------------------------------------------------------ operators come and go
     def enter(self, welcome: Welcome) -> Operator:
-        """Return a new operator, who is told everything there is."""
+        """Return a new operator, whose page gets the whole view."""
         operator = Operator(self, welcome)
-        self.guests[operator] = None
+        self.clients[operator] = None
         welcomed = {"user": welcome.user, "priority": welcome.priority, "mission": self._launch.mission}
         operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))
-        self._tell_tables([operator.outbox])
+        self._send_tables([operator.outbox])
         operator.refresh(self.clock.now_s())
         self._say(OperatorAction.ATTACH, welcome.user, f"with priority {welcome.priority}")
-        self._somebody.set()
+        self._has_operators.set()
         self.attention_changed()
         return operator
 
-    async def leave(self, guest: Operator, reason: str) -> None:
-        """Let an operator go: the wheels stop, the robot is given back."""
-        self.guests.pop(guest, None)
-        if not self.guests:
-            self._somebody.clear()
-        await guest.leave(reason)
-        self._say(OperatorAction.DETACH, guest.welcome.user, reason)
+    async def leave(self, client: Operator, reason: str) -> None:
+        """Remove an operator: the wheels stop, the robot is given back."""
+        self.clients.pop(client, None)
+        if not self.clients:
+            self._has_operators.clear()
+        await client.leave(reason)
+        self._say(OperatorAction.DETACH, client.welcome.user, reason)
 
-    async def obey(self, guest: Operator, intent: Intent) -> None:
-        """Do what an operator asks; what takes time goes on beside."""
-        guest.obey(intent)
+    async def obey(self, client: Operator, intent: Intent) -> None:
+        """Carry out an operator's intent; a slow one goes on in a task of its own."""
+        client.obey(intent)
 
-    def refused(self, guest: Operator) -> None:
-        """Stop the wheels of an operator that is thrown out."""
-        guest.stop()
+    def refused(self, client: Operator) -> None:
+        """Stop the wheels of an operator whose connection is being closed."""
+        client.stop()
 
-    def offended(self, who: str, offence: Offence) -> None:
-        """Have the operators know of a visitor that did what it must not.
+    def report_violation(self, who: str, violation: ProtocolViolation) -> None:
+        """Show the operators a client's violation.
 
         Args:
             who: For people: an operator's name, or an address.
-            offence: What was done.
+            violation: The violation.
         """
         now_s = self.clock.now_s()
-        line = f"{who} {offence.line}"
-        key = f"{AlarmKind.VISITOR}:{offence.fault}:{who}"
-        self.team.alarms.happened(AlarmKind.VISITOR, "web", line, now_s, offence.remedy, key)
-        if now_s >= self._told_s.get(offence.fault, -TOLD_EVERY_S) + TOLD_EVERY_S:
-            self._told_s[offence.fault] = now_s
+        line = f"{who} {violation.line}"
+        key = f"{AlarmKind.VISITOR}:{violation.kind}:{who}"
+        self.team.alarms.happened(AlarmKind.VISITOR, "web", line, now_s, violation.remedy, key)
+        if now_s >= self._told_s.get(violation.kind, -TOLD_EVERY_S) + TOLD_EVERY_S:
+            self._told_s[violation.kind] = now_s
             log.warning("%s", line)
             if self.observer.state is LifeState.READY:
                 self.observer.publish_event("web", line, LogLevel.WARNING)
 
-    async def tell_all(self) -> None:
-        """Keep every operator's view fresh; until cancelled. Nobody there: nothing is done."""
+    async def refresh_all(self) -> None:
+        """Keep every operator's view fresh while there are operators; until cancelled."""
         for turn in itertools.count():
-            await self._somebody.wait()
+            await self._has_operators.wait()
             now_s = self.clock.now_s()
             if turn % TEAM_EVERY == 0:
-                self._tell_tables([operator.outbox for operator in self.guests])
-            for operator in self.guests:
+                self._send_tables([operator.outbox for operator in self.clients])
+            for operator in self.clients:
                 operator.refresh(now_s)
             await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
 
-    # ------------------------------------------------------------------ what operators need; see Hands
+    # ------------------------------------------------------------------ services for operators; see OperatorServices
     async def new_console(self, operator: Operator, robot: str) -> Teleoperation:
         """Return a console of this operator that claims the robot as soon as it runs."""
         number, welcome = next(self._consoles), operator.welcome
@@ -170,8 +168,8 @@ class WebHub:
         )
 
     def watching_changed(self) -> None:
-        """Listen to the pictures that somebody watches and that somebody's grant delivers, and to no others."""
-        watched = {robot for operator in self.guests for robot in operator.outbox.watched}
+        """Subscribe to pictures that an operator watches and that a grant delivers, and to no others."""
+        watched = {robot for operator in self.clients for robot in operator.outbox.watched}
         wanted = {robot: arc for robot, arc in self._arcs.items() if robot in watched}
         for robot, (arc, stream) in list(self._streams.items()):
             if wanted.get(robot) != arc:
@@ -181,13 +179,13 @@ class WebHub:
             self._streams[robot] = (wanted[robot], self._listen(robot, wanted[robot]))
 
     def attention_changed(self) -> None:
-        """Note whether anybody at all looks after the mission."""
-        self.team.alarms.attention(any(one.is_there for one in self.guests), self.clock.now_s())
+        """Note whether any operator looks after the mission."""
+        self.team.alarms.attention(any(one.is_there for one in self.clients), self.clock.now_s())
 
     # ------------------------------------------------------------------ within
     def _answers_of(self, user: str) -> ConsentAnswers | None:
-        """Return where this person is asked: at the page they look at, else at any they left open."""
-        pages = [one for one in self.guests if one.welcome.user == user]
+        """Return the questions at the page this person looks at, else at another open page of this person."""
+        pages = [one for one in self.clients if one.welcome.user == user]
         return next((page.answers for page in sorted(pages, key=lambda page: not page.is_there)), None)
 
     def _heard(self, event: ConsoleEvent) -> None:
@@ -196,12 +194,12 @@ class WebHub:
             rcs = event.body.rcs
             self._arcs = {rc.rc: rc.holders[0].arc for rc in rcs if rc.kind == ROBOT_KIND and rc.holders}
             self.watching_changed()
-            for operator in self.guests:
+            for operator in self.clients:
                 operator.schedule_heard()
 
     def _listen(self, robot: str, arc: str) -> Subscription:
-        def arrived(envelope: Envelope[Any]) -> None:
-            frame: Frame = envelope.body
+        def arrived(envelope: Envelope[Frame]) -> None:
+            frame = envelope.body
             if frame.robot == robot:
                 self._show_picture(frame)
 
@@ -209,7 +207,7 @@ class WebHub:
         return self._bus.subscribe(at, Conversation.FRAMES, Frame, arrived, latest=True)
 
     def _show_picture(self, frame: Frame) -> None:
-        watchers = [operator for operator in self.guests if frame.robot in operator.outbox.watched]
+        watchers = [operator for operator in self.clients if frame.robot in operator.outbox.watched]
         if not watchers:
             return
         number = self._numbers[frame.robot] = self._numbers.get(frame.robot, 0) + 1
@@ -219,9 +217,9 @@ class WebHub:
         for operator in watchers:
             operator.saw(frame.robot, number, frame.captured_s, packed)
 
-    def _tell_tables(self, outboxes: list[Outbox]) -> None:
+    def _send_tables(self, outboxes: list[Outbox]) -> None:
         team, now_s = self.team, self.clock.now_s()
-        tables: dict[str, Any] = {
+        tables: dict[str, object] = {
             "tree": team.tree(),
             "requests": plain(team.requests()),
             "timeline": team.timeline(now_s),
@@ -242,7 +240,7 @@ class WebHub:
 
 
 def _name_from(user: str) -> str:
-    """Return the part of a component's name that tells people who it is.
+    """Return the operator's part of a component's name.
 
     Example:
         >>> _name_from("Anna B."), _name_from("7")

@@ -1,12 +1,12 @@
-"""One person at a browser: what they want is done, what they must know waits in their outbox."""
+"""One person at a browser: intents are carried out, views and answers wait in the outbox."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
-from typing import Any, Protocol, assert_never
+from typing import Protocol, assert_never
 
 import msgspec
 
@@ -15,33 +15,40 @@ from backbone.errors import LinkError, Refusal, code_of
 from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import STICK_LASTS_S, Halt, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, HaltWish, drive_by_stick
 from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, PictureSeen, failed
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
 from ui_console.session.consent_answers import ConsentAnswers
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.web import protocol
-from ui_console.web.door import Welcome
 from ui_console.web.found_log import FoundLog
+from ui_console.web.login import Welcome
 from ui_console.web.outbox import Outbox
 
 log = logging.getLogger(__name__)
 
-MOST_ASKED = 8  # chosen: a person asks one thing at a time; the mission's services need not bear more
+MOST_ASKED = 8  # chosen: a person asks one thing at a time, and the mission's services are spared more
 LATENCY_STEP = (
     0.2  # chosen: weight of the newest picture in the latency shown: it follows within a second and is readable
 )
 
-Asked = protocol.AskWhy | protocol.AskParameters | protocol.SetParameter | protocol.SearchLog
-AtWork = Asked | protocol.StopRobot | protocol.StopAll | protocol.LiftStop | protocol.TakeOver | protocol.LetGo
+Asked = protocol.WhyRequest | protocol.ParametersRequest | protocol.SetRequest | protocol.SearchLog
+AtWork = (
+    Asked
+    | protocol.StopRequest
+    | protocol.StopAllRequest
+    | protocol.LiftRequest
+    | protocol.TakeOver
+    | protocol.ReleaseRequest
+)
 
 
-class Hands(Protocol):
-    """What an operator needs of the server."""
+class OperatorServices(Protocol):
+    """Services of the server for an operator."""
 
-    observer: Observer[Any]
+    observer: AnyObserver
     team: TeamModel
     clock: Clock
 
@@ -49,30 +56,30 @@ class Hands(Protocol):
         """Return a console of this operator that claims the robot as soon as it runs."""
 
     def watching_changed(self) -> None:
-        """Somebody wants other pictures."""
+        """Note that an operator wants other pictures."""
 
     def attention_changed(self) -> None:
-        """Somebody came or went."""
+        """Note that an operator came or went."""
 
 
 class Operator:
     """A person at a browser, from the right token to the end of the connection.
 
     Args:
-        hands: The server's.
-        welcome: Who it is.
+        services: The server's.
+        welcome: Identity and priority.
     """
 
-    def __init__(self, hands: Hands, welcome: Welcome) -> None:
+    def __init__(self, services: OperatorServices, welcome: Welcome) -> None:
         self.welcome = welcome
         self.outbox = Outbox()
         self.news = asyncio.Event()
         """Set when there is something to send."""
         self.is_there = True
-        self.model = ConsoleModel(welcome.user, welcome.user, hands.team)
-        self.answers = ConsentAnswers(welcome.user, hands.clock, self.show, hands.observer.acted)
-        """What this person is asked by others."""
-        self._hands = hands
+        self.model = ConsoleModel(welcome.user, welcome.user, services.team)
+        self.answers = ConsentAnswers(welcome.user, services.clock, self.show, services.observer.acted)
+        """The questions of others to this person."""
+        self._services = services
         self._console: Teleoperation | None = None
         self._life: asyncio.Task[None] | None = None
         self._claiming = asyncio.Lock()
@@ -80,9 +87,9 @@ class Operator:
         self._latency_s: dict[str, float] = {}
         self._work: dict[bytes, asyncio.Task[None]] = {}
 
-    # ------------------------------------------------------------------ what the browser says
+    # ------------------------------------------------------------------ messages of the browser
     def obey(self, intent: protocol.Intent) -> None:
-        """Do what the browser asks; what takes time goes on beside."""
+        """Carry out the browser's intent; a slow one goes on in a task of its own."""
         match intent:
             case protocol.Steer(moment, forward, right, speed_rad_s):
                 drive = drive_by_stick(forward, right, speed_rad_s)
@@ -94,8 +101,8 @@ class Operator:
             case protocol.Drawn(robot, number):
                 self._drawn(robot, number)
             case protocol.Watch(robots):
-                self.outbox.watch(frozenset(robots))  # also those not heard of yet: a page may be older than the server
-                self._hands.watching_changed()
+                self.outbox.watch(frozenset(robots))  # also unknown ones: a page may be older than the server
+                self._services.watching_changed()
             case protocol.Acknowledge(key):
                 self._acknowledge(key)
             case protocol.MoreLog(number, first):
@@ -108,12 +115,16 @@ class Operator:
                 self.answers.decide(is_given)
             case protocol.DismissLost():
                 self.model.dismiss_lost()
-                self.refresh(self._hands.clock.now_s())
+                self.refresh(self._services.clock.now_s())
             case (
-                protocol.TakeOver() | protocol.LetGo() | protocol.StopRobot() | protocol.StopAll() | protocol.LiftStop()
+                protocol.TakeOver()
+                | protocol.ReleaseRequest()
+                | protocol.StopRequest()
+                | protocol.StopAllRequest()
+                | protocol.LiftRequest()
             ):
                 self._begin(intent)
-            case protocol.AskWhy() | protocol.AskParameters() | protocol.SetParameter() | protocol.SearchLog():
+            case protocol.WhyRequest() | protocol.ParametersRequest() | protocol.SetRequest() | protocol.SearchLog():
                 self._begin(intent)
             case _:
                 assert_never(intent)
@@ -134,32 +145,32 @@ class Operator:
         if console is not None and life is not None:
             self.stop()
             if console.is_ready and console.is_held:
-                await console.do(Halt())
+                await console.do(HaltWish())
             console.end(reason)
             await asyncio.wait({life})
-        self._hands.watching_changed()
-        self._hands.attention_changed()
+        self._services.watching_changed()
+        self._services.attention_changed()
 
-    # ------------------------------------------------------------------ what the browser is told
+    # ------------------------------------------------------------------ messages to the browser
     def show(self, event: ConsoleEvent) -> None:
-        """Take in what happened to this operator's robot."""
+        """Take in an event of this operator's robot."""
         if isinstance(event, Attention):
             self.is_there = event.is_there
-            self._hands.attention_changed()
+            self._services.attention_changed()
             return
         self.model.apply(printable_all(event))
         if not isinstance(event, PictureSeen | CommandApplied):
-            self.refresh(self._hands.clock.now_s())
+            self.refresh(self._services.clock.now_s())
 
     def saw(self, robot: str, number: int, captured_s: float, packet: bytes) -> None:
-        """A picture of a robot came that may be watched here."""
+        """Take in a picture of a robot that this operator may watch."""
         if robot in self.outbox.watched:
-            self.model.apply(PictureSeen(self._hands.clock.now_s(), captured_s, robot))
+            self.model.apply(PictureSeen(self._services.clock.now_s(), captured_s, robot))
             self.outbox.put_picture(robot, number, captured_s, packet)
             self.news.set()
 
     def refresh(self, now_s: float) -> None:
-        """Have sent what changed of this operator's own part of the view, and of the alarms."""
+        """Send the changes of this operator's own part of the view, and of the alarms."""
         model, put = self.model, self.outbox.put_section
         model.sees = model.robot in self.outbox.watched
         model.look(now_s)
@@ -171,7 +182,7 @@ class Operator:
         self.news.set()
 
     def schedule_heard(self) -> None:
-        """There is a new schedule: ask why this operator waits, who does."""
+        """React to a new schedule: ask why this operator waits, if so."""
         self._with_robot(Teleoperation.schedule_heard)
 
     # ------------------------------------------------------------------ within
@@ -180,7 +191,7 @@ class Operator:
             act(self._console)
 
     def _by_press(self, moment: int, act: Callable[[Teleoperation], None]) -> None:
-        """Do what moves the robot unless the press is from an earlier moment, however late the page's word came."""
+        """Move the robot unless the press is from an earlier moment, also if the page's message was late."""
         if moment == self.model.moment:
             self._with_robot(act)
 
@@ -188,15 +199,15 @@ class Operator:
         captured_s = self.outbox.drawn(robot, number)
         self.news.set()
         if captured_s is not None:
-            took_s = max(0.0, self._hands.clock.now_s() - captured_s)
+            took_s = max(0.0, self._services.clock.now_s() - captured_s)
             before_s = self._latency_s.get(robot, took_s)
             self._latency_s[robot] = before_s + LATENCY_STEP * (took_s - before_s)
 
     def _acknowledge(self, key: str) -> None:
         seen = self.model.acknowledge(key)
         if seen:
-            self._hands.observer.acknowledged(seen, key, self.welcome.user)
-            self.refresh(self._hands.clock.now_s())
+            self._services.observer.acknowledged(seen, key, self.welcome.user)
+            self.refresh(self._services.clock.now_s())
 
     def _attend(self, is_there: bool) -> None:
         if is_there:
@@ -205,7 +216,7 @@ class Operator:
             self._with_robot(Teleoperation.leave)
         if self.is_there != is_there:
             self.is_there = is_there
-            self._hands.attention_changed()
+            self._services.attention_changed()
 
     def _begin(self, intent: AtWork) -> None:
         same = msgspec.json.encode(intent)
@@ -219,41 +230,41 @@ class Operator:
         task.add_done_callback(lambda done: self._done(same, done))
 
     async def _do(self, intent: AtWork) -> None:
-        observer, user = self._hands.observer, self.welcome.user
+        observer, user = self._services.observer, self.welcome.user
         match intent:
             case protocol.TakeOver(robot):
                 async with self._claiming:
                     await self._take(robot)
-            case protocol.LetGo():
+            case protocol.ReleaseRequest():
                 async with self._claiming:
                     if self._console is not None and self._console.is_ready:
                         await self._console.give_back(f"{user} released it")
-            case protocol.StopRobot(robot):
+            case protocol.StopRequest(robot):
                 await self._stop(robot)
-            case protocol.StopAll():
+            case protocol.StopAllRequest():
                 self._with_robot(Teleoperation.require_let_go)
-                self._tell_unsure(await observer.stop_all("", user))
-            case protocol.LiftStop(robot, number):
+                self._report_unsure(await observer.stop_all("", user))
+            case protocol.LiftRequest(robot, number):
                 await observer.lift_stop(robot, number, user, self.show)
-            case protocol.AskWhy(name):
+            case protocol.WhyRequest(name):
                 self._answer({"why": name, "lines": await observer.why(name)})
-            case protocol.AskParameters(name):
+            case protocol.ParametersRequest(name):
                 self._answer({"parameters": name, "told": await observer.feed.ask_parameters(name)})
             case protocol.SearchLog():
                 await self._search(intent)
-            case protocol.SetParameter(name, parameter, value):
+            case protocol.SetRequest(name, parameter, value):
                 is_set = await observer.set_parameter(name, parameter, value, user)
                 self._answer({"set": name, "parameter": parameter, "done": is_set})
             case _:
                 assert_never(intent)
-        self.refresh(self._hands.clock.now_s())
+        self.refresh(self._services.clock.now_s())
 
     async def _search(self, wanted: protocol.SearchLog) -> None:
-        """Find something in the mission's log; the page fetches the rest of it part by part."""
-        clock = self._hands.clock
+        """Search the mission's log; the page fetches the rest of the result part by part."""
+        clock = self._services.clock
         now = Now(clock.now_s(), datetime.now(), clock.rate)
         try:
-            found = await self._hands.observer.feed.search_log(wanted.asked(now))
+            found = await self._services.observer.feed.search_log(wanted.asked(now))
         except Refusal as refusal:
             refused = {"code": code_of(refusal), "refused": refusal.detail, "remedy": refusal.remedy}
             self._answer({"log": {"number": wanted.number, **refused}})
@@ -262,18 +273,18 @@ class Operator:
         self._hand_out(wanted.number, 0)
 
     def _hand_out(self, number: int, first: int) -> None:
-        """Send some of what was found, unless the page means an earlier search."""
+        """Send a part of the result, unless the page means an earlier search."""
         if self._found is not None and self._found.number == number:
             self._answer({"log": self._found.part(first)})
 
     async def _stop(self, robot: str) -> None:
         """Emergency stop; the wheels this operator turns stop with it."""
         self._with_robot(Teleoperation.require_let_go)
-        is_known = robot in self._hands.team.robots.names()
-        is_stopped = is_known and await self._hands.observer.stop_robot(robot, "", self.welcome.user)
-        self._tell_unsure([] if is_stopped else [robot])
+        is_known = robot in self._services.team.robots.names()
+        is_stopped = is_known and await self._services.observer.stop_robot(robot, "", self.welcome.user)
+        self._report_unsure([] if is_stopped else [robot])
 
-    def _tell_unsure(self, robots: list[str]) -> None:
+    def _report_unsure(self, robots: list[str]) -> None:
         if robots:
             self._answer({"refused": f"not certain to have stopped: {', '.join(robots)}"})
 
@@ -283,10 +294,10 @@ class Operator:
                 await self._console.switch(robot)
             return
         try:
-            self._console = await self._hands.new_console(self, robot)
+            self._console = await self._services.new_console(self, robot)
             self.model.name = self._console.name  # others of this person are other screens
         except LinkError as error:
-            self.show(failed(self._hands.clock.now_s(), error))
+            self.show(failed(self._services.clock.now_s(), error))
             return
         self._life = asyncio.create_task(self._live(self._console), name=f"life of {self._console.address}")
         self._life.add_done_callback(self._bug_of)
@@ -295,21 +306,21 @@ class Operator:
         try:
             await console.run()
         except (Refusal, LinkError) as error:
-            self.show(failed(self._hands.clock.now_s(), error))
+            self.show(failed(self._services.clock.now_s(), error))
 
     def _done(self, same: bytes, task: asyncio.Task[None]) -> None:
         self._work.pop(same, None)
         self._bug_of(task)
 
     def _bug_of(self, task: asyncio.Task[None]) -> None:
-        """A bug of an operator's part is a bug of the server."""
+        """Raise a bug of an operator's task as a bug of the server."""
         if not task.cancelled() and (bug := task.exception()) is not None:
-            self._hands.observer.fail(bug)
+            self._services.observer.fail(bug)
 
-    def _answer(self, answer: dict[str, Any]) -> None:
+    def _answer(self, answer: dict[str, object]) -> None:
         self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
         self.news.set()
 
 
-def _encode(views: list[Any]) -> bytes:
+def _encode(views: Sequence[object]) -> bytes:
     return msgspec.json.encode(views)

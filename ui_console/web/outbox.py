@@ -1,11 +1,11 @@
-"""What waits for one browser: never more than the newest of each thing.
+"""Outbox of one browser: never more than the newest of each kind.
 
 Rules of this file: no socket, no clock; times are seconds of the machine.
 
 * Nothing queues: a newer picture of a robot, or a newer section of the view, takes the place of the older.
 * At most ``PICTURES_UNDERWAY`` pictures of a robot are on their way; the next goes when the browser has drawn one. So a
   slow link shows few pictures, not old ones.
-* Answers to what the operator asked are told all, but for the oldest when there are more than ``ANSWERS_KEPT``.
+* Answers to the operator are all sent, but for the oldest when there are more than ``ANSWERS_KEPT``.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ ANSWERS_KEPT = 20  # chosen: more than a person asks before reading
 
 
 @dataclass(slots=True)
-class _Stream:
+class _PictureStream:
     waiting: tuple[int, float, bytes] | None = None
     underway: dict[int, tuple[float, float]] = field(default_factory=dict)  # number → (sent, captured)
     turn: int = 0
 
 
 class Outbox:
-    """What one browser has not been sent yet."""
+    """Messages not sent yet to one browser."""
 
     def __init__(self) -> None:
         self._sections: dict[str, bytes] = {}
         self._unsent: dict[str, None] = {}
         self._answers: deque[bytes] = deque(maxlen=ANSWERS_KEPT)
-        self._streams: dict[str, _Stream] = {}
+        self._streams: dict[str, _PictureStream] = {}
         self._turns = 0
         self.skipped = 0
         """Pictures that a newer one replaced before they were sent."""
 
     # ------------------------------------------------------------------ in
     def put_section(self, name: str, body: bytes) -> None:
-        """Have a section of the view sent unless the browser has just that.
+        """Queue a section of the view unless the browser has just that.
 
         Args:
             name: Of the section.
@@ -52,7 +52,7 @@ class Outbox:
             self._unsent[name] = None
 
     def put_answer(self, body: bytes) -> None:
-        """Have an answer sent.
+        """Queue an answer.
 
         Args:
             body: A JSON object.
@@ -61,7 +61,7 @@ class Outbox:
 
     def watch(self, robots: frozenset[str]) -> None:
         """Show these robots' pictures and no others."""
-        self._streams = {robot: self._streams.get(robot) or _Stream() for robot in sorted(robots)}
+        self._streams = {robot: self._streams.get(robot) or _PictureStream() for robot in sorted(robots)}
 
     @property
     def watched(self) -> frozenset[str]:
@@ -69,17 +69,17 @@ class Outbox:
         return frozenset(self._streams)
 
     def put_picture(self, robot: str, number: int, captured_s: float, packet: bytes) -> None:
-        """Have a picture sent in place of an older one of that robot; nothing if it is not watched."""
+        """Queue a picture in place of an older one of that robot; do nothing if the browser does not watch it."""
         stream = self._streams.get(robot)
         if stream is not None:
             self.skipped += stream.waiting is not None
             stream.waiting = (number, captured_s, packet)
 
     def drawn(self, robot: str, number: int) -> float | None:
-        """Take note that a picture, and whatever was sent before it, is on the screen.
+        """Note that a picture, and all pictures sent before it, are on the screen.
 
         Returns:
-            When it was captured, as told with it; None: no such picture is on its way.
+            Its time of capture; None: no such picture is on its way.
         """
         stream = self._streams.get(robot)
         if stream is None or number not in stream.underway:
@@ -90,7 +90,7 @@ class Outbox:
 
     # ------------------------------------------------------------------ out
     def next(self, now_s: float) -> str | bytes | None:
-        """Return what to send now: text, a picture's packet, or None; what is returned counts as sent."""
+        """Return the next message: text, a picture's packet, or None; a returned message counts as sent."""
         if self._answers:
             return self._answers.popleft().decode()
         if self._unsent:
@@ -112,7 +112,7 @@ class Outbox:
         return packet
 
     def next_s(self) -> float | None:
-        """When a picture that was not drawn makes room for one that waits; None: none waits for that."""
+        """When a picture that was not drawn makes room for the next one; None: none waits for that."""
         held = [
             min(sent_s for sent_s, _captured in stream.underway.values()) + DRAWN_WITHIN_S
             for stream in self._streams.values()
@@ -121,7 +121,7 @@ class Outbox:
         return min(held, default=None)
 
 
-def _has_room(stream: _Stream, now_s: float) -> bool:
+def _has_room(stream: _PictureStream, now_s: float) -> bool:
     if len(stream.underway) >= PICTURES_UNDERWAY:
         stream.underway = {n: at for n, at in stream.underway.items() if now_s < at[0] + DRAWN_WITHIN_S}
     return len(stream.underway) < PICTURES_UNDERWAY

@@ -1,6 +1,6 @@
-"""What a page of the console may say.
+"""Messages of a page of the console.
 
-A message is a JSON object whose ``do`` says which of these it is; anything else in it makes it meaningless.
+A message is a JSON object whose ``do`` names one of these; an unknown field makes it invalid.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from typing import Annotated, Any
 
 import msgspec
 
-from backbone.log_question import LogQuestion
+from backbone.mission_log.question import LogQuestion
 from backbone.ranges import EXACT
 from ui_console.model.consent import MAX_WHY
-from ui_console.web.door import Beat, Hello, ShortText
+from ui_console.web.login import BeatRequest, Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
 MOST_RAD_S = 15.0  # a Scout's most; robots clip to what they can
@@ -22,7 +22,7 @@ Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
 
 class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="drive"):
-    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be said again meanwhile.
+    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be repeated meanwhile.
 
     Attributes:
         moment: ``OwnView.moment`` as the page showed it when the press began; at a later one the press moves nothing.
@@ -35,7 +35,7 @@ class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 
 class StopWheels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop"):
-    """It was let go."""
+    """The control was let go."""
 
 
 class JumpOnce(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="jump"):
@@ -55,7 +55,7 @@ class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class MayI(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="may_i"):
-    """Ask the operator who holds what this one waits for."""
+    """Ask the operator who holds the robot this one waits for."""
 
     why: Annotated[str, msgspec.Meta(max_length=MAX_WHY)] = ""
 
@@ -67,25 +67,25 @@ class Decide(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field=
 
 
 class DismissLost(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="dismiss_lost"):
-    """It was seen that a robot was lost."""
+    """The operator has seen that a robot was lost."""
 
 
-class LetGo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="release"):
+class ReleaseRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="release"):
     """Give the robot back."""
 
 
-class StopRobot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop_robot"):
+class StopRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop_robot"):
     """Emergency stop of one robot; needs no grant."""
 
     robot: ShortText
 
 
-class StopAll(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop_all"):
+class StopAllRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop_all"):
     """Emergency stop of all robots."""
 
 
-class LiftStop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="lift"):
-    """Let a robot move again: the stop of this number, which was seen on the page."""
+class LiftRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="lift"):
+    """Lift the stop of this number, as shown on the page."""
 
     robot: ShortText
     number: Numbered
@@ -104,24 +104,24 @@ class Drawn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     number: Annotated[int, msgspec.Meta(ge=0, le=2**32 - 1)]
 
 
-class AskWhy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="why"):
-    """Say why something is as it is."""
+class WhyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="why"):
+    """Explain the state of a component or request."""
 
     name: ShortText
 
 
 class SearchLog(LogQuestion, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="search_log", kw_only=True):
-    """Find this in the mission's log.
+    """Search the mission's log.
 
     Attributes:
-        number: Comes back with what was found.
+        number: Comes back with the result.
     """
 
     number: Numbered
 
 
 class MoreLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="more_log"):
-    """Hand out the next part of what was found.
+    """Send the next part of the result.
 
     Attributes:
         number: Of the search.
@@ -133,19 +133,19 @@ class MoreLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 
 
 class Acknowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="acknowledge"):
-    """An alarm was seen; with an empty key all."""
+    """Acknowledge an alarm; with an empty key all."""
 
     key: Annotated[str, msgspec.Meta(max_length=256)] = ""
 
 
-class AskParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="parameters"):
-    """Have a component tell its parameters."""
+class ParametersRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="parameters"):
+    """Ask a component for its parameters."""
 
     name: ShortText
 
 
-class SetParameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="set"):
-    """Have a component run with another value."""
+class SetRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="set"):
+    """Set a parameter of a component."""
 
     name: ShortText
     parameter: ShortText
@@ -163,30 +163,30 @@ Intent = (
     | StopWheels
     | JumpOnce
     | TakeOver
-    | LetGo
+    | ReleaseRequest
     | MayI
     | Decide
     | DismissLost
-    | StopRobot
-    | StopAll
-    | LiftStop
+    | StopRequest
+    | StopAllRequest
+    | LiftRequest
     | Watch
     | Drawn
-    | AskWhy
+    | WhyRequest
     | SearchLog
     | MoreLog
     | Acknowledge
-    | AskParameters
-    | SetParameter
+    | ParametersRequest
+    | SetRequest
     | Here
 )
-_intents: msgspec.json.Decoder[Hello | Beat | Intent] = msgspec.json.Decoder(Hello | Beat | Intent)
+_intents: msgspec.json.Decoder[Hello | BeatRequest | Intent] = msgspec.json.Decoder(Hello | BeatRequest | Intent)
 
 
-def understand(data: bytes | str) -> Hello | Beat | Intent:
-    """Return what a message means.
+def understand(data: bytes | str) -> Hello | BeatRequest | Intent:
+    """Return the decoded message.
 
     Raises:
-        msgspec.DecodeError: Nothing.
+        msgspec.DecodeError: The message is not valid.
     """
     return _intents.decode(data)

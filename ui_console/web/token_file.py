@@ -1,12 +1,12 @@
 """Tokens that outlive the server, for this user alone.
 
-A server that begins again at the same port knows the pages that are still open, and they come back by themselves. Where
-the tokens lie decides when they end:
+A server that is restarted at the same port accepts the tokens of open pages, which reconnect by themselves. The place
+of the file decides when the tokens end:
 
 * A mission on this machine: beside its run files, which end with it.
 * A mission elsewhere: named after its hub and the secret of its run, so that the next run finds none.
 * A designer: named after the mission file; they end with the login session.
-* Port 0: nowhere. A page belongs to the port it came from, and no open page finds a port that nobody chose.
+* Port 0: no file. A page belongs to the port it came from, and no open page finds a port that the system chose.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ import msgspec
 from backbone import run_files
 from backbone.atomic_file import replace_file
 from backbone.errors import Refusal
-from ui_console.web.door import Pass
+from ui_console.web.login import TokenRights
 
 MODE = 0o600
 DIGITS = 16  # chosen: 64 bits; no two missions of one user have the same
 
 
 class TokensNotKept(Refusal):
-    """The tokens cannot be written where the next server would find them."""
+    """The tokens cannot be written to the file that the next server reads."""
 
     code = "web.tokens"
-    remedy = "Free the disk; without that file open pages have to be told the next server's address."
+    remedy = "Free the disk; without that file open pages have to be given the next server's address."
 
 
 class TokenFile:
     """The tokens of the server at one port.
 
     Args:
-        folder: Of the mission's run files, or of what is kept for others.
+        folder: Of the mission's run files, or the user's run files.
         port: Of the server.
-        of: What is served, where the folder is not only for that.
+        of: The mission or file served, for a folder with several.
     """
 
     def __init__(self, folder: Path, port: int, of: str = "") -> None:
@@ -63,8 +63,8 @@ class TokenFile:
         """Return the tokens of the designer of a mission file."""
         return cls(run_files.kept_directory(), port, _digest(str(Path(source).resolve())))
 
-    def read(self) -> dict[str, Pass]:
-        """Return the tokens of the server before; none if there was none, or somebody else could have read them."""
+    def read(self) -> dict[str, TokenRights]:
+        """Return the tokens of the server before; none if there was none, or another user could have read them."""
         try:
             descriptor = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
         except OSError:
@@ -74,12 +74,12 @@ class TokenFile:
             if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) != MODE:
                 return {}
             try:
-                return msgspec.json.decode(file.read(), type=dict[str, Pass])
+                return msgspec.json.decode(file.read(), type=dict[str, TokenRights])
             except msgspec.DecodeError:
                 return {}
 
-    def keep(self, passes: Mapping[str, Pass]) -> None:
-        """Have the next server at this port find these tokens, and no others.
+    def keep(self, rights: Mapping[str, TokenRights]) -> None:
+        """Keep these tokens, and no others, for the next server at this port.
 
         Raises:
             TokensNotKept: The system refused.
@@ -87,25 +87,24 @@ class TokenFile:
         try:
             self.path.touch(mode=MODE)  # what replaces it has its mode
             self.path.chmod(MODE)
-            replace_file(self.path, msgspec.json.encode(dict(passes)), is_lasting=False)
+            replace_file(self.path, msgspec.json.encode(dict(rights)), is_lasting=False)
         except OSError as error:
             raise TokensNotKept(f"{self.path}: {error.strerror or error}", path=str(self.path)) from error
 
 
 def _digest(*of: str) -> str:
-    """Return a short name that tells these from others and says nothing of them."""
+    """Return a short name that is unique to these words and does not reveal them."""
     return f"{hashlib.sha256(json.dumps(of).encode()).hexdigest()[:DIGITS]}-"
 
 
-def kept_or_new(new: Mapping[str, Pass], before: Mapping[str, Pass]) -> dict[str, Pass]:
-    """Return what opens a server: each operator's token of before, if there was one, else the new one.
+def kept_or_new(new: Mapping[str, TokenRights], before: Mapping[str, TokenRights]) -> dict[str, TokenRights]:
+    """Return the valid tokens: each operator's token of before, if there was one, else the new one.
 
-    What a token is good for is what the new server says. An operator who is not among the new ones has no token any
-    more.
+    The new server defines the rights of a token. An operator who is not among the new ones has no token any more.
 
     Example:
-        >>> kept_or_new({"b": Pass("anna", 50)}, {"a": Pass("anna", 100), "c": Pass("ben", 1)})
-        {'a': Pass(user='anna', priority=50)}
+        >>> kept_or_new({"b": TokenRights("anna", 50)}, {"a": TokenRights("anna", 100), "c": TokenRights("ben", 1)})
+        {'a': TokenRights(user='anna', priority=50)}
     """
     tokens = {granted.user: token for token, granted in before.items()}
     return {tokens.get(granted.user, token): granted for token, granted in new.items()}

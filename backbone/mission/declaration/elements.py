@@ -54,7 +54,7 @@ class Host(Declared):
 
     @property
     def is_loopback(self) -> bool:
-        """True if the address means the machine 'up' is typed on, whatever machine that is."""
+        """True if the address means the machine on which 'up' is typed, without its name."""
         return is_loopback(self.address)
 
 
@@ -165,7 +165,8 @@ class ResourceElement(Declared):
     features: Names = Field(default=(), description="What it has, as names separated by blanks, for wishes (camera).")
     process: Name = Field(
         default="",
-        description="Name of the process it shares with all others of that name; left out: a process of its own.",
+        description="Name of the process it shares with all others of that name; all are on the host that any of them "
+        "names; left out: a process of its own.",
     )
     uses: tuple[UsesElement, ...] = ()
     parameter: tuple[ParameterElement, ...] = ()
@@ -217,7 +218,8 @@ class BehaviorAttributes(Declared):
     priority: Priority = Field(description="Its priority among its siblings, a whole number; larger is higher.")
     process: Name = Field(
         default="",
-        description="Name of the process it shares with all others of that name; left out: a process of its own.",
+        description="Name of the process it shares with all others of that name; all are on the host that any of them "
+        "names; left out: a process of its own.",
     )
 
 

@@ -11,7 +11,7 @@ Rules of this file:
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import BeforeValidator, Field, JsonValue
 
@@ -40,21 +40,21 @@ def flag(text: str) -> bool | None:
     return _FLAGS.get(text.strip(_BLANKS))
 
 
-def _read_decimal(value: Any) -> Any:
+def _read_decimal(value: object) -> object:
     return _must(decimal(value)) if isinstance(value, str) else value
 
 
-def _read_whole(value: Any) -> Any:
+def _read_whole(value: object) -> object:
     if not isinstance(value, str):
         return value
     return _must(int(value) if _WHOLE.fullmatch(value := value.strip(_BLANKS)) else None)
 
 
-def _read_flag(value: Any) -> Any:
+def _read_flag(value: object) -> object:
     return _must(flag(value)) if isinstance(value, str) else value
 
 
-def _read_words(value: Any) -> Any:
+def _read_words(value: object) -> object:
     return tuple(re.findall(rf"[^{_BLANKS}]+", value)) if isinstance(value, str) else value
 
 

@@ -16,6 +16,9 @@ from backbone.mission.declaration.elements import MissionElement
 ROOT = "mission"
 MANY = 1 << 30  # any number of an element
 
+Schema = dict[str, Any]
+"""A JSON schema, or a part of one."""
+
 
 @dataclass(frozen=True, slots=True)
 class AttributeRule:
@@ -33,7 +36,7 @@ class AttributeRule:
     required: bool
     default: str | None
     documentation: str
-    schema: Mapping[str, Any]
+    schema: Schema
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -71,13 +74,11 @@ def vocabulary() -> Mapping[str, ElementRule]:
     return found
 
 
-def _collect(
-    tag: str, schema: Mapping[str, Any], definitions: Mapping[str, Any], found: dict[str, ElementRule]
-) -> None:
+def _collect(tag: str, schema: Schema, definitions: Schema, found: dict[str, ElementRule]) -> None:
     required = set(schema.get("required", ()))
     attributes: dict[str, AttributeRule] = {}
     children: dict[str, tuple[int, int]] = {}
-    inside: dict[str, Mapping[str, Any]] = {}
+    inside: dict[str, Schema] = {}
     for name, written in schema["properties"].items():
         one = _resolved(written, definitions)
         items = _resolved(one.get("items", {}), definitions)
@@ -93,7 +94,7 @@ def _collect(
             _collect(child, its_schema, definitions, found)
 
 
-def _resolved(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> Mapping[str, Any]:
+def _resolved(schema: Schema, definitions: Schema) -> Schema:
     """Return a schema without references and without the alternative that nothing is given."""
     if "anyOf" in schema:
         [one] = [each for each in schema["anyOf"] if each.get("type") != "null"]
@@ -104,12 +105,12 @@ def _resolved(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> Mapp
     return schema
 
 
-def _attribute(schema: Mapping[str, Any], *, is_required: bool) -> AttributeRule:
+def _attribute(schema: Schema, *, is_required: bool) -> AttributeRule:
     default = None if is_required else schema.get("default")
     return AttributeRule(schema["kind"], is_required, _text(default), " ".join(schema["description"].split()), schema)
 
 
-def _text(default: Any) -> str | None:
+def _text(default: object) -> str | None:
     """Return a default as a mission file writes it; None if it says nothing."""
     match default:
         case None | "" | [] | ():

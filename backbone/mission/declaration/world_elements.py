@@ -66,7 +66,7 @@ class AirElement(Declared):
     interference: Share = Field(
         default=1.0, description="Share of the rows that two transmitters on one frequency spoil, 0 to 1."
     )
-    snow: Share = Field(default=1.0, description="Contrast of the noise on a frequency nobody uses, 0 to 1.")
+    snow: Share = Field(default=1.0, description="Contrast of the noise on an unused frequency, 0 to 1.")
     radio_loss: Share = Field(default=0.0, description="Share of command packets lost at any distance, 0 to 1.")
     radio_delay_s: Share = Field(
         default=0.002, description="From a packet's end on the air to the robot's having read it, seconds, 0 to 1."
@@ -194,7 +194,8 @@ class WorldElement(Declared):
     seed: Seed = Field(default=0, description="Seed of everything random in the world, a whole number, 0 or more.")
     process: Name = Field(
         default="",
-        description="Name of the process it shares with all others of that name; left out: a process of its own.",
+        description="Name of the process it shares with all others of that name; all are on the host that any of them "
+        "names; left out: a process of its own.",
     )
     parameter: tuple[ParameterElement, ...] = ()
     room: RoomElement

@@ -6,12 +6,11 @@ children that stand in any order beside repeated ones, so it counts the required
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 from xml.sax.saxutils import escape, quoteattr
 
 from backbone.mission.declaration.values import LEAST_WHOLE, MOST_WHOLE
-from backbone.mission.declaration.vocabulary import MANY, AttributeRule, ElementRule, vocabulary
+from backbone.mission.declaration.vocabulary import MANY, AttributeRule, ElementRule, Schema, vocabulary
 
 XSD = "mission.xsd"
 
@@ -113,11 +112,11 @@ def _simple_types() -> Iterator[str]:
         yield "  </xs:simpleType>"
 
 
-def _base(schema: Mapping[str, Any]) -> str:
+def _base(schema: Schema) -> str:
     return {"number": "xs:decimal", "integer": "xs:int"}.get(schema.get("type", ""), "xs:string")
 
 
-def _facets(schema: Mapping[str, Any]) -> Iterator[str]:
+def _facets(schema: Schema) -> Iterator[str]:
     for word in schema.get("enum", ()):
         yield f"<xs:enumeration value={quoteattr(word)}/>"
     if "pattern" in schema:

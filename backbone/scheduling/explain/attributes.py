@@ -15,7 +15,7 @@ from backbone.scheduling.views import Attributes, RequestAttributes
 
 
 def attributes(arcs: Iterable[ArcEntry], name: str, way: Callable[[tuple[str, ...]], list[PathNode]]) -> Attributes:
-    """Return what the ARC or owner of this name asks for, or all at and below the node of this name.
+    """Return the requests of the ARC or owner of this name, or of all at and below the node of this name.
 
     Args:
         arcs: All there are.
@@ -23,7 +23,7 @@ def attributes(arcs: Iterable[ArcEntry], name: str, way: Callable[[tuple[str, ..
         way: Names from the root to an owner → the same with their numbers.
 
     Raises:
-        UnknownRequest: None of them is meant.
+        UnknownRequest: The name fits none of them.
     """
     meant = [arc for arc in arcs if name in (arc.name, arc.request.owner, *_nodes(arc))]
     if not meant:

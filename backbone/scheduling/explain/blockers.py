@@ -1,8 +1,8 @@
-"""Blockers: who would have to go so that a waiting ARC gets its RCs as soon as those are free.
+"""Blockers: the ARCs without which a waiting ARC gets its RCs as soon as these are free.
 
-Two answers to two questions. Who stands *directly* in the way is told by the plan at once, for every
-request in the schedule. Who must go *altogether* also counts those that would come before the ARC if
-the first ones were gone; it costs a plan for each of them, and is worked out for one ARC on demand.
+There are two questions. The plan names the *direct* blockers at once, for every request in the
+schedule. *All* blockers include the ARCs that would come before the ARC if the direct ones were gone;
+this costs a plan for each of them, and is computed for one ARC on demand.
 
 Rule of this file: it errs towards naming one too many, never one too few.
 """
@@ -19,7 +19,7 @@ from backbone.scheduling.planner import Slot
 from backbone.scheduling.priority import higher, rank
 from backbone.scheduling.requests import RequestState
 
-FEWEST_OF = 24  # chosen: each costs one more plan; more than these are named as they are
+FEWEST_OF = 24  # chosen: each costs one more plan; a longer list is not reduced
 MEANWHILE_OF = 64  # chosen: so many are planned in a few milliseconds
 
 
@@ -27,7 +27,7 @@ class Blockers:
     """Answers about one master schedule."""
 
     def __init__(self, schedule: MasterSchedule) -> None:
-        """Look at this schedule.
+        """Answer for this schedule.
 
         Args:
             schedule: Nothing in it changes.
@@ -38,9 +38,9 @@ class Blockers:
         self._in_turns = schedule.state.fairness.discipline == "turns"
 
     def direct(self, slot: Slot, now_s: float) -> list[ArcEntry]:
-        """Return who stands in the way of the planned ARC now or has time reserved that it would need, in order.
+        """Return the ARCs that block the planned ARC now or have a reservation of its time, in order.
 
-        Where only the first in line have a start reserved: who stands in its way and who is first in line before it.
+        In a large group: the ARCs that block it and the first ones in line before it.
         """
         arc, planner = slot.arc, self._schedule.planner_of(slot.arc)
         met = [*dict.fromkeys(other for other, _, _ in meeting(slot.against, now_s, now_s + arc.length_s))]
@@ -53,9 +53,9 @@ class Blockers:
         return alone or met
 
     def altogether(self, arc: ArcEntry, now_s: float, *, grace_s: float) -> list[ArcEntry]:
-        """Return ARCs without which this one starts as soon as its RCs are free, as few as were found.
+        """Return ARCs without which this one starts as soon as its RCs are free, as few as the search finds.
 
-        If an RC of it is down or has too little capacity: what is in its way once that is not so any more.
+        If an RC of it is down or has too little capacity: the blockers once the RC is up and has enough.
 
         Args:
             grace_s: Time a decision process has to stop cleanly at the end of a slice.
@@ -83,7 +83,7 @@ class Blockers:
         return self._table.strict and one.state is not RequestState.RUNNING and higher(one.path, arc.path)
 
     def _starting_meanwhile(self, gone: Sequence[ArcEntry], arc: ArcEntry, now_s: float) -> list[ArcEntry]:
-        """Return who would start in the way of the ARC when only the first of those that have to go are gone."""
+        """Return the ARCs that would start and block the ARC when only its first blockers are gone."""
         group = self._state.group_of(arc) if self._is_planned_whole(arc) else [arc, *self._state.beside(arc)]
         if len(group) > MEANWHILE_OF:
             return []
@@ -103,19 +103,19 @@ class Blockers:
         return [*found]
 
     def _holders_in_the_way(self, arc: ArcEntry, now_s: float) -> list[ArcEntry]:
-        """Return the holders of its RCs that it cannot simply displace now."""
+        """Return the holders of its RCs that it cannot displace now."""
         return [holder for holder in self._state.holders(arc) if self._stays(holder, arc, now_s)]
 
     def _stays(self, holder: ArcEntry, arc: ArcEntry, now_s: float) -> bool:
         if not self._in_turns and not rank(holder.path, arc.path):
-            return True  # whether its slice is ended for this one depends on more than time
+            return True  # the end of its slice for this one depends on more than time
         return self._table.stands_until_s(holder, arc, now_s) > now_s + INSTANT_S
 
     def _rivals(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return who waits and could take RCs before the ARC once the ARC could use them, too."""
+        """Return the waiting ARCs that could take RCs before the ARC once the ARC could use them, too."""
         down = {rc for rc in arc.uses if not self._state.rcs[rc].up}
         rivals = self._schedule.planner_of(arc).before(arc)
-        if not self._in_turns:  # equals reserve nothing from each other: also who comes later may be quicker
+        if not self._in_turns:  # equals reserve nothing from each other: a later one may start first
             equals = [one for one in self._state.beside(arc) if one.queued and not higher(arc.path, one.path)]
             rivals = [*dict.fromkeys([*rivals, *equals])]
         else:
@@ -135,7 +135,7 @@ class Blockers:
         ]
 
     def _higher_ones(self, arc: ArcEntry) -> Iterator[ArcEntry]:
-        """Return who is higher and waits in its group."""
+        """Return the higher waiting ARCs of its group."""
         for other in self._state.group_of(arc):
             if other.state is RequestState.WAITING and higher(other.path, arc.path) and self._table.usable(other):
                 yield other
@@ -148,7 +148,7 @@ class Blockers:
         now_s: float,
         grace_s: float,
     ) -> bool:
-        """Say whether the ARC would start after one hand-over if these were gone."""
+        """Return whether the ARC would start after one hand-over if these were gone."""
         rest = [other for other in group if other not in gone]
         sharing = [other for other in rest if other is not arc and other.holds and other.touches & arc.touches]
         if any(self._stays(h, arc, now_s) and h.state in CONNECTED and not self._table.fits(arc, [h]) for h in sharing):
@@ -165,14 +165,14 @@ class Blockers:
             before = self._schedule.planner_of(arc).before(arc)
             overtaking = [one for one in order[: order.index(arc)] if starting and one not in before]
             if any(not self._table.fits(arc, [one]) for one in overtaking):
-                return False  # who held them back starts as well, and then they come before the ARC
+                return False  # the ARC that held them back starts as well, and then they come before the ARC
             others = [slot for slot in slots if self._table.strict and slot.start_s > now_s + INSTANT_S]
             if any(slot.arc is not arc and higher(slot.arc.path, arc.path) for slot in others):
                 return False
         return True
 
     def _fits_throughout(self, slot: Slot, start_s: float, end_s: float) -> bool:
-        """Say whether the ARC fits beside all who meet this span, but for those that only come free."""
+        """Return whether the ARC fits beside all ARCs of this span, but for those whose RCs are being freed."""
         met = [hold for hold in meeting(slot.against, start_s, end_s) if hold[0].state is not RequestState.REVOKING]
         reserved = [hold for hold in slot.against if hold[0].state is RequestState.REVOKING and hold[1] > start_s]
         met += meeting(reserved, start_s, end_s)

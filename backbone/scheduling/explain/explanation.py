@@ -1,7 +1,7 @@
-"""Explanation: the state of the master schedule in sentences, with the rule that decides.
+"""Explanation: the state of the master schedule in sentences, with the deciding rule.
 
-Rule of this file: it reads, it never changes; and it asks the same plan that decides, so that what
-it says is what will happen if nothing else does.
+Rule of this file: it reads, it never changes; and it asks the plan that decides, so that its answers
+come true if no event comes between.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from backbone.scheduling.views import RcView, RequestView, Schedule, Why
 from backbone.spoken import counted
 
 UNKNOWN_S = -1.0
-MOST_REHEARSED = 32  # measured: to play so many forward takes at most 80 ms
+MOST_REHEARSED = 32  # measured: a rehearsal of so many takes at most 80 ms
 
 _REASONS = {
     "slice": "its slice was over and it was the turn of {by}",
@@ -37,7 +37,7 @@ _REASONS = {
 
 
 class _Answer(NamedTuple):
-    """Lines for people, the rule that decides, and what would change it."""
+    """Lines for people, the deciding rule, and the event that would change the state."""
 
     lines: list[str]
     rule: str
@@ -54,7 +54,7 @@ class Explanation:
 
         Args:
             schedule: Nothing in it changes.
-            rules: With which it is decided.
+            rules: Rules of the decisions.
             granted_s: Waiting ARC, time of the question → when it is granted, by playing the schedule forward;
                 infinite: not foreseeable.
         """
@@ -281,7 +281,7 @@ class Explanation:
         return _Answer([what], "3", f"{_release(blockers)} earlier, or a higher ARC asks")
 
     def _would_let_it_start(self, arc: ArcEntry, blockers: Sequence[ArcEntry], otherwise: str) -> str:
-        """Return with what the ARC would start after one hand-over."""
+        """Return the events after which the ARC would start after one hand-over."""
         needs = [f"{rc} answers" for rc in arc.uses if not self._state.rcs[rc].up]
         if not needs and not self._table.usable(arc):
             needs = [otherwise]

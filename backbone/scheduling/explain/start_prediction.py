@@ -1,7 +1,7 @@
-"""StartPrediction: when those who wait will be granted, hand-overs included.
+"""Start prediction: the next grants of waiting ARCs, hand-overs included.
 
-The plan is made of slices only: it decides what may start, and a hand-over must not cost an ARC its gap.
-Here the time is added that it takes until what was held before is free.
+The plan is made of slices only: it decides which ARC may start, and a hand-over must not cost an ARC its gap.
+The prediction adds the time until the RCs of the ARC before are free.
 
 Rule of this file: it predicts and decides nothing.
 """
@@ -28,7 +28,7 @@ class StartPrediction:
 
         Args:
             schedule: Nothing in it changes.
-            rules: With which it is decided; of the time to stop cleanly half is expected to be taken.
+            rules: Rules of the decisions; half of the time to stop cleanly is expected to be taken.
         """
         self._schedule = schedule
         self._table = schedule.table
@@ -36,13 +36,13 @@ class StartPrediction:
         self._rules = rules
 
     def grants_s(self, slots: Sequence[Slot], now_s: float) -> dict[ArcEntry, float]:
-        """Return when each of these will be granted if nothing else happens; infinite: not foreseeable.
+        """Return when each of these will be granted if no event comes; infinite: not foreseeable.
 
         Args:
             slots: Places of all queued ARCs of a group, in order.
         """
         starts_s: dict[ArcEntry, float] = {}
-        for slot in sorted(slots, key=lambda slot: slot.start_s):  # whom one waits for starts earlier
+        for slot in sorted(slots, key=lambda slot: slot.start_s):  # an ARC starts later than those it waits for
             start_s = slot.start_s
             if start_s < math.inf and self._schedule.planner_of(slot.arc).is_exact:
                 start_s = max([start_s, *self._frees_s(slot, starts_s, now_s)])
@@ -52,7 +52,7 @@ class StartPrediction:
         return {arc: start_s + arc.settle_s for arc, start_s in starts_s.items()}
 
     def _frees_s(self, slot: Slot, starts_s: dict[ArcEntry, float], now_s: float) -> list[float]:
-        """Return when what the ARC waits for will be free."""
+        """Return when the RCs that the ARC waits for will be free."""
         arc = slot.arc
         times_s = []
         for other, begin_s, end_s in slot.against:
@@ -81,7 +81,7 @@ class StartPrediction:
 
     def _let_higher_go_first(self, slots: Sequence[Slot], starts_s: dict[ArcEntry, float]) -> None:
         above = PrefixMaximum()
-        for slot in slots:  # in order: the higher ones' starts are known
+        for slot in slots:  # in order: the starts of higher ARCs are known
             start_s = above.largest(slot.arc.path)
             if start_s > starts_s[slot.arc]:
                 starts_s[slot.arc] = self._beside_reserved_s(slot, start_s)
@@ -89,7 +89,7 @@ class StartPrediction:
                 above.add(slot.arc.path, starts_s[slot.arc])
 
     def _beside_reserved_s(self, slot: Slot, start_s: float) -> float:
-        """Return the first time from then on at which what is reserved for others leaves the ARC its room."""
+        """Return the first time from then on at which the reservations of others leave room for the ARC."""
         for other, begin_s, end_s in sorted(slot.against, key=lambda hold: hold[1]):
             meets = (
                 begin_s < start_s + slot.arc.length_s and end_s > start_s and not self._table.fits(slot.arc, [other])

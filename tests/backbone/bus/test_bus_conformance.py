@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-import socket
 from collections.abc import Awaitable, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 import uvloop
+from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock, VirtualClock, VirtualLoop
 from backbone.bus.interface import Bus, BusStatistics, Clock, current_cause
@@ -42,7 +42,7 @@ class Echoed(Message, frozen=True):
 
 
 class Other(Message, frozen=True):
-    """A message nobody in these tests accepts."""
+    """A message that no component of these tests accepts."""
 
 
 class News(Message, frozen=True):
@@ -80,12 +80,6 @@ def fail_on_bug(bug: BaseException) -> None:
     raise AssertionError("a bug nobody expected here") from bug
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.fixture(params=["local", "zenoh", "shared", "shared by turns"])
 def on_bus(request: pytest.FixtureRequest) -> Runner:
     """Return what runs a law on one of the buses."""
@@ -95,7 +89,7 @@ def on_bus(request: pytest.FixtureRequest) -> Runner:
         await run_and_close(law, Net(network.join, VirtualClock()))
 
     async def on_zenoh(law: Law) -> None:
-        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        endpoint = free_endpoint()
         clock = MissionClock.started_now()
         hub = ZenohBus.open("conformance", "backbone/hub", clock, hub_config([endpoint]))
         try:
@@ -105,7 +99,7 @@ def on_bus(request: pytest.FixtureRequest) -> Runner:
             await hub.close()
 
     async def on_shared(law: Law, processes: int) -> None:
-        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        endpoint = free_endpoint()
         clock = MissionClock.started_now()
         hub = ZenohBus.open("conformance", "backbone/hub", clock, hub_config([endpoint]))
         sessions = [SharedSession("conformance", endpoint) for _ in range(processes)]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import socket
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
 import pytest_asyncio
+from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.shared_bus import SharedBus, SharedSession
@@ -43,9 +43,7 @@ class Pool:
 
 @pytest_asyncio.fixture
 async def pool() -> AsyncIterator[Pool]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     clock = MissionClock.started_now()
     hub = ZenohBus.open("pool", "backbone/hub", clock, hub_config([endpoint]))
     session = SharedSession("pool", endpoint)
@@ -203,6 +201,29 @@ async def test_a_name_that_moves_to_another_process_is_followed(pool: Pool) -> N
     token.close()
     await heard.until(lambda all_: len(all_) == 2)
     await known_elsewhere.until(lambda all_: len(all_) == 2)
+    elsewhere = pool.stranger.declare_alive(RADIO)
+    await heard.until(lambda all_: len(all_) == 3)
+    elsewhere.close()
+    await heard.until(lambda all_: len(all_) == 4)
+    assert heard.all == [(RADIO, True), (RADIO, False)] * 2
+
+
+async def test_a_no_of_the_hub_counts_only_when_the_session_agrees(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The session drops an answer about a token that it reports in the meantime; the hub is then asked again."""
+    heard, asked = Heard(), 0
+    stands = pool.scout.stands
+
+    async def drop_three(address: str) -> bool:
+        nonlocal asked
+        asked += 1
+        return asked > 3 and await stands(address)
+
+    token = pool.radio.declare_alive(RADIO)
+    pool.scout.watch_alive(RADIO, heard)
+    await heard.until(lambda all_: len(all_) == 1)
+    token.close()
+    await heard.until(lambda all_: len(all_) == 2)
+    monkeypatch.setattr(pool.scout, "stands", drop_three)
     elsewhere = pool.stranger.declare_alive(RADIO)
     await heard.until(lambda all_: len(all_) == 3)
     elsewhere.close()

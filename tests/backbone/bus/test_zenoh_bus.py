@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 import threading
 from collections.abc import AsyncIterator, Awaitable
 from contextlib import asynccontextmanager
@@ -12,9 +11,10 @@ from typing import Any
 
 import pytest
 import zenoh
+from free_ports import free_endpoint
 from hostile_messages import enveloped, honest, hostile_messages
 
-from backbone.bus import zenoh_bus
+from backbone.bus import zenoh_bus, zenoh_settings
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.component.messages import AskState, CommonQuestion, SetParameter, Stop, Stopping
@@ -39,12 +39,6 @@ async def within(work: Awaitable[Any], what: str, limit_s: float = DEADLINE_S) -
             return await work
     except TimeoutError:
         pytest.fail(f"not within {limit_s:g} s: {what}")
-
-
-def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def join(endpoint: str, source: str) -> ZenohBus:
@@ -241,7 +235,7 @@ async def test_a_hub_sees_its_own_link_up_whoever_comes_and_goes() -> None:
 
 
 async def until_gone(hub: ZenohBus) -> None:
-    """Return when a token declared and withdrawn by a last client has fallen, so what fell before it was told too."""
+    """Return when a token declared and withdrawn by a last client has fallen: earlier falls were reported too."""
     fallen = asyncio.Event()
     watching = hub.watch_alive(SERVER, lambda _address, alive: None if alive else fallen.set())
     other = hub.declare_alive(SERVER)
@@ -275,7 +269,7 @@ async def test_a_hub_on_a_taken_port_is_unreachable() -> None:
 
 
 async def test_no_hub_is_unreachable_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zenoh_bus, "OPEN_TIMEOUT_MS", 100)
+    monkeypatch.setattr(zenoh_settings, "OPEN_TIMEOUT_MS", 100)
     config = client_config(free_endpoint())
     with pytest.raises(HubUnreachable):
         ZenohBus.open("hostile", ASKER, CLOCK, config)

@@ -130,7 +130,7 @@ class Quiet(Component[Any]):
 
 
 class Stage:
-    """A network with a walker on it, its published states, its token's changes, and somebody who asks."""
+    """A network with a walker on it, its published states, its token's changes, and a component that asks."""
 
     def __init__(self, **walker: Any) -> None:
         self.network, self.clock = LocalNetwork(), VirtualClock()

@@ -1,4 +1,4 @@
-"""A heartbeat that is written is read, and what cannot be written or read harms nobody."""
+"""A written heartbeat is read, and a failure to write or read it ends no component."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Logs stay small whatever is said, by whomever, and on a full disk nothing ends because of them."""
+"""Logs stay small under any output of any process, and on a full disk no component ends because of them."""
 
 from __future__ import annotations
 

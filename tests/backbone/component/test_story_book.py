@@ -1,4 +1,4 @@
-"""A story book has its size, whatever is noted in it."""
+"""A story book keeps its size with any events."""
 
 from __future__ import annotations
 

@@ -8,13 +8,13 @@ from typing import Any
 import msgspec
 import pytest
 
+from backbone.addresses import COMPONENT_DATABASE
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStory, Story
 from backbone.component_database.messages import (
-    ADDRESS,
     Admit,
     Admitted,
     ComponentType,
@@ -59,7 +59,7 @@ def database(network: LocalNetwork) -> Component[Any]:
 
 async def admit(network: LocalNetwork, kind: str, name: str) -> ComponentType:
     bus = network.join("ui_console/asker", VirtualClock())
-    return (await bus.ask(ADDRESS, Admit(kind, name), Admitted, within_s=10)).component_type
+    return (await bus.ask(COMPONENT_DATABASE, Admit(kind, name), Admitted, within_s=10)).component_type
 
 
 def test_types_survive_the_way_through_a_launch_order(local_mission: Any, beside: Any) -> None:
@@ -69,14 +69,16 @@ def test_types_survive_the_way_through_a_launch_order(local_mission: Any, beside
             with pytest.raises(UnknownType):
                 await admit(network, "wather", "left")
             bus = network.join("ui_console/asker", VirtualClock())
-            counted = await bus.ask(ADDRESS, ListTypes(), Types, within_s=1)
+            counted = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=1)
             assert {count.component_type.name: count.running for count in counted.types} == {
                 "watcher": 0,
                 "world": 0,
                 "rc_manager": 0,
                 "component_database": 1,
             }
-            told = [event.what for event in (await bus.ask(ADDRESS, AskStory("left"), Story, within_s=1)).events]
+            told = [
+                event.what for event in (await bus.ask(COMPONENT_DATABASE, AskStory("left"), Story, within_s=1)).events
+            ]
             assert told[0] == "was admitted as watcher"
             assert told[1].startswith("was not admitted: no component type 'wather'")
 

@@ -1,4 +1,4 @@
-"""A zygote's twin for virtual time: components and shared processes run as tasks of one loop, and die as told."""
+"""A zygote's twin for virtual time: components and shared processes run as tasks of one loop, and die on order."""
 
 from __future__ import annotations
 

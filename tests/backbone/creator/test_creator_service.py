@@ -12,6 +12,7 @@ import msgspec
 import pytest
 from in_process_zygote import InProcessZygote
 
+from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
@@ -38,10 +39,8 @@ from backbone.creator.messages import (
 )
 from backbone.creator.service import Creator
 from backbone.keys import Conversation
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Resolve, Resolved
 from backbone.naming import IllegalName, Subsystem
-from backbone.placer.messages import ADDRESS as PLACER
 
 CREATOR = "backbone/creator-lab"
 KINDS = ("Quiet", "Stubborn", "Late", "Leaver", "Failing", "Broken", "Forker")

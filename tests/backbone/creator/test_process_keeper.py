@@ -19,15 +19,9 @@ from backbone.component.heartbeat import Vitals
 from backbone.component.launch import Launch
 from backbone.component.logs import log_path
 from backbone.component.messages import Stop, Stopping
-from backbone.creator.messages import (
-    AlreadyHere,
-    EndedBy,
-    NotHere,
-    ProcessFell,
-    RestartPolicy,
-    StartFailed,
-)
-from backbone.creator.process_keeper import LAST_LINES, ProcessKeeper, last_lines
+from backbone.creator.failed_starts import LAST_LINES, last_lines
+from backbone.creator.messages import AlreadyHere, EndedBy, NotHere, ProcessFell, RestartPolicy, StartFailed
+from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.silence import LOOK_EVERY_S
 from backbone.naming import Subsystem
 
@@ -73,7 +67,7 @@ def on_bench(local_mission: Callable) -> Callable[[Callable[[Bench], Awaitable[N
             zygote, fell, vitals = InProcessZygote(network), [], dict[int, Vitals]()
 
             def look(_folder: str, pid: int) -> Vitals:
-                """Every process beats at each look, unless the test says what is seen."""
+                """Every process beats at each look, unless the test sets the beats."""
                 return vitals.get(pid) or Vitals(int(now_s() * 1000))
 
             keeper = ProcessKeeper(zygote, VirtualClock(), look)

@@ -160,7 +160,7 @@ class RandomHistories(RuleBasedStateMachine):
         assert self.wake_s >= self.now_s
 
     def teardown(self) -> None:
-        """In a world that obeys everybody who is wanted runs in the end, and nobody's process is ended."""
+        """In a world that obeys, every wanted member runs in the end, and no member's process is ended."""
         self.pass_time(SERVES_WITHIN_S + ADMITS_WITHIN_S)
         for _ in range(100):
             for process, pid in list(self.live.items()):

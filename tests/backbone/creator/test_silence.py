@@ -27,7 +27,7 @@ def test_a_process_that_beats_is_never_silent(gaps_s: list[float]) -> None:
 
 @given(GAPS_S, st.floats(0.0, 1.0))
 def test_silence_never_exceeds_the_time_that_passed_and_grows_only(gaps_s: list[float], share: float) -> None:
-    """Whatever share of its time the process waited for a processor."""
+    """For any share of its time that the process waited for a processor."""
     at_s = queued_s = 0.0
     looks = [(0.0, Vitals(1))]
     for gap_s in gaps_s:

@@ -179,7 +179,7 @@ class RandomHistories(RuleBasedStateMachine):
         assert self.wake_s <= min((one.deadline_s for one in self.supervision), default=float("inf"))
 
     def teardown(self) -> None:
-        """Whatever happened, ordering the end of all ends all and answers everybody, within the times ordered."""
+        """After any events, the order to end all ends all and answers every requester, within the times ordered."""
         for one in list(self.supervision):
             self.ends_open.add(one.name)
             self.do(self.supervision.end_ordered(one.name, 1.0, 0.5, self.now_s))
@@ -401,7 +401,7 @@ def test_signals_without_a_name_are_described_by_number() -> None:
 
 @pytest.mark.parametrize("returncode", [0, -9, -15])
 def test_a_start_that_is_ended_from_outside_is_begun_again_also_without_restart(returncode: int) -> None:
-    """Its owner still waits for the answer; a refusal would tell it that the component cannot run."""
+    """Its owner still waits for the answer; a refusal would mean that the component cannot run."""
     supervision = Supervision()
     supervision.start_ordered("arc", RestartPolicy(restart=False), 20.0, 1.0)
     supervision.forked("arc", 7, 1.1)

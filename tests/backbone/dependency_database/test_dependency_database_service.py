@@ -7,18 +7,11 @@ from typing import Any
 import msgspec
 import pytest
 
+from backbone.addresses import DEPENDENCY_DATABASE
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, AskStory, Statistics, Story
-from backbone.dependency_database.messages import (
-    ADDRESS,
-    AskResources,
-    FindRcs,
-    NoSuchHardware,
-    RcSets,
-    Resource,
-    Resources,
-)
+from backbone.dependency_database.messages import AskResources, FindRcs, NoSuchHardware, RcSets, Resource, Resources
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.naming import Subsystem
 
@@ -40,15 +33,15 @@ def test_hardware_survives_the_way_through_a_launch_order(local_mission: Any, be
             beside(DependencyDatabase(launch, network.join(launch.address, clock), clock)),
         ):
             bus = network.join("ui_console/asker", clock)
-            known = await bus.ask(ADDRESS, AskResources(), Resources, within_s=1)
+            known = await bus.ask(DEPENDENCY_DATABASE, AskResources(), Resources, within_s=1)
             assert known.resources == sorted(HARDWARE, key=lambda resource: resource.name)
-            found = await bus.ask(ADDRESS, FindRcs(["scout", "command_radio"]), RcSets, within_s=1)
+            found = await bus.ask(DEPENDENCY_DATABASE, FindRcs(["scout", "command_radio"]), RcSets, within_s=1)
             assert found.sets == [{"scout": "scout1", "command_radio": "radio"}]
             with pytest.raises(NoSuchHardware):
-                await bus.ask(ADDRESS, FindRcs(["framegrabber"]), RcSets, within_s=1)
-            counted = await bus.ask(ADDRESS, AskStatistics(), Statistics, within_s=1)
+                await bus.ask(DEPENDENCY_DATABASE, FindRcs(["framegrabber"]), RcSets, within_s=1)
+            counted = await bus.ask(DEPENDENCY_DATABASE, AskStatistics(), Statistics, within_s=1)
             assert (counted.values["searches_found"], counted.values["searches_refused"]) == (1.0, 1.0)
-            story = await bus.ask(ADDRESS, AskStory("ui_console/asker"), Story, within_s=1)
+            story = await bus.ask(DEPENDENCY_DATABASE, AskStory("ui_console/asker"), Story, within_s=1)
             assert [event.what for event in story.events] == [
                 "found 1 set of scout, command_radio",
                 "found no hardware: no 'framegrabber' exists",

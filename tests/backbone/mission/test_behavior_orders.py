@@ -7,9 +7,9 @@ import msgspec
 import pytest
 
 from backbone.mission.behavior_orders import ReservedParameter, behavior_order, behavior_orders
-from backbone.mission.model import ArcWish, Behavior, MissionDescription
+from backbone.mission.model import ArcWish, BehaviorDescription, MissionDescription
 
-WATCH = Behavior(
+WATCH = BehaviorDescription(
     type="watch_for_motion",
     name="watch1",
     priority=3,
@@ -25,7 +25,7 @@ WATCH = Behavior(
 )
 
 
-def mission(*behaviors: Behavior) -> MissionDescription:
+def mission(*behaviors: BehaviorDescription) -> MissionDescription:
     return MissionDescription(
         name="iros2001",
         priority=10,
@@ -40,7 +40,9 @@ def mission(*behaviors: Behavior) -> MissionDescription:
 
 
 def test_a_root_is_ordered_with_its_path_its_own_parameters_and_its_children() -> None:
-    [order] = behavior_orders(mission(Behavior(type="surveillance", name="watch", priority=5, children=(WATCH,))))
+    [order] = behavior_orders(
+        mission(BehaviorDescription(type="surveillance", name="watch", priority=5, children=(WATCH,)))
+    )
     assert (order.type, order.name) == ("surveillance", "watch")
     assert order.parameters["path"] == [["iros2001", 10], ["watch", 5]]
     assert order.parameters["arc"] is None
@@ -48,7 +50,9 @@ def test_a_root_is_ordered_with_its_path_its_own_parameters_and_its_children() -
 
 
 def test_a_child_is_ordered_by_the_same_rule_one_step_further_down() -> None:
-    [order] = behavior_orders(mission(Behavior(type="surveillance", name="watch", priority=5, children=(WATCH,))))
+    [order] = behavior_orders(
+        mission(BehaviorDescription(type="surveillance", name="watch", priority=5, children=(WATCH,)))
+    )
     child = behavior_order(order.parameters["children"][0], [("iros2001", 10), ("watch", 5)])
     assert child.parameters["path"] == [["iros2001", 10], ["watch", 5], ["watch1", 3]]
     assert child.parameters["again_after_s"] == 2.0
@@ -61,11 +65,11 @@ def test_orders_survive_the_wire() -> None:
 
 
 def test_a_parameter_of_a_reserved_name_is_refused_at_any_depth() -> None:
-    bad = Behavior(type="wander", name="wander", priority=1, parameters={"path": []})
+    bad = BehaviorDescription(type="wander", name="wander", priority=1, parameters={"path": []})
     with pytest.raises(ReservedParameter):
         behavior_orders(mission(bad))
     with pytest.raises(ReservedParameter):
-        behavior_orders(mission(Behavior(type="surveillance", name="s", priority=1, children=(bad,))))
+        behavior_orders(mission(BehaviorDescription(type="surveillance", name="s", priority=1, children=(bad,))))
 
 
 @pytest.mark.processes

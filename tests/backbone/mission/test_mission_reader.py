@@ -255,6 +255,15 @@ def test_what_shares_a_process_says_so_in_its_order(tmp_path: Path) -> None:
     assert [order.process for order in behavior_orders(mission)] == ["eyes", ""]
 
 
+def test_members_of_a_process_are_on_the_host_that_one_of_them_names(tmp_path: Path) -> None:
+    """Placed one by one, a member without a host once began its process on another machine before the others came."""
+    text = MISSION_XML.read_text().replace('name="radio" sharable', 'name="radio" host="base" sharable')
+    file = tmp_path / "mission.xml"
+    file.write_text(text)
+    hosts = {(each.process, each.host) for each in read_mission(file).resources}
+    assert hosts == {("hardware", "base"), ("", "")}
+
+
 def test_a_new_kind_of_hardware_needs_no_other_schema(tmp_path: Path) -> None:
     lidar = '<type name="lidar" class="backbone.component.component:Component" subsystem="resource_pool"/>\n  </types>'
     description = read_text(
@@ -359,8 +368,11 @@ def test_every_host_runs_a_creator_and_the_first_the_other_services(tmp_path: Pa
 def test_the_shipped_missions_say_only_what_is_their_own() -> None:
     assert len(MISSION_XML.read_text().splitlines()) <= 75
     assert len(SMALLEST.read_text().splitlines()) <= 15
+    shipped = {kind.text("name") for kind in shipped_types()}
     for file in (MISSION_XML, *SMALLEST.parent.glob("*.xml")):
-        assert not re.search("<core>|<types>", file.read_text()), file
+        text = file.read_text()
+        assert "<core>" not in text, file
+        assert shipped.isdisjoint(re.findall(r'<type name="(\w+)"', text)), file
 
 
 # ---------------------------------------------------------------------- the mission at the top of the project

@@ -8,11 +8,11 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
-from backbone.cli import app
+from backbone.command_line.cli import app
 from backbone.component.launch import Launch
-from backbone.core_launches import UpOptions, core_launches
-from backbone.dry_run import dry_run
-from backbone.endings import ExitCode
+from backbone.dry_run.run import dry_run
+from backbone.launcher.core_launches import UpOptions, core_launches
+from backbone.launcher.endings import ExitCode
 from backbone.mission.class_facts import parameters_of
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import MissionInvalid, read_mission

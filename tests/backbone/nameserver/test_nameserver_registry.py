@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.component.messages import ComponentState, LifeState
+from backbone.component.messages import ComponentState, LifeState, NameTaken
 from backbone.errors import Refusal
-from backbone.nameserver.messages import Appeared, Disappeared, NameTaken, UnknownName
+from backbone.nameserver.messages import Appeared, Disappeared, UnknownName
 from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Introduce, Registry
 from backbone.naming import component_of
 

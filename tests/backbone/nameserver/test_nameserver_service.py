@@ -10,22 +10,29 @@ from typing import Any
 
 import pytest
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import REGISTER_WITHIN_S, Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import AskStatistics, AskStory, ComponentState, LifeState, Statistics, Story
+from backbone.component.messages import (
+    AskStatistics,
+    AskStory,
+    ComponentState,
+    LifeState,
+    NameTaken,
+    Register,
+    Registered,
+    Statistics,
+    Story,
+)
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
 from backbone.nameserver.messages import (
-    ADDRESS,
     Appeared,
     Components,
     Disappeared,
     ListComponents,
-    NameTaken,
-    Register,
-    Registered,
     Resolve,
     Resolved,
     UnknownName,
@@ -66,7 +73,9 @@ def nameserver(network: LocalNetwork, run_directory: str = "") -> Nameserver:
 
 
 async def listed(network: LocalNetwork) -> Components:
-    return await network.join("ui_console/asker", VirtualClock()).ask(ADDRESS, ListComponents(), Components, within_s=1)
+    return await network.join("ui_console/asker", VirtualClock()).ask(
+        NAMESERVER, ListComponents(), Components, within_s=1
+    )
 
 
 def names(components: Components) -> list[str]:
@@ -97,7 +106,7 @@ def test_whoever_listens_hears_who_appears_and_disappears(local_mission: Any, be
         heard: list[object] = []
         async with local_mission() as network:
             bus = network.join("ui_console/asker", VirtualClock())
-            bus.subscribe(ADDRESS, Conversation.EVENTS, Appeared | Disappeared, lambda said: heard.append(said.body))
+            bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, lambda said: heard.append(said.body))
             async with beside(probe(network)):
                 await VirtualClock().sleep_s(0.1)
             await VirtualClock().sleep_s(0.1)
@@ -121,7 +130,7 @@ def test_a_second_of_the_same_name_ends_with_the_refusal_and_is_never_heard_of(l
             assert (taken.value.facts["name"], taken.value.facts["host"]) == ("scout1", "a")
             await VirtualClock().sleep_s(0.1)
             assert heard == []
-            resolved = await bus.ask(ADDRESS, Resolve("scout1"), Resolved, within_s=1)
+            resolved = await bus.ask(NAMESERVER, Resolve("scout1"), Resolved, within_s=1)
             assert (resolved.component.host, resolved.component.state) == ("a", LifeState.READY)
 
     run_virtual(main())
@@ -138,7 +147,7 @@ def test_a_name_whose_process_was_killed_before_its_claim_stood_is_waited_for(lo
         async with local_mission() as network:
             former = network.join("resource_pool/scout1", VirtualClock())
             state = ComponentState("resource_pool/scout1", "probe", "a", dead.pid, LifeState.CONNECTING, 0.0)
-            await former.ask(ADDRESS, Register(state), Registered, within_s=1.0)
+            await former.ask(NAMESERVER, Register(state), Registered, within_s=1.0)
             await former.close()
             successor = probe(network, host="a")
             life = asyncio.create_task(successor.run())
@@ -243,7 +252,7 @@ def test_a_token_nobody_answers_for_holds_the_list_up_only_for_a_moment(local_mi
             await VirtualClock().sleep_s(3.0)
             assert (await listed(network)).complete
             with pytest.raises(UnknownName):
-                await hung.ask(ADDRESS, Resolve("hung"), Resolved, within_s=1)
+                await hung.ask(NAMESERVER, Resolve("hung"), Resolved, within_s=1)
             await hung.close()
 
     run_virtual(main())
@@ -257,7 +266,7 @@ def test_a_strangers_token_does_not_end_the_hub(local_mission: Any) -> None:
                 stranger.declare_alive(odd)
             await VirtualClock().sleep_s(2.5)
             assert names(await listed(network)) == ["nameserver"]
-            counted = await stranger.ask(ADDRESS, AskStatistics(), Statistics, within_s=1)
+            counted = await stranger.ask(NAMESERVER, AskStatistics(), Statistics, within_s=1)
             assert counted.values["introductions_unanswered"] == 0  # nobody can answer there: it is not even asked
             await stranger.close()
 
@@ -269,8 +278,8 @@ def test_the_nameserver_tells_what_it_counted_and_decided(local_mission: Any, be
         async with local_mission() as network, beside(probe(network)):
             await VirtualClock().sleep_s(0.1)
             bus = network.join("ui_console/asker", VirtualClock())
-            counted = await bus.ask(ADDRESS, AskStatistics(), Statistics, within_s=1)
-            return counted, await bus.ask(ADDRESS, AskStory("scout1"), Story, within_s=1)
+            counted = await bus.ask(NAMESERVER, AskStatistics(), Statistics, within_s=1)
+            return counted, await bus.ask(NAMESERVER, AskStory("scout1"), Story, within_s=1)
 
     counted, story = run_virtual(main())
     assert (counted.values["components"], counted.values["registrations"]) == (2.0, 1.0)

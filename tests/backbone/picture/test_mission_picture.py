@@ -1,4 +1,4 @@
-"""What a look at a mission says of those who did not answer, and of what is wanted and absent."""
+"""A look at a mission reports services that did not answer, and wanted components that are absent."""
 
 from __future__ import annotations
 
@@ -8,20 +8,18 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import Absence, AskTime, ComponentState, LifeState, MissionTime, StandingStop
 from backbone.creator.messages import ListProcesses, Processes, ProcessState, Spawn
 from backbone.errors import LinkError
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, Disappeared, ListComponents
-from backbone.naming import LAUNCHER, Subsystem
+from backbone.naming import Subsystem
 from backbone.picture.health import HealthWord
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture, misses
 from backbone.picture.screen import live_screen, screen
-from backbone.placer.messages import ADDRESS as PLACER
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Message
@@ -38,7 +36,7 @@ def process(name: str, subsystem: Subsystem = Subsystem.RESOURCE_POOL, pid: int 
 
 
 def serve(network: LocalNetwork, address: str, answers: dict[type[Message], Message]) -> Any:
-    """Have a component at this address answer these questions."""
+    """Answer these questions by a component at this address."""
     accepts: Any = None
     for question in answers:
         accepts = question if accepts is None else accepts | question
@@ -58,7 +56,7 @@ WHOLE = Components(LISTED, True, 0.0)
 def core(
     network: LocalNetwork, listing: Components = WHOLE, processes: tuple[ProcessState, ...] = ()
 ) -> dict[str, Any]:
-    """Have all core services that are asked by a look answer."""
+    """Answer all questions of a look by core services."""
     time = {AskTime: MissionTime(1.0, 1.0)}
     return {
         NAMESERVER: serve(network, NAMESERVER, {ListComponents: listing}),

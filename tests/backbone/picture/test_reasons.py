@@ -1,4 +1,4 @@
-"""``why`` and ``story`` name whoever did not answer, and understand what causes look like."""
+"""``why`` and ``story`` name the components that did not answer, and understand ids of causes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, current_cause
 from backbone.bus.local_bus import LocalNetwork
@@ -20,9 +21,8 @@ from backbone.component.messages import (
 )
 from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.picture.reasons import Asked, Reasons, Told, reasons_for, story_of
+from backbone.picture.reasons import AskedName, Reasons, Told, reasons_for, story_of
 
 CAUSE = "backbone/rc_manager#112"
 SCOUT = ComponentState(
@@ -107,7 +107,7 @@ def test_a_cause_has_the_events_that_it_led_to_and_no_others() -> None:
 
 
 def test_an_address_means_its_component() -> None:
-    assert Asked.of("resource_pool/scout1") == Asked("scout1")
+    assert AskedName.of("resource_pool/scout1") == AskedName("scout1")
     assert why("resource_pool/scout1").component == SCOUT
 
 
@@ -146,7 +146,7 @@ def test_an_events_cause_may_be_typed_with_or_without_its_subsystem(text: str) -
 
 
 def test_a_message_that_led_to_nothing_says_so() -> None:
-    assert why("scout1#7").lines(5.0)[0].startswith("nobody tells that scout1#7 led to anything")
+    assert why("scout1#7").lines(5.0)[0].startswith("no component has an event that scout1#7 led to")
 
 
 def test_an_alarm_means_what_it_is_about() -> None:

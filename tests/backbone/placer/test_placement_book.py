@@ -8,21 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.component.messages import NameTaken
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
 from backbone.creator.messages import HostLoad, ProcessState, RestartPolicy, Spawn
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem
+from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase
 from backbone.placer.messages import NoHost, NotPlaced
-from backbone.placer.placement_book import (
-    STOPPED_KEPT,
-    EndOrphan,
-    Inspect,
-    Instruction,
-    Note,
-    PlaceAgain,
-    PlacementBook,
-    PlacementPhase,
-)
+from backbone.placer.placement_book import STOPPED_KEPT, PlacementBook
 
 
 def spawn(name: str, *, restart: bool = True, pinned: bool = False, kind: str = "watcher", shares: str = "") -> Spawn:

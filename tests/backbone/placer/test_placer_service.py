@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.component import Component, NoParameters
@@ -22,6 +23,7 @@ from backbone.component.messages import (
     AskStory,
     ComponentState,
     LifeState,
+    NameTaken,
     Statistics,
     Story,
 )
@@ -44,11 +46,9 @@ from backbone.creator.messages import (
 )
 from backbone.errors import ReplyTimeout
 from backbone.keys import Conversation
-from backbone.nameserver.messages import NameTaken
 from backbone.nameserver.service import Nameserver
 from backbone.naming import IllegalName, Subsystem
 from backbone.placer.messages import (
-    ADDRESS,
     AskPlacement,
     CreatorSilent,
     Ended,
@@ -190,20 +190,20 @@ class Mission:
         await self.bus.close()
 
     async def start(self, kind: str, name: str = "", host: str = "", within_s: float = 600.0, **more: Any) -> Started:
-        return await self.bus.ask(ADDRESS, Start(kind, name, host=host, **more), Started, within_s=within_s)
+        return await self.bus.ask(PLACER, Start(kind, name, host=host, **more), Started, within_s=within_s)
 
     async def stop(self, name: str) -> Ended:
-        return await self.bus.ask(ADDRESS, StopComponent(name), Ended, within_s=30.0)
+        return await self.bus.ask(PLACER, StopComponent(name), Ended, within_s=30.0)
 
     async def placements(self) -> dict[str, str]:
-        listed = await self.bus.ask(ADDRESS, ListPlacements(), Placements, within_s=1.0)
+        listed = await self.bus.ask(PLACER, ListPlacements(), Placements, within_s=1.0)
         return {placement.name: placement.host for placement in listed.placements}
 
     async def absent(self) -> list[Absence]:
-        return (await self.bus.ask(ADDRESS, AskState(), ComponentState, within_s=1.0)).absent
+        return (await self.bus.ask(PLACER, AskState(), ComponentState, within_s=1.0)).absent
 
     async def story(self, name: str) -> list[str]:
-        return [event.what for event in (await self.bus.ask(ADDRESS, AskStory(name), Story, within_s=1.0)).events]
+        return [event.what for event in (await self.bus.ask(PLACER, AskStory(name), Story, within_s=1.0)).events]
 
 
 @asynccontextmanager
@@ -256,7 +256,7 @@ async def test_a_loaded_host_gets_fewer(one: Mission) -> None:
 
 @on("a", "b")
 async def test_a_start_that_a_leaving_creator_gives_up_goes_to_another_host(one: Mission) -> None:
-    """A creator that ends politely ends what is starting there too; that says nothing against the component."""
+    """A creator that drains also ends components that are starting there; that is no fault of these components."""
     leaving = one.creators["a"]
     leaving.spawn_s, leaving.fails = 0.5, ["watcher-1"]
     one.creators["b"].tell_load(cpu=0.9)
@@ -272,7 +272,7 @@ async def test_a_start_that_a_leaving_creator_gives_up_goes_to_another_host(one:
 @on("a", "b")
 async def test_a_placement_tells_who_wanted_it_and_why_it_is_there(one: Mission) -> None:
     await one.start("scout", "scout1", host="b")
-    placed = await one.bus.ask(ADDRESS, AskPlacement("scout1"), Placement, within_s=1.0)
+    placed = await one.bus.ask(PLACER, AskPlacement("scout1"), Placement, within_s=1.0)
     assert (placed.host, placed.type, placed.requester) == ("b", "scout", "backbone/boss")
     assert placed.reasons[0] == "a: not b, which was asked for"
     assert placed.reasons[1].startswith("b: chosen, asked for")
@@ -296,7 +296,7 @@ async def test_refusals_name_the_fault_and_leave_nothing_behind(one: Mission) ->
         await one.stop("w")
     assert await one.placements() == {}
     assert (await one.start("watcher", "w")).host == "a"
-    counted = await one.bus.ask(ADDRESS, AskStatistics(), Statistics, within_s=1.0)
+    counted = await one.bus.ask(PLACER, AskStatistics(), Statistics, within_s=1.0)
     assert (counted.values["starts"], counted.values["starts_refused"]) == (6.0, 5.0)
 
 
@@ -344,7 +344,7 @@ async def test_a_component_that_is_being_stopped_is_placed_no_more(one: Mission)
     stopping = asyncio.create_task(one.stop("w"))
     await one.clock.sleep_s(1.0)
     with pytest.raises(NotPlaced) as refused:
-        await one.bus.ask(ADDRESS, AskPlacement("w"), Placement, within_s=1.0)
+        await one.bus.ask(PLACER, AskPlacement("w"), Placement, within_s=1.0)
     assert refused.value.facts["stopped"] is True
     await stopping
 
@@ -413,7 +413,7 @@ async def test_what_cannot_be_placed_is_reported_as_absent_with_its_cause(one: M
 async def test_what_a_component_wanted_ends_with_an_order_to_stop_it(one: Mission) -> None:
     await one.start("watcher", "parent")
     child = one.network.join("mission_control/parent", one.clock)
-    await child.ask(ADDRESS, Start("watcher", "child"), Started, within_s=10.0)
+    await child.ask(PLACER, Start("watcher", "child"), Started, within_s=10.0)
     await one.stop("parent")
     await one.clock.sleep_s(1.0)
     assert await one.placements() == {}
@@ -422,9 +422,9 @@ async def test_what_a_component_wanted_ends_with_an_order_to_stop_it(one: Missio
 
 @on("a")
 async def test_what_nobody_wants_any_more_is_ended(one: Mission) -> None:
-    """The owner and the placer died at the same moment, and nobody brought the owner back."""
+    """The owner and the placer died at the same moment, and no component restarted the owner."""
     gone = one.network.join("mission_control/gone", one.clock)
-    await gone.ask(ADDRESS, Start("watcher", "child"), Started, within_s=10.0)
+    await gone.ask(PLACER, Start("watcher", "child"), Started, within_s=10.0)
     await gone.close()
     await one.clock.sleep_s(3 * COMPARE_EVERY_S)
     assert await one.placements() == {}
@@ -435,12 +435,12 @@ async def test_an_order_to_stop_is_remembered_until_the_next_start(one: Mission)
     await one.start("watcher", "w")
     await one.stop("w")
     with pytest.raises(NotPlaced) as refused:
-        await one.bus.ask(ADDRESS, AskPlacement("w"), Placement, within_s=1.0)
+        await one.bus.ask(PLACER, AskPlacement("w"), Placement, within_s=1.0)
     assert refused.value.facts["stopped"] is True
-    listed = await one.bus.ask(ADDRESS, ListPlacements(), Placements, within_s=1.0)
+    listed = await one.bus.ask(PLACER, ListPlacements(), Placements, within_s=1.0)
     assert list(listed.stopped) == ["w"]
     await one.start("watcher", "w")
-    assert (await one.bus.ask(ADDRESS, ListPlacements(), Placements, within_s=1.0)).stopped == {}
+    assert (await one.bus.ask(PLACER, ListPlacements(), Placements, within_s=1.0)).stopped == {}
 
 
 @pytest.mark.parametrize("how", ["crash", "kill"])
@@ -612,7 +612,7 @@ async def test_a_restarted_placer_knows_what_runs_and_for_whom(one: Mission) -> 
     await one.kill("placer")
     await one.begin(Placer, "placer")
     assert await one.placements() == {"scout1": "b", "watcher-1": "a"}
-    placed = await one.bus.ask(ADDRESS, AskPlacement("scout1"), Placement, within_s=1.0)
+    placed = await one.bus.ask(PLACER, AskPlacement("scout1"), Placement, within_s=1.0)
     assert (placed.requester, placed.type) == ("backbone/boss", "scout")
     assert (await one.start("watcher")).address == "mission_control/watcher-2"
     await one.kill("creator-b")

@@ -6,11 +6,11 @@ import asyncio
 
 import pytest
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.peer_monitor import GONE_AFTER_S
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, Placement, Start, Started
 from backbone.placer.wishes import PAUSE_MOST_S, Wish, keep_placed
 from backbone.wire import Envelope, Message
@@ -20,7 +20,7 @@ SETTLED_S = 0.3  # chosen: some events of the bus later
 
 
 def serve_placer(bus: Bus) -> None:
-    """Have it believe that its creator mends whatever is missing."""
+    """Let it believe that its creator restarts all missing components."""
 
     async def answer(asked: Envelope[Start | AskPlacement]) -> Message:
         if isinstance(asked.body, Start):

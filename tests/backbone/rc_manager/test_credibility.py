@@ -11,11 +11,12 @@ import pytest
 from msgspec.structs import replace
 from test_rc_manager_service import Pool, a_pool, request
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.dependency_database.messages import Resource
 from backbone.keys import Conversation
 from backbone.rc_manager.credibility import contradiction
-from backbone.rc_manager.messages import ADDRESS, AskWhy, RcState, most_epoch
+from backbone.rc_manager.messages import AskWhy, RcState, most_epoch
 from backbone.scheduling.requests import Holder, RequestState, Scheduled
 from backbone.scheduling.views import Why
 from backbone.wire import MalformedMessage
@@ -175,6 +176,6 @@ def tell(here: Pool, rc: str, lie: Any) -> None:
 
 async def why(here: Pool, name: str) -> Why:
     asker = here.network.join("ui_console/asker", here.clock)
-    reasons = await asker.ask(ADDRESS, AskWhy(name), Why, within_s=1)
+    reasons = await asker.ask(RC_MANAGER, AskWhy(name), Why, within_s=1)
     await asker.close()
     return reasons

@@ -14,19 +14,18 @@ import msgspec
 import pytest
 from trace_checker import check
 
+from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import NameTaken
 from backbone.dependency_database.messages import Resource
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.keys import Conversation
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start
 from backbone.rc_manager.messages import (
-    ADDRESS,
     BEAT_EVERY_S,
     AskRc,
     AskRequest,
@@ -76,7 +75,7 @@ HARDWARE = [
 
 
 class PlainRc(Component[Any]):
-    """An RC that keeps the rules to the letter and says when somebody else does not."""
+    """An RC that keeps the rules to the letter and reports violations of others."""
 
     accepts = Connect | Disconnect | AskRc
     sharable = False
@@ -115,7 +114,7 @@ class PlainRc(Component[Any]):
 
 
 class PlainArc(Component[Any]):
-    """An ARC that opens and closes as told."""
+    """An ARC that opens and closes on order."""
 
     accepts = OpenGate | CloseGate | AskRequest
 
@@ -137,7 +136,7 @@ class PlainArc(Component[Any]):
 
     async def ask_for(self, request: SchedulingRequest) -> Scheduled:
         self.request = request
-        scheduled = await self.bus.ask(ADDRESS, request, Scheduled, within_s=30)
+        scheduled = await self.bus.ask(RC_MANAGER, request, Scheduled, within_s=30)
         self.rcs = scheduled.rcs
         return scheduled
 
@@ -261,7 +260,7 @@ def test_a_console_of_higher_priority_overrides_at_once_and_the_behavior_comes_b
             assert not behavior.is_open
             assert console.granted_s - asked_s < 0.05
             assert behavior.log[-1][:2] == ("higher", "console")
-            await console.bus.ask(ADDRESS, Withdraw("console", "self"), Done, within_s=1)
+            await console.bus.ask(RC_MANAGER, Withdraw("console", "self"), Done, within_s=1)
             await here.clock.sleep_s(0.05)
             assert behavior.is_open
 
@@ -407,7 +406,7 @@ def test_an_rc_that_does_not_confirm_in_time_and_has_no_other_holder_is_down_unt
             await one.ask_for(request("one", "left", "radio"))
             await here.clock.sleep_s(1.0)
             here.rcs["left"].hangs = True
-            await one.bus.ask(ADDRESS, SetIdle("one", True), Done, within_s=1)
+            await one.bus.ask(RC_MANAGER, SetIdle("one", True), Done, within_s=1)
             await here.clock.sleep_s(LEASE_S + 0.1)
             here.rcs["left"].hangs = False
             await here.clock.sleep_s(LEASE_S)
@@ -513,7 +512,7 @@ def test_impossible_requests_are_refused_with_their_numbers(pool: Any) -> None:
             with pytest.raises(CapacityExceeded) as refused:
                 await one.ask_for(greedy)
             assert refused.value.facts["demanded"] == pytest.approx(2.0)
-            found = await one.bus.ask(ADDRESS, AskSchedule(), Schedule, within_s=1)
+            found = await one.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=1)
             assert found.requests == []
 
     run_virtual(main())
@@ -526,9 +525,9 @@ def test_why_names_the_blocker_and_a_changed_priority_plans_anew(pool: Any) -> N
             await one.ask_for(request("one", "left", "radio", minimum_runtime_s=60.0))
             await two.ask_for(request("two", "left", "radio"))
             await here.clock.sleep_s(1.0)
-            why = await two.bus.ask(ADDRESS, AskWhy("two"), Why, within_s=1)
+            why = await two.bus.ask(RC_MANAGER, AskWhy("two"), Why, within_s=1)
             assert (why.state, why.blockers) == ("waiting", ["one"])
-            await two.bus.ask(ADDRESS, SetPriority("owner-two", 5), Done, within_s=1)
+            await two.bus.ask(RC_MANAGER, SetPriority("owner-two", 5), Done, within_s=1)
             await here.clock.sleep_s(0.1)
             assert two.is_open
 

@@ -1,4 +1,4 @@
-"""Faults that somebody could put into the scheduling core: each a change of one place, each caught by the tests."""
+"""Faults that a change could put into the scheduling core: each at one place, each caught by the tests."""
 
 from __future__ import annotations
 
@@ -87,6 +87,12 @@ FAULTS = [
     Planted("nothing is reserved for an ARC that overrides", "schedule_manager.py", "if forced or not", "if not"),
     Planted("an ARC that could not open is not asked again", "schedule_manager.py", "        self._arcs.retry()\n", ""),
     Planted("slack eats a short slice", "plan.py", "min(self._slack_s, arc.minimum_s / 2)", "self._slack_s"),
+    Planted(
+        "slack eats a short slice in a large group",
+        "large_group.py",
+        "min(self._slack_s, arc.minimum_s / 2)",
+        "self._slack_s",
+    ),
     Planted(
         "a lower ARC overlaps what a higher one reserved", "plan.py", "if rank(other.path, arc.path) > 0:", "if False:"
     ),
@@ -193,6 +199,12 @@ FAULTS = [
         "large_group.py",
         "ahead.isdisjoint(first.uses)",
         "True",
+    ),
+    Planted(
+        "RCs freed by force in a large group stay free although a higher ARC needs one of them first",
+        "large_group.py",
+        "if arc.reservation is not None and not first.goes_before(arc):",
+        "if arc.reservation is not None:",
     ),
     Planted(
         "a slice ends although it is awaited by none",

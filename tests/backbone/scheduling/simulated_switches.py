@@ -27,6 +27,7 @@ from backbone.scheduling.events import (
     WakeAt,
     Woken,
 )
+from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.master_schedule import EXACT_UP_TO
 from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
@@ -36,6 +37,7 @@ from backbone.scheduling.schedule_manager import ScheduleManager
 MISSION = "watch"
 TOLERANCE_S = 1e-6
 REPAIR_S = 3.0
+MOST_AT_ONCE = 3_000  # chosen: some ten times the events that the largest of these missions has at one instant
 
 
 def unit(name: str, connect_s: float = 0.0, disconnect_s: float = 0.0, *, up: bool = True) -> RcKnown:
@@ -128,6 +130,11 @@ class Bench:
         for rc in rcs:
             self.tell(rc)
 
+    @property
+    def answers(self) -> Answers:
+        """What can be asked about the schedule."""
+        return Answers(self.manager)
+
     def at(self, time_s: float, event: Event) -> None:
         heapq.heappush(self._agenda, (time_s, next(self._serial), event))
 
@@ -154,12 +161,19 @@ class Bench:
         self.manager.check()
 
     def run(self, until_s: float) -> Bench:
-        """Let time pass; everything due at the last instant still happens."""
+        """Let time pass; everything due at the last instant still happens.
+
+        Raises:
+            AssertionError: Time stands still: a livelock.
+        """
+        at_once = 0
         while True:
             times_s = [self._agenda[0][0]] if self._agenda else []
             times_s += [self._wake_s] if self._wake_s is not None else []
             if not times_s or min(times_s) > until_s:
                 break
+            at_once = at_once + 1 if min(times_s) <= self.now_s else 0
+            assert at_once < MOST_AT_ONCE, f"time stands still at {self.now_s}; the last lines: {self.trace[-8:]}"
             self.now_s = max(self.now_s, min(times_s))
             if self._agenda and self._agenda[0][0] <= self.now_s:
                 event = heapq.heappop(self._agenda)[2]

@@ -50,7 +50,7 @@ def test_who_is_damped_is_told_and_comes_in_by_itself():
         bench.tell(console)
         bench.tell(Departed("console"))
     bench.tell(console)
-    why = bench.manager.why("console", bench.now_s)
+    why = bench.answers.why("console", bench.now_s)
     assert "again and again; again at" in why.lines[0]
     assert bench.run(20.0).runs("console")
     assert bench.verdict() == []

@@ -23,7 +23,7 @@ SHIPPED = "backbone.scheduling.whole_group:WholeGroupPlanner"
 
 @pytest.fixture(scope="module", autouse=True)
 def guide(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Have the guide's planner where Python finds it."""
+    """Put the guide's planner on Python's path."""
     found = re.search(r"```python\n(.*?)```", GUIDE.read_text(), re.DOTALL)
     assert found is not None
     folder = tmp_path_factory.mktemp("planner")

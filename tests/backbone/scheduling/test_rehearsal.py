@@ -8,7 +8,7 @@ import pytest
 from random_missions import random_mission
 from simulated_switches import Bench, ask, load, manager, sharable, unit
 
-from backbone.scheduling.events import Departed, Event, Idled, RcKnown, Wanted
+from backbone.scheduling.events import ConnectArc, Departed, Event, Idled, Instruction, RcKnown, RevokeArc, Wanted
 from backbone.scheduling.rehearsal import Rehearsal, Timetable
 
 
@@ -96,6 +96,20 @@ def test_a_connection_that_was_broken_off_never_opens() -> None:
     seen = Timetable(rehearsal.trace, rehearsal.now_s)
     assert [(run.arc, run.grant_s) for run in seen.runs] == [("low", None), ("high", 3.0)]
     assert seen.runs[0].granted_s == 0.0
+
+
+class NeverAtRest:
+    """Revokes the ARC that it has just connected, again and again."""
+
+    def handle(self, event: Event, now_s: float) -> list[Instruction]:
+        return [ConnectArc("a", {}, 0.0, now_s, {}), RevokeArc("a", {}, "slice", "b", 0.0, -1.0)]
+
+
+def test_a_schedule_that_never_leaves_an_instant_ends_the_rehearsal() -> None:
+    rehearsal = Rehearsal(NeverAtRest())
+    rehearsal.at(3.0, Wanted("a"))
+    with pytest.raises(AssertionError, match=r"a is connected 1000 times at 3\.0"):
+        rehearsal.run(60.0)
 
 
 @pytest.mark.parametrize("seed", range(40))

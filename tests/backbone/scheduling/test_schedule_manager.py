@@ -46,7 +46,7 @@ def all_of(bench: Bench, kind: type) -> list:
 
 
 def states(bench: Bench) -> dict[str, RequestState]:
-    return {view.arc: view.state for view in bench.manager.schedule(bench.now_s).requests}
+    return {view.arc: view.state for view in bench.answers.schedule(bench.now_s).requests}
 
 
 # Context switches.
@@ -267,7 +267,7 @@ def test_an_rc_that_fails_stops_its_holders_and_nobody_else():
     bench.at(9.0, RcCameBack("v", 0))
     bench.run(8.0)
     assert bench.runs("b") == [(1, None)]
-    assert bench.manager.why("a", 8.0).rule == "11"
+    assert bench.answers.why("a", 8.0).rule == "11"
     bench.run(12.0)
     assert bench.runs("a") == [(0, 1), (9, None)]
     assert bench.verdict() == []
@@ -434,7 +434,7 @@ def test_a_capacity_that_cannot_be_changes_nothing(capacity):
     bench.tell(ask("a", {"r": load(0.4)}))
     bench.tell(CapacityChanged("r", capacity))
     assert bench.run(1.0).runs("a") == [(0.0, None)]
-    assert bench.manager.schedule(1.0).rcs[0].capacity == 1.0
+    assert bench.answers.schedule(1.0).rcs[0].capacity == 1.0
 
 
 def test_a_request_for_nothing_is_refused():
@@ -451,7 +451,7 @@ def test_the_answer_to_a_request_says_when_and_behind_whom():
     bench.tell(ask("b", "v"))
     bench.tell(ask("c", "v"))
     bench.run(1.0)
-    a, b, c = (bench.manager.scheduled(arc, 1.0) for arc in "abc")
+    a, b, c = (bench.answers.scheduled(arc, 1.0) for arc in "abc")
     assert (a.state, a.position, a.blockers) == (RequestState.RUNNING, 0, [])
     assert (b.state, b.position, b.blockers, b.expected_start_s) == (RequestState.WAITING, 1, ["a"], 6.0)
     assert (c.position, c.blockers, c.expected_start_s) == (2, ["a", "b"], 11.5)
@@ -462,7 +462,7 @@ def test_predicted_starts_come_true():
     for name in "abcd":
         bench.tell(ask(name, "v"))
     bench.run(1.0)
-    expected = {name: bench.manager.scheduled(name, 1.0).expected_start_s for name in "bcd"}
+    expected = {name: bench.answers.scheduled(name, 1.0).expected_start_s for name in "bcd"}
     bench.run(30.0)
     assert expected == {name: bench.runs(name)[0][0] for name in "bcd"}
 
@@ -472,7 +472,7 @@ def test_why_names_the_blocker_its_rank_and_the_end_of_its_slice():
     bench.tell(ask("a", "v"))
     bench.tell(ask("b", "v"))
     bench.run(2.0)
-    why = bench.manager.why("b", 2.0)
+    why = bench.answers.why("b", 2.0)
     assert (why.state, why.rule, why.blockers, why.expected_start_s) == ("waiting", "3", ["a"], 5.0)
     assert "a (equal, shares v) runs, its slice ends at 5.00 s" in why.lines
     assert "a" in why.would_change
@@ -482,14 +482,14 @@ def test_why_knows_owners_by_name_and_address_and_rcs():
     bench = Bench(manager(), unit("v"), unit("w"))
     bench.tell(ask("a", "v"))
     bench.run(1.0)
-    assert bench.manager.why("owner-a", 1.0).state == "running"
-    assert bench.manager.why("mission_control/owner-a", 1.0).lines[0].startswith("a running")
-    assert bench.manager.why("v", 1.0).blockers == ["a"]
-    assert bench.manager.why("w", 1.0).lines == ["w is up", "no ARC asks for it"]
+    assert bench.answers.why("owner-a", 1.0).state == "running"
+    assert bench.answers.why("mission_control/owner-a", 1.0).lines[0].startswith("a running")
+    assert bench.answers.why("v", 1.0).blockers == ["a"]
+    assert bench.answers.why("w", 1.0).lines == ["w is up", "no ARC asks for it"]
     with pytest.raises(UnknownRequest):
-        bench.manager.why("nobody", 1.0)
+        bench.answers.why("nobody", 1.0)
     with pytest.raises(UnknownRequest):
-        bench.manager.scheduled("nobody", 1.0)
+        bench.answers.scheduled("nobody", 1.0)
 
 
 def test_why_has_an_answer_in_every_state():
@@ -498,14 +498,14 @@ def test_why_has_an_answer_in_every_state():
     bench.tell(ask("a", "v"))
     bench.tell(ask("i", "v", idle=True))
     bench.tell(ask("n", "down"))
-    rules = {name: bench.manager.why(name, 0.0).rule for name in ("a", "i", "n")}
+    rules = {name: bench.answers.why(name, 0.0).rule for name in ("a", "i", "n")}
     assert rules == {"a": "6", "i": "14", "n": "11"}
     bench.run(7.0)
-    assert bench.manager.why("a", 7.0).rule == "5"
+    assert bench.answers.why("a", 7.0).rule == "5"
     bench.tell(ask("f", "v"))
-    assert bench.manager.why("a", 7.0).state == "revoking"
+    assert bench.answers.why("a", 7.0).state == "revoking"
     bench.run(9.0)
-    assert "again at" in bench.manager.why("f", 9.0).lines[0]
+    assert "again at" in bench.answers.why("f", 9.0).lines[0]
 
 
 def test_the_schedule_shows_holders_and_who_is_next():
@@ -513,7 +513,7 @@ def test_the_schedule_shows_holders_and_who_is_next():
     bench.tell(ask("a", "v"))
     bench.tell(ask("b", "v"))
     bench.run(2.0)
-    view = bench.manager.schedule(2.0)
+    view = bench.answers.schedule(2.0)
     assert [(holder.arc, holder.epoch) for holder in view.rcs[0].holders] == [("a", 1)]
     assert view.rcs[0].next == ["b"]
     assert view.groups == [["a", "b"]]
@@ -557,24 +557,6 @@ def test_under_the_discipline_time_equals_that_ask_for_the_same_take_turns(jitte
     bench.run(120.0)
     for arc in ("left", "right"):
         assert max(end_s - start_s for start_s, end_s in bench.runs(arc) if end_s) < 2.6
-
-
-def test_with_aging_a_lower_one_that_waited_long_gets_one_whole_slice():
-    """After 10 s it is as high as the other, whose slice is over."""
-    bench = Bench(manager(aging_s=10.0), unit("v"))
-    bench.tell(ask("high", "v", priority=2))
-    bench.tell(ask("low", "v", priority=1))
-    bench.run(50.0)
-    assert bench.runs("low") == [(10.0, 15.0), (25.0, 30.0), (40.0, 45.0)]
-    assert bench.runs("high")[1] == (15.0, 25.0)
-
-
-def test_aging_outwaits_no_console():
-    bench = Bench(manager(aging_s=1.0), unit("v"))
-    bench.tell(ask("human", "v", priority=9, console=True))
-    bench.tell(ask("low", "v"))
-    bench.run(100.0)
-    assert bench.runs("low") == []
 
 
 def test_slices_end_on_the_grid():

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from random import Random
 
+import pytest
 from random_missions import random_mission
 from simulated_switches import Bench, ask, load, manager, sharable, unit
 
 from backbone.scheduling.events import ConnectArc, RevokeArc
+from backbone.scheduling.master_schedule import EXACT_UP_TO
 
 P1_H = [("watch", 0), ("p1", 1), ("h", 1)]
 P1_X = [("watch", 0), ("p1", 1), ("x", 2)]
@@ -78,6 +80,20 @@ def test_d_hand_over_times_do_not_eat_an_exactly_fitting_gap():
     bench.run(100.0)
     assert len(bench.runs("h1")) >= 8
     assert len(bench.runs("l")) >= len(bench.runs("h1")) - 1
+    assert bench.verdict() == []
+
+
+@pytest.mark.parametrize("exact_up_to", [EXACT_UP_TO, 0], ids=["whole group", "large group"])
+@pytest.mark.parametrize(("begin_s", "fits"), [(4.97, True), (4.99, False)])
+def test_d_the_slack_of_a_gap_is_at_most_half_a_slice(begin_s, fits, exact_up_to):
+    """A slice of 0.04 s is shorter than the tolerance: without a limit it would fit a gap of any length."""
+    bench = Bench(manager(tolerance_s=0.05, exact_up_to=exact_up_to), unit("v"), unit("w"))
+    bench.tell(ask("k", "w", priority=2))
+    bench.tell(ask("h", "v w", priority=2))
+    bench.at(begin_s, ask("l", "v", run_s=0.04))
+    bench.run(6.0)
+    assert bench.runs("h") == [(5.0, None)]
+    assert bench.runs("l") == ([(begin_s, 5.0)] if fits else [])
     assert bench.verdict() == []
 
 

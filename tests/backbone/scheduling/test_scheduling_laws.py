@@ -111,7 +111,7 @@ SAFETY = {"FORM", "EXCL", "CAP", "RTA", "DOWN", "MINRUN", "PRIO", "DEMOTE", "GRA
 @settings(max_examples=80, derandomize=True)
 @given(seeds)
 def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardware_safe(seed):
-    """It may leave a gap or let a younger equal go first; nobody is cut short and nobody waits for a lower one."""
+    """The plan may leave a gap or let a younger equal go first; no slice is cut short, no ARC waits for a lower one."""
     found = violations(play(*random_mission(Random(seed), exact_up_to=0)))
     assert [one for one in found if one.code in SAFETY] == []
 
@@ -121,6 +121,7 @@ def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardwar
     [
         pytest.param(550, id="two equals that are each first at an RC of the other's wait for each other for ever"),
         pytest.param(187, id="an estimate made for one ARC is believed for another"),
+        pytest.param(1127, id="RCs freed by force stay free although a higher ARC needs one of them first"),
     ],
 )
 def test_in_a_big_group_no_arc_waits_for_rcs_that_are_free_or_served(seed):

@@ -1,4 +1,4 @@
-"""The scenarios that tell readings of the papers apart: H priority 2, L priority 1, 5 s slices."""
+"""The scenarios that distinguish readings of the papers: H priority 2, L priority 1, 5 s slices."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_s2_holds_with_hand_over_times_too():
 def test_s3_a_lower_one_on_the_same_frequency_starves_visibly():
     bench = mission(H1, H2, ask("l", "v"))
     assert bench.runs("l") == []
-    why = bench.manager.why("l", bench.now_s)
+    why = bench.answers.why("l", bench.now_s)
     assert why.rule == "9"
     assert set(why.blockers) & {"h1", "h2"}
     assert "40.0 s" in why.lines[0]

@@ -24,7 +24,7 @@ Way = tuple[str, ...]
 
 # ---------------------------------------------------------------------- the tree
 class PlainTree:
-    """A behavior tree as anybody would write it down: each node has a parent and a number."""
+    """A plain behavior tree: each node has a parent and a number."""
 
     def __init__(self, rng: Random) -> None:
         self.parent: dict[str, str] = {}
@@ -145,9 +145,9 @@ def test_moving_a_parent_moves_all_that_stand_below_it() -> None:
     bench = two_branches()
     bench.at(7.0, NodeMoved("below", "above"))
     bench.run(9.0)
-    [moved] = bench.manager.attributes("low").requests
+    [moved] = bench.answers.attributes("low").requests
     assert [node.name for node in moved.path] == [MISSION, "above", "below", "l"]
-    assert {one.arc for one in bench.manager.attributes("above").requests} == {"high", "low"}
+    assert {one.arc for one in bench.answers.attributes("above").requests} == {"high", "low"}
     assert bench.runs("low") == [(7.0, None)]  # 'below' and 'h' are equal siblings now
     assert bench.verdict() == []
 
@@ -181,18 +181,18 @@ def test_a_move_that_is_impossible_changes_nothing() -> None:
 def test_attributes_say_what_is_asked_for_as_it_counts_now() -> None:
     bench = two_branches()
     bench.tell(PriorityChanged("above", 7))
-    [high] = bench.manager.attributes("h").requests
+    [high] = bench.answers.attributes("h").requests
     assert (high.arc, list(high.uses), high.minimum_runtime_s, high.console) == ("high", ["v"], 5.0, False)
     assert [(node.name, node.priority) for node in high.path] == [(MISSION, 0), ("above", 7), ("h", 1)]
-    assert len(bench.manager.attributes(MISSION).requests) == 2
+    assert len(bench.answers.attributes(MISSION).requests) == 2
     with pytest.raises(UnknownRequest):
-        bench.manager.attributes("nobody")
+        bench.answers.attributes("nobody")
 
 
 def test_attributes_show_what_was_set_not_what_waiting_adds() -> None:
     bench = two_branches(aging_s=3.0)
     bench.run(10.0)
-    [low] = bench.manager.attributes("low").requests
+    [low] = bench.answers.attributes("low").requests
     assert [node.priority for node in low.path] == [0, 1, 1]
 
 

@@ -55,7 +55,7 @@ def played(title: str) -> tuple[Bench, Why]:
     for time_s, event in happens:
         bench.at(time_s, event)
     bench.run(asked_s)
-    return bench, bench.manager.why(SECTIONS[title]["name"], asked_s)
+    return bench, bench.answers.why(SECTIONS[title]["name"], asked_s)
 
 
 def _use(words: str) -> tuple[str, RcUse]:
@@ -96,7 +96,7 @@ def test_without_those_the_page_names_the_wait_is_over(title: str) -> None:
     granted = len(bench.runs(why.name))
     for name in why.blockers:
         bench.tell(Departed(name))
-    for view in bench.manager.schedule(bench.now_s).rcs:
+    for view in bench.answers.schedule(bench.now_s).rcs:
         if view.state == "down":
             bench.tell(RcCameBack(view.rc, 0))
     bench.run(bench.now_s + HAND_OVER_S)

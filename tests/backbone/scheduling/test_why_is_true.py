@@ -49,13 +49,13 @@ def moment(seed: int, rules: dict[str, Any]) -> Moment:
     bench.fails.clear()
     now_s = rng.uniform(1.0, LATEST_S)
     play(bench, [(time_s, event) for time_s, event in happens if time_s <= now_s], now_s)
-    requests = bench.manager.schedule(now_s).requests
+    requests = bench.answers.schedule(now_s).requests
     return Moment(bench, now_s, [request for request in requests if request.state is RequestState.WAITING])
 
 
 def repair(then: Moment, request: RequestView) -> None:
     """Bring back the request's RCs that are down, and the capacity of those that lost some."""
-    for rc in then.bench.manager.schedule(then.now_s).rcs:
+    for rc in then.bench.answers.schedule(then.now_s).rcs:
         if rc.rc in request.rcs and rc.state == "down":
             then.bench.tell(RcCameBack(rc.rc, 0))
     for known in then.bench.rcs:
@@ -66,7 +66,7 @@ def repair(then: Moment, request: RequestView) -> None:
 def granted_without_blockers(seed: int, then: Moment) -> Why | None:
     """Ask why one waits, remove whom it names, let time pass for a hand-over; return the answer if it was of no use."""
     request = Random(seed).choice(then.waiting)
-    why = then.bench.manager.why(request.arc, then.now_s)
+    why = then.bench.answers.why(request.arc, then.now_s)
     before = len(then.bench.runs(request.arc))
     for name in why.blockers:
         then.bench.tell(Departed(name))
@@ -93,7 +93,7 @@ def test_without_those_that_why_names_a_waiting_arc_is_granted_after_one_hand_ov
 
 
 def test_beside_others_a_slice_that_is_over_but_for_rounding_is_over() -> None:
-    """Something happened at 14.25 s, when a slice ended at 14.250000000000002 s: nobody looked again."""
+    """An event came at 14.25 s, when a slice ended at 14.250000000000002 s: no decision followed."""
     assert granted_without_blockers(252, moment(252, {"exact_up_to": 0})) is None
 
 
@@ -106,14 +106,14 @@ def test_without_those_that_why_names_each_of_a_thousand_is_granted(rules: dict[
 
 
 def test_with_aging_why_is_nearly_always_enough() -> None:
-    """Who goes takes the levels along by which it had raised its parents, and so who is higher may change."""
+    """An ARC that leaves takes the levels along by which it had raised its parents, so the order may change."""
     assert len(untrue(100, {"aging_s": 7.0})) <= 10
 
 
 def needless(seed: int, then: Moment) -> list[str]:
     """Return the names in ``why`` without whose removal the ARC would have been granted, too."""
     request = Random(seed).choice(then.waiting)
-    names = then.bench.manager.why(request.arc, then.now_s).blockers
+    names = then.bench.answers.why(request.arc, then.now_s).blockers
     found = []
     for name in names:
         again = moment(seed, {})
@@ -138,7 +138,7 @@ def of_the_schedule(then: Moment, request: RequestView) -> float:
 
 
 def of_why(then: Moment, request: RequestView) -> float:
-    return then.bench.manager.why(request.arc, then.now_s).expected_start_s
+    return then.bench.answers.why(request.arc, then.now_s).expected_start_s
 
 
 def predictions(

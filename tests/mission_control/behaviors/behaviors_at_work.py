@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from examples import share
+from examples import FULL, share
 from hypothesis import Phase, settings
 
 from backbone.bus.interface import Bus, Clock
@@ -18,12 +18,12 @@ from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.placer.messages import Start
 from backbone.wire import Message
-from resource_pool.messages import AskPose, Pose
-from resource_pool.simulation.whole_mission import RunningMission, mission_in_one_process
-from ui_console.model.driving import Drive
+from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
+from resource_pool.drivers.world_messages import AskPose, Pose
+from ui_console.model.driving import DriveWish
 from ui_console.session.teleoperation import Teleoperation
 
-FEW_MOMENTS = settings(max_examples=2, phases=[Phase.generate], derandomize=True)
+FEW_MOMENTS = settings(max_examples=1 + (share(FULL) == FULL), phases=[Phase.generate], derandomize=True)
 MANY_MOMENTS = settings(max_examples=share(30), phases=[Phase.generate], derandomize=True)
 """How many sequences of take-overs are played; never shrunk, which would take an hour."""
 
@@ -53,7 +53,7 @@ def example(*behaviors: str, **parameters: Any) -> MissionDescription:
 
 
 class Person:
-    """Whoever sits at a console: takes robots over, drives them about, gives them back."""
+    """A person at a console: takes robots over, drives them about, gives them back."""
 
     def __init__(self) -> None:
         self.running: RunningMission | None = None
@@ -82,7 +82,7 @@ def driving(left_rad_s: float, right_rad_s: float, lasts_s: float) -> Course:
         await console.wait_granted()
         until_s = console.clock.now_s() + lasts_s
         while console.clock.now_s() < until_s:
-            await console.do(Drive(left_rad_s, right_rad_s))
+            await console.do(DriveWish(left_rad_s, right_rad_s))
             await console.clock.sleep_s(0.1)
 
     return course

@@ -29,7 +29,7 @@ BOX = Obstacle(FloorPoint(3.0, 2.0), 0.0, 0.1)
 
 
 class PlayedRobot:
-    """Drives on arcs and jumps 0.6 m far, if nobody tells it anything meanwhile; the box stops it otherwise."""
+    """Drives on arcs and jumps 0.6 m far, if no command comes meanwhile; the box stops it otherwise."""
 
     def __init__(self, position: Position, *, lands_on_its_back: bool = False) -> None:
         self.position, self.now_s = position, 0.0

@@ -1,4 +1,4 @@
-"""The pure part of a patrol, with a robot that obeys exactly, or does whatever it likes."""
+"""The pure part of a patrol, with a robot that obeys exactly, or moves at random."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def drive(patrol: PatrolRoute, position: Position, now_s: float, until_s: float)
 
 @dataclass(frozen=True)
 class TakeOver:
-    """Somebody has the robot for a while and leaves it there."""
+    """An operator has the robot for a while and leaves it there."""
 
     after_s: float
     lasts_s: float

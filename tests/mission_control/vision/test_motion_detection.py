@@ -108,7 +108,7 @@ def test_a_flash_of_one_picture_is_outvoted() -> None:
 
 
 def test_after_a_swap_a_changed_view_is_learned_without_an_alarm() -> None:
-    """A robot that somebody drove meanwhile looks elsewhere; that is no motion."""
+    """A robot that an operator drove meanwhile looks elsewhere; that is no motion."""
     detector = MotionDetector()
     look_at([room(1)] * 30, detector)
     detector.swapped_in()

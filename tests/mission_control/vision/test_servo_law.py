@@ -46,7 +46,7 @@ def at(range_m: float, off_axis_deg: float, bearing_deg: float = 0.0) -> TargetP
 
 
 class Robot:
-    """A robot that does what it is told and knows where it is while the target is in its view."""
+    """A robot that obeys its commands and knows its pose while the target is in its view."""
 
     def __init__(self, pose: TargetPose) -> None:
         self.pose = pose

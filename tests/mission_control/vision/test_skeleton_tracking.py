@@ -1,4 +1,4 @@
-"""Laws of tracking: the skeleton is followed, what is lost is searched for, what is not found is acquired anew."""
+"""Laws of tracking: the tracker follows the skeleton, searches for a lost one, and acquires anew after the search."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people do at the designer's page, with a mouse or a finger, and the tutorial done by such hands."""
+"""Actions of people at the designer's page, with a mouse or a finger, and the tutorial carried out by them."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def served(file: Path) -> Iterator[str]:
 
 
 class Hands:
-    """What a person does at the page, whatever with."""
+    """A person's actions at the page, by any pointer."""
 
     def __init__(self, page: Any) -> None:
         self.page = page
 
     def row(self, told: str) -> Any:
-        """Return the row of the element of which this is told, tag first."""
+        """Return the row of the element with these words, tag first."""
         return self.page.locator(f".element[data-told='{told}']")
 
     def part(self, label: str) -> Any:
@@ -61,12 +61,12 @@ class Hands:
         raise NotImplementedError
 
     async def open(self, pane: str) -> None:
-        """Have a pane in sight."""
+        """Open a pane."""
         for tab in await self.page.locator(f"#below-tabs [data-pane={pane}]").all():
             await tab.click()
 
     async def answer(self, **answers: str) -> None:
-        """Answer what is asked."""
+        """Answer the questions."""
         for name, value in answers.items():
             field = self.page.locator(f"#ask [name='{name.replace('_', '-')}']")
             await field.wait_for()

@@ -17,11 +17,11 @@ from websockets.exceptions import ConnectionClosed
 from backbone.mission.class_facts import ClassFacts
 from ui_console.design.room import DesignRoom
 from ui_console.design.server import DesignServer, begin
-from ui_console.web.door import Doorkeeper, Pass
+from ui_console.web.login import Authenticator, TokenRights
 
 MISSION_XML = (Path(__file__).parents[3] / "mission.xml").read_bytes()
 ANNA, BEN = "token-of-anna", "token-of-ben"
-PASSES = {ANNA: Pass("anna", 100), BEN: Pass("ben", 50)}
+RIGHTS = {ANNA: TokenRights("anna", 100), BEN: TokenRights("ben", 50)}
 WITHIN_S = 15.0
 
 
@@ -47,7 +47,7 @@ class Page:
         await self.socket.send(json.dumps(message))
 
     async def change(self, **message: Any) -> dict[str, Any] | None:
-        """Say a change of what is shown now; return the answer to it once it was handled, None if there was none."""
+        """Send a change of the present draft; return the answer once it was handled, None if there was none."""
         handled, heard = self.view.get("handled", 0), len(self.answers)
         await self.say(revision=self.view["status"]["revision"], **message)
         await self.wait(lambda: self.view.get("handled", 0) > handled, f"handled {message}")
@@ -111,7 +111,7 @@ async def serving(file: Path) -> AsyncIterator[Serving]:
         made.port = port
         ready.set()
 
-    server = DesignServer(made.room, Doorkeeper(PASSES))
+    server = DesignServer(made.room, Authenticator(RIGHTS))
     life = asyncio.create_task(server.run("127.0.0.1", 0, listens, made.end))
     await ready.wait()
     try:

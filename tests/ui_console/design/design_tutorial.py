@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import NewElement, Node
-from ui_console.design.commands import Add, AddBehavior, AddResource, AddWorld, Claim, SetValue
+from ui_console.design.commands import Add, AddBehavior, AddResource, AddWorld, ClaimArc, SetValue
 from ui_console.design.draft import Draft
 
 WATCH = "mission_control.behaviors.watch_for_motion:WatchForMotion"
@@ -15,7 +15,7 @@ FACTS = {
 
 
 def tutorial_draft(source: str = "guard.xml") -> Draft:
-    """Return the mission of the design tutorial, whatever hands build it."""
+    """Return the mission of the design tutorial, as every pointer has to build it."""
 
     def path_of(tag: str, name: str) -> tuple[int, ...]:
         return next(node.path for node in draft.mission if (node.tag, node.text("name")) == (tag, name))
@@ -32,7 +32,7 @@ def tutorial_draft(source: str = "guard.xml") -> Draft:
     draft = draft.do(AddBehavior((), "surveillance", "surveillance", 5))
     for robot in ("scout1", "scout2"):
         draft = draft.do(AddBehavior(path_of("behavior", "surveillance"), "watch_for_motion", f"watch-{robot}"))
-        draft = draft.do(Claim(draft.step.touched, "capture", "5"))
+        draft = draft.do(ClaimArc(draft.step.touched, "capture", "5"))
         draft = draft.do(Add(draft.step.touched, NewElement("wish", {"type": "scout", "name": robot})))
     return draft
 

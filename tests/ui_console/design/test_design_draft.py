@@ -21,19 +21,19 @@ from ui_console.design.commands import (
     AddResource,
     AddType,
     AddWorld,
-    Claim,
+    ClaimArc,
     Command,
     DesignRefused,
+    ElementNameTaken,
     Move,
-    NameTaken,
     NothingToUndo,
     Remove,
     Rename,
-    SetParameter,
     SetValue,
+    WriteParameter,
 )
 from ui_console.design.draft import Draft
-from ui_console.design.effects import Step
+from ui_console.design.effects import TextState
 from ui_console.design.file import FileChanged, NotSaved, save
 from ui_console.design.offers import free_name, offers
 from ui_console.design.properties import properties
@@ -70,7 +70,7 @@ def watchers() -> Draft:
     for robot in ("scout1", "scout2"):
         parent = only(draft, "behavior", "surveillance").path
         draft = draft.do(AddBehavior(parent, "watch_for_motion", f"watch-{robot}"))
-        draft = draft.do(Claim(draft.step.touched, "capture", "5"))
+        draft = draft.do(ClaimArc(draft.step.touched, "capture", "5"))
         draft = draft.do(Add(draft.step.touched, NewElement("wish", {"type": "scout", "name": robot})))
     return draft
 
@@ -88,12 +88,12 @@ def commands(draft: Draft) -> st.SearchStrategy[Command]:
         st.builds(Rename, paths, NAMES),
         st.builds(Move, paths, paths, st.integers(0, 5)),
         st.builds(SetValue, paths, st.sampled_from(["name", "priority", "host", "x-m"]), NAMES | st.none()),
-        st.builds(SetParameter, paths, NAMES, NAMES | st.none()),
+        st.builds(WriteParameter, paths, NAMES, NAMES | st.none()),
         st.builds(AddBehavior, paths, kinds, NAMES, st.integers(-3, 3)),
         st.builds(AddResource, kinds, NAMES),
         st.builds(AddType, kinds),
         st.builds(AddWorld, st.just("9"), st.sampled_from(["6", "x"])),
-        st.builds(Claim, paths, kinds, st.sampled_from(["5", "none"])),
+        st.builds(ClaimArc, paths, kinds, st.sampled_from(["5", "none"])),
         st.builds(Add, paths, st.builds(NewElement, st.sampled_from(["wish", "uses", "behavior", "furniture"]))),
     )
 
@@ -174,10 +174,10 @@ def test_what_the_text_means_is_what_the_reader_reads(tmp_path: Path) -> None:
 
 
 def test_a_problem_is_about_the_element_it_stands_in() -> None:
-    """Whatever stands before it in its line, and with a byte order mark."""
+    """With any text before it in its line, and with a byte order mark."""
     for mark in (b"", b"\xef\xbb\xbf"):
         text = mark + SHIPPED[0].read_bytes().replace(b'x-m="7.20"', 'x-m="ü"'.encode())
-        draft = Draft("mission.xml", Step(text))
+        draft = Draft("mission.xml", TextState(text))
         (fault,) = draft.problems
         assert draft.mission.at(draft.element_of(fault)).text("name") == "scout2"
         assert text.splitlines()[fault.line - 1].decode()[fault.column - 1 :].startswith("x-m=")
@@ -266,9 +266,9 @@ def test_to_rename_anything_keeps_the_mission_fine(tag: str, old: str) -> None:
 
 def test_a_claim_replaces_the_one_before_and_declares_no_shipped_type() -> None:
     draft = designed(AddBehavior((), "patrol", "guard"))
-    draft = draft.do(Claim(draft.step.touched, "drive", "5"))
+    draft = draft.do(ClaimArc(draft.step.touched, "drive", "5"))
     assert draft.mission.first("types") is None
-    draft = draft.do(Claim(draft.step.touched[:-1], "capture", "7"))
+    draft = draft.do(ClaimArc(draft.step.touched[:-1], "capture", "7"))
     (arc,) = [node for node in draft.mission if node.tag == "arc"]
     assert (arc.text("kind"), arc.text("minimum-runtime-s")) == ("capture", "7")
 
@@ -276,23 +276,23 @@ def test_a_claim_replaces_the_one_before_and_declares_no_shipped_type() -> None:
 def test_a_parameter_is_set_changed_and_left_out() -> None:
     draft = watchers()
     path = only(draft, "behavior", "watch-scout1").path
-    more = draft.do(SetParameter(path, "view_s", "6"))
+    more = draft.do(WriteParameter(path, "view_s", "6"))
     assert more.description is not None
     assert more.description.behaviors[0].children[0].parameters == {"view_s": 6}
-    again = more.do(SetParameter(path, "view_s", "7")).do(SetParameter(path, "view_s", None))
+    again = more.do(WriteParameter(path, "view_s", "7")).do(WriteParameter(path, "view_s", None))
     assert again.text == draft.text
-    assert draft.do(SetParameter(path, "view_s", None)) is draft
+    assert draft.do(WriteParameter(path, "view_s", None)) is draft
 
 
 def test_what_cannot_be_meant_is_refused_and_changes_nothing() -> None:
     draft = watchers()
     refused: list[tuple[Command, type[Refusal]]] = [
-        (AddResource("scout", "scout1"), NameTaken),
-        (AddBehavior((), "patrol", "world"), NameTaken),
+        (AddResource("scout", "scout1"), ElementNameTaken),
+        (AddBehavior((), "patrol", "world"), ElementNameTaken),
         (Rename(only(draft, "host", "base").path, "Base Station"), Refusal),
         (AddResource("submarine", "nautilus"), DesignRefused),
         (AddBehavior((), "no_such", "x"), DesignRefused),
-        (Claim(only(draft, "host", "base").path, "drive", "5"), DesignRefused),
+        (ClaimArc(only(draft, "host", "base").path, "drive", "5"), DesignRefused),
         (AddWorld("1", "1"), Refusal),
         (Remove(()), Refusal),
     ]
@@ -312,7 +312,7 @@ def test_the_last_network_id_is_the_last_robot() -> None:
     section = draft.text[robot.begin : robot.end].decode()
     many = "\n".join(section.replace("scout1", f"s{number}").replace('"1"', f'"{number}"') for number in range(3, 255))
     text = draft.text.replace(b"  </resources>", many.encode() + b"</resources>")
-    full = Draft("many.xml", Step(text))
+    full = Draft("many.xml", TextState(text))
     with pytest.raises(DesignRefused, match="254 network ids"):
         full.do(AddResource("scout", "one-more"))
 
@@ -398,7 +398,7 @@ def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: by
         outline(text)
     except MissionInvalid:
         return
-    draft = Draft("mission.xml", Step(text))
+    draft = Draft("mission.xml", TextState(text))
     assert len(tree_view(draft)) == sum(node.tag != "parameter" for node in draft.mission)
     assert len(problems_view(draft)) == len(draft.problems)
     for node in draft.mission:
@@ -408,13 +408,13 @@ def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: by
 
 def test_parameters_of_shipped_classes_are_judged_and_of_others_once_they_were_looked_up() -> None:
     draft = watchers()
-    wrong = draft.do(SetParameter(only(draft, "behavior", "watch-scout1").path, "veiw_s", "6"))
+    wrong = draft.do(WriteParameter(only(draft, "behavior", "watch-scout1").path, "veiw_s", "6"))
     assert [fault.message for fault in wrong.problems] == [
         "watch_for_motion has no parameter 'veiw_s' (did you mean 'view_s'?)"
     ]
     own = {"name": "own", "class": "backbone.naming:Subsystem", "subsystem": "mission_control"}
     draft = draft.do(Add((), NewElement("types", {}, [NewElement("type", own)])))
-    draft = draft.do(AddBehavior((), "own", "mine")).do(SetParameter((4, 1), "depth_m", "deep"))
+    draft = draft.do(AddBehavior((), "own", "mine")).do(WriteParameter((4, 1), "depth_m", "deep"))
     assert draft.problems == ()
     depth = ParameterFacts("depth_m", {"type": "number", "default": 1.0})
     known = draft.knowing({"backbone.naming:Subsystem": ClassFacts(parameters=(depth,))})

@@ -1,4 +1,4 @@
-"""A cursor stays on the element that was chosen, whatever somebody else does."""
+"""A cursor stays on the chosen element through any change of others."""
 
 from __future__ import annotations
 

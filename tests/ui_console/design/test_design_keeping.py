@@ -1,4 +1,4 @@
-"""The draft file: what is not saved survives, and is nobody else's."""
+"""The draft file: unsaved changes survive, and belong to one designer."""
 
 from __future__ import annotations
 

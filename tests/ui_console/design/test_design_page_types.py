@@ -12,7 +12,7 @@ from ui_console.page_types import DESIGNER
 
 
 def write_elsewhere(file: Path) -> None:
-    """Have the mission file hold what another program wrote."""
+    """Change the mission file by another program."""
     file.write_bytes(file.read_bytes() + b"<!-- theirs -->\n")
 
 

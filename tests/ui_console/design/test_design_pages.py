@@ -16,7 +16,7 @@ from backbone.mission.edit import outline
 from ui_console.design.changes import MustAsk, changed, sections, sibling_file, touched_by
 from ui_console.design.commands import DesignRefused, Remove
 from ui_console.design.draft import Draft
-from ui_console.design.effects import Step
+from ui_console.design.effects import TextState
 from ui_console.design.offers import offer_at, offers
 from ui_console.design.protocol import Change, MoveElement, Redo, RemoveElement, SetProperty, TakeOffer, Undo
 from ui_console.design.views import element_view, palette, places, problems_view, rehearsal_view, tree_view
@@ -143,7 +143,7 @@ def test_empty_text_leaves_a_value_out_and_a_parameter_nobody_knows_can_be_set()
 
 def test_a_problem_stands_at_its_element_also_when_it_is_about_a_parameter() -> None:
     text = tutorial_draft().text.replace(b'name="network_id" value="2"', b'name="network_id" value="1"')
-    draft = Draft("guard.xml", Step(text))
+    draft = Draft("guard.xml", TextState(text))
     assert [row.told for row in tree_view(draft) if row.problems] == ["scout2 scout"]
     (problem,) = problems_view(draft)
     assert draft.mission.at(problem.path).tag == "parameter"

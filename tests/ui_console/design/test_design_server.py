@@ -20,7 +20,7 @@ from ui_console.design.draft import Draft
 from ui_console.design.keeping import path_of_draft
 from ui_console.design.protocol import DesignIntent, Select, understand_designer
 from ui_console.design.server import begin
-from ui_console.web.door import MAX_MESSAGE_BYTES, Hello
+from ui_console.web.login import MAX_MESSAGE_BYTES, Hello
 
 
 def read(file: Path) -> bytes:

@@ -1,4 +1,4 @@
-"""What is not saved survives the end of the designer's server, whatever ends it: real processes, real signals."""
+"""Unsaved changes survive every end of the designer's server: real processes, real signals."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ async def heard(socket: ClientConnection, view: dict[str, Any], revision: int) -
 
 
 async def change_priority(address: str, revision: int, priority: str) -> None:
-    """Have a page change the mission's priority, and return once it was done."""
+    """Change the mission's priority by a page, and return once it was done."""
     found = re.fullmatch(r"http://(\S+)/#token=(\S+)", address)
     assert found is not None, address
     async with connect(f"ws://{found[1]}/socket", compression=None, proxy=None) as socket:
@@ -73,7 +73,7 @@ def mission(folder: Path) -> Path:
 
 
 def wait_kept(file: Path) -> None:
-    """Return once the server has kept what is not saved."""
+    """Return once the server has kept the unsaved changes."""
     deadline_s = time.monotonic() + WITHIN_S
     while not path_of_draft(str(file)).exists():
         assert time.monotonic() < deadline_s, "the draft was not kept"
@@ -91,7 +91,7 @@ async def assert_goes_on(file: Path, priority: str) -> None:
     assert draft.mission.text("priority") == priority
     with server(file) as (process, address):
         assert process.stderr is not None
-        assert "goes on with what was not saved" in process.stderr.readline()
+        assert "goes on with the unsaved changes" in process.stderr.readline()
         await change_priority(address, 1, "77")
     assert_not_saved(file)
 

@@ -1,4 +1,4 @@
-"""Alarms are few: what is over is none, what merely happened fades, one cause is one line, and nobody misses any."""
+"""Alarms are few: an ended condition is none, an event fades, one cause is one line, and no operator misses any."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STEPS = st.lists(
 
 
 def play(steps: list[tuple[str, int]]) -> tuple[AlarmBook, set[str], set[str]]:
-    """Return the book, what is unseen by the plain rule, and which conditions are so."""
+    """Return the book, the unseen alarms by the plain rule, and the present conditions."""
     book, unseen, active = AlarmBook(), set[str](), set[str]()
     for at_s, (step, number) in enumerate(steps):
         subject = f"s{number}"

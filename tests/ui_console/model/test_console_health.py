@@ -1,4 +1,4 @@
-"""Consoles show the mission's health in one word, what is absent as alarms, and a launcher that is silent."""
+"""Consoles show the mission's health in one word, absences as alarms, and a silent launcher."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.component.messages import LogLevel, StoryEvent
-from backbone.mission_log import AskLog, Log, PeopleKnown
-from backbone.operators import OperatorActed, OperatorAction
+from backbone.mission_log.log import AskLog, Log, PeopleKnown
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.picture.mission import LOG_KEPT
 from ui_console.model.events import Heard
 

@@ -25,8 +25,8 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import LifeState, Parameters, SetParameter, Statistics, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.nameserver.messages import Components, Disappeared
-from backbone.operators import OperatorActed, OperatorAction
 from backbone.picture.health import HealthWord, MissionHealth
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule, Why
@@ -419,7 +419,7 @@ def test_a_schedule_in_json_names_its_fields() -> None:
 
 
 def test_a_slice_that_ends_now_has_no_number_and_one_kept_longer_says_so() -> None:
-    """Schedules that nobody waits in let a console keep its robot beyond its slice."""
+    """Schedules without a waiting ARC let a console keep its robot beyond its slice."""
     shown = held_model()
     assert shown.status_line(GRANT.until_s - 3.0).endswith("slice 3 s")
     assert "slice" not in shown.status_line(GRANT.until_s - 0.4)

@@ -3,7 +3,16 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.model.driving import FIRST_HOLD_S, REPEAT_EVERY_S, DeadMan, Drive, DriveSpan, Halt, Jump, drive_towards
+from ui_console.model.driving import (
+    FIRST_HOLD_S,
+    REPEAT_EVERY_S,
+    DeadMan,
+    DriveSpan,
+    DriveWish,
+    HaltWish,
+    JumpWish,
+    drive_towards,
+)
 
 FORWARD = drive_towards("forward", 4.0)
 TICK_S = 0.01
@@ -31,7 +40,7 @@ def test_without_a_key_nothing_is_sent() -> None:
 
 def test_one_press_drives_half_a_second_at_ten_hertz_then_halts() -> None:
     sent = commands([1.0], 5.0)
-    assert [command for _at_s, command in sent] == [FORWARD] * 5 + [Halt()]
+    assert [command for _at_s, command in sent] == [FORWARD] * 5 + [HaltWish()]
     assert sent[0][0] == 1.0
     assert abs(sent[-1][0] - (1.0 + FIRST_HOLD_S)) < 2 * TICK_S
 
@@ -39,13 +48,13 @@ def test_one_press_drives_half_a_second_at_ten_hertz_then_halts() -> None:
 def test_a_held_key_drives_without_a_gap_and_stops_soon_after_it_is_let_go() -> None:
     repeats = [1.0] + [1.5 - TICK_S + 0.04 * n for n in range(50)]
     sent = commands(repeats, 6.0)
-    assert [command for _at_s, command in sent].count(Halt()) == 1
+    assert [command for _at_s, command in sent].count(HaltWish()) == 1
     assert sent[-1][0] - repeats[-1] < 0.2
 
 
 def test_the_stop_key_halts_at_once_and_also_when_nothing_is_held() -> None:
-    assert commands([1.0], 3.0, stops_s=(1.2,))[-1] == (1.2, Halt())
-    assert commands([], 3.0, stops_s=(1.0,)) == [(1.0, Halt())]
+    assert commands([1.0], 3.0, stops_s=(1.2,))[-1] == (1.2, HaltWish())
+    assert commands([], 3.0, stops_s=(1.0,)) == [(1.0, HaltWish())]
 
 
 def test_another_direction_takes_over_at_once() -> None:
@@ -63,10 +72,10 @@ def test_a_drive_is_only_sent_within_the_hold_of_a_press_and_always_followed_by_
 ) -> None:
     sent = commands(presses, 10.0, tuple(stops))
     for at_s, command in sent:
-        if isinstance(command, Drive):
+        if isinstance(command, DriveWish):
             assert any(press - TICK_S <= at_s <= press + FIRST_HOLD_S + 2 * TICK_S for press in presses)
-    if any(isinstance(command, Drive) for _at_s, command in sent):
-        assert sent[-1][1] == Halt()
+    if any(isinstance(command, DriveWish) for _at_s, command in sent):
+        assert sent[-1][1] == HaltWish()
 
 
 @given(st.lists(st.floats(0.0, 8.0), max_size=40))
@@ -89,17 +98,17 @@ def test_pressed_again_right_after_a_stop_it_drives_and_waits_for_the_next_repea
     assert hand.due(1.1) == FORWARD
     assert hand.next_s is not None
     assert hand.next_s > 1.1
-    assert hand.due(1.1 + FIRST_HOLD_S) == Halt()
+    assert hand.due(1.1 + FIRST_HOLD_S) == HaltWish()
 
 
-@given(st.lists(st.sampled_from([FORWARD, Halt(), Jump(), None])))
-def test_the_begin_and_the_end_of_a_drive_take_turns(applied: list[Drive | Halt | Jump | None]) -> None:
+@given(st.lists(st.sampled_from([FORWARD, HaltWish(), JumpWish(), None])))
+def test_the_begin_and_the_end_of_a_drive_take_turns(applied: list[DriveWish | HaltWish | JumpWish | None]) -> None:
     span, told = DriveSpan(), []
     for at_s, command in enumerate(applied):
         if command is not None and span.begins(command, at_s):
-            assert isinstance(command, Drive)
+            assert isinstance(command, DriveWish)
             told.append("begin")
-        if command is None or isinstance(command, Halt):
+        if command is None or isinstance(command, HaltWish):
             took_s = span.ends(at_s)
             if took_s is not None:
                 assert took_s >= 0

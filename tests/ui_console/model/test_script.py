@@ -1,4 +1,4 @@
-"""Laws of scripts: what is wrong is refused with its line; what is right is played in its time."""
+"""Laws of scripts: a wrong line is refused with its number; a right one is played in its time."""
 
 import json
 from itertools import pairwise
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.model.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
+from ui_console.model.driving import REPEAT_EVERY_S, DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot, Wish
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript, read_script
 
 EXAMPLE = '{"at_s":0.5,"left_rad_s":4,"right_rad_s":4}\n{"at_s":3,"release":true}\n'
@@ -28,28 +28,28 @@ def play(player: ScriptPlayer, until_s: float) -> list[tuple[float, Wish]]:
 
 def test_the_example_drives_from_its_time_until_the_release() -> None:
     done = play(ScriptPlayer(read_script(EXAMPLE)), 10.0)
-    assert done[0] == (0.5, Drive(4.0, 4.0))
+    assert done[0] == (0.5, DriveWish(4.0, 4.0))
     assert done[-1] == (3.0, GiveBack())
     times = [at_s for at_s, _wish in done]
     assert all(later - earlier <= REPEAT_EVERY_S + 1e-9 for earlier, later in pairwise(times))
 
 
 def test_the_end_of_a_script_releases() -> None:
-    assert play(ScriptPlayer(read_script('{"at_s":1,"halt":true}')), 5.0) == [(1.0, Halt()), (1.0, GiveBack())]
+    assert play(ScriptPlayer(read_script('{"at_s":1,"halt":true}')), 5.0) == [(1.0, HaltWish()), (1.0, GiveBack())]
     assert play(ScriptPlayer([]), 5.0) == [(0.0, GiveBack())]
 
 
 def test_after_a_halt_nothing_is_repeated() -> None:
     script = '{"at_s":0,"left_rad_s":1,"right_rad_s":1}\n{"at_s":0.2,"halt":true}\n{"at_s":5,"release":true}'
     done = play(ScriptPlayer(read_script(script)), 10.0)
-    assert [wish for at_s, wish in done if at_s > 0.15] == [Halt(), GiveBack()]
+    assert [wish for at_s, wish in done if at_s > 0.15] == [HaltWish(), GiveBack()]
 
 
 def test_a_jump_does_not_interrupt_a_drive() -> None:
     script = '{"at_s":0,"left_rad_s":1,"right_rad_s":1}\n{"at_s":0.25,"jump":true}\n{"at_s":0.6,"release":true}'
     wishes = [wish for _at_s, wish in play(ScriptPlayer(read_script(script)), 10.0)]
-    assert wishes.count(Jump()) == 1
-    assert wishes[-2] == Drive(1.0, 1.0)
+    assert wishes.count(JumpWish()) == 1
+    assert wishes[-2] == DriveWish(1.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -68,31 +68,31 @@ def test_a_stop_of_another_robot_does_not_end_the_drive() -> None:
     script = '{"at_s":0,"left_rad_s":1,"right_rad_s":1}\n{"at_s":0.25,"stop_robot":"x"}\n{"at_s":0.6,"release":true}'
     wishes = [wish for _at_s, wish in play(ScriptPlayer(read_script(script)), 10.0)]
     assert wishes.count(StopRobot("x")) == 1
-    assert wishes[-2] == Drive(1.0, 1.0)
+    assert wishes[-2] == DriveWish(1.0, 1.0)
 
 
 def test_when_letting_go_is_required_nothing_moves_before_a_line_that_halts() -> None:
     player = ScriptPlayer()
-    player.add(Step(0.0, Drive(1.0, 1.0)))
-    assert player.due(0.0) == [Drive(1.0, 1.0)]
+    player.add(Step(0.0, DriveWish(1.0, 1.0)))
+    assert player.due(0.0) == [DriveWish(1.0, 1.0)]
     player.require_let_go()
     assert player.due(1.0) == []
-    for step in (Step(1.1, Drive(2.0, 2.0)), Step(1.2, Jump())):
+    for step in (Step(1.1, DriveWish(2.0, 2.0)), Step(1.2, JumpWish())):
         player.add(step)
     assert player.due(1.5) == []
     assert player.held_back == 2
-    for step in (Step(1.6, Halt()), Step(1.7, Drive(3.0, 3.0))):
+    for step in (Step(1.6, HaltWish()), Step(1.7, DriveWish(3.0, 3.0))):
         player.add(step)
-    assert player.due(2.0) == [Halt(), Drive(3.0, 3.0)]
+    assert player.due(2.0) == [HaltWish(), DriveWish(3.0, 3.0)]
 
 
 def test_a_streamed_script_waits_for_its_next_line_and_repeats_the_last_meanwhile() -> None:
     player = ScriptPlayer()
     assert player.next_s is None
-    player.add(Step(0.0, Drive(1.0, 1.0)))
-    assert player.due(0.0) == [Drive(1.0, 1.0)]
+    player.add(Step(0.0, DriveWish(1.0, 1.0)))
+    assert player.due(0.0) == [DriveWish(1.0, 1.0)]
     assert player.due(0.05) == []
-    assert player.due(2.0) == [Drive(1.0, 1.0)]
+    assert player.due(2.0) == [DriveWish(1.0, 1.0)]
     player.end()
     assert player.due(2.01) == [GiveBack()]
     assert player.is_over
@@ -130,7 +130,7 @@ def test_time_may_not_run_backwards_and_nothing_follows_a_release() -> None:
 
 
 _speeds = st.floats(-30.0, 30.0)
-_wishes = st.one_of(st.builds(Drive, _speeds, _speeds), st.just(Halt()), st.just(Jump()))
+_wishes = st.one_of(st.builds(DriveWish, _speeds, _speeds), st.just(HaltWish()), st.just(JumpWish()))
 _scripts = st.lists(st.tuples(st.floats(0.0, 3.0), _wishes), max_size=12).map(
     lambda steps: [Step(at_s, wish) for at_s, wish in sorted(steps, key=lambda step: step[0])]
 )
@@ -146,7 +146,7 @@ def test_every_step_is_done_once_in_order_at_its_time_and_the_release_comes_last
         if left and wish is left[0].wish:
             assert at_s == left.pop(0).at_s
         else:
-            assert isinstance(wish, Drive)
+            assert isinstance(wish, DriveWish)
     assert left == []
 
 

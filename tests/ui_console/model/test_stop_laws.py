@@ -1,4 +1,4 @@
-"""The law of stops: a stopped robot never moves until somebody entitled lifted the stop and a fresh press drives it.
+"""The law of stops: a stopped robot never moves before an entitled operator lifts the stop and a fresh press drives it.
 
 Three operators, one robot, everything that their consoles decide by, and a network that delays what it likes.
 """
@@ -14,11 +14,11 @@ from functools import partial
 from typing import assert_never
 
 from resource_pool.arc_client import EmergencyStopped, StopState
-from resource_pool.messages import OtherStop
 from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import OtherStop
 from ui_console.model.consent import ConsentDesk, Sought, Topic
-from ui_console.model.driving import STICK_LASTS_S, DeadMan, Drive
+from ui_console.model.driving import STICK_LASTS_S, DeadMan, DriveWish
 from ui_console.model.lifting import AskFirst, LiftNow, NotThatStop, decide_lift
 
 SEQUENCES, STEPS = 1000, 50
@@ -85,12 +85,12 @@ class World:
 
     # ------------------------------------------------------------------ the network
     def send(self, who: Operator, act: Callable[[], None]) -> None:
-        """Have it arrive later, much later over a link that is cut."""
+        """Let the message arrive later, much later over a cut link."""
         delay_s = self.rng.uniform(0, LONGEST_DELAY_S) + (self.rng.uniform(0, CUT_S) if who.is_cut else 0.0)
         heapq.heappush(self._on_the_way, (self.now_s + delay_s, next(self._numbers), act))
 
     def pass_s(self, seconds: float) -> None:
-        """Let time pass: hands repeat what they hold, consoles send what is due, messages arrive."""
+        """Let time pass: held controls repeat, consoles send due commands, messages arrive."""
         until_s = self.now_s + seconds
         while self.now_s < until_s:
             self.now_s += TICK_S
@@ -98,10 +98,10 @@ class World:
                 heapq.heappop(self._on_the_way)[2]()
             for who in self.people:
                 if who.pressed_s is not None:
-                    drive = Drive(who.pressed_s, 1.0)
+                    drive = DriveWish(who.pressed_s, 1.0)
                     who.hand.press(drive, self.now_s, STICK_LASTS_S if who.uses_stick else None)
                 wanted = who.hand.due(self.now_s)
-                if isinstance(wanted, Drive) and who.epoch:
+                if isinstance(wanted, DriveWish) and who.epoch:
                     self._command(who, wanted, who.epoch, who.known.number("scout1"))
 
     def tell_all(self, tell: Callable[[Operator], None]) -> None:
@@ -110,7 +110,7 @@ class World:
                 self.send(who, lambda who=who: tell(who))
 
     # ------------------------------------------------------------------ the robot's RC
-    def _command(self, who: Operator, drive: Drive, epoch: int, after_stop: int) -> None:
+    def _command(self, who: Operator, drive: DriveWish, epoch: int, after_stop: int) -> None:
         def arrive() -> None:
             if epoch != self.epoch or who.name != self.holder:
                 return
@@ -128,7 +128,7 @@ class World:
         who.known.refused(refusal)
         who.hand.require_let_go()
 
-    def _moved(self, drive: Drive) -> None:
+    def _moved(self, drive: DriveWish) -> None:
         pressed_s = drive.left_rad_s
         self.moves += 1
         self.moves_again += self.lifts > 0

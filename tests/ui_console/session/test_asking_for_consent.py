@@ -8,20 +8,20 @@ from typing import Any
 import pytest
 from fake_resource_pool import FakePlacer
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
-from backbone.operators import OperatorActed, OperatorAction
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule
 from backbone.wire import Envelope, Message
 from ui_console.model.consent import CONSENT_WITHIN_S, AskConsent, Consent, NotAnOperator
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 from ui_console.session.teleoperation import Teleoperation
 
 CONSENTS = (OperatorAction.ASK_CONSENT, OperatorAction.CONSENT, OperatorAction.DECLINE)
@@ -44,7 +44,7 @@ class RcManager(Component[NoParameters]):
 
 
 class Person:
-    """Somebody at a console, and what its screens show."""
+    """A person at a console, and the content of its screens."""
 
     def __init__(self, name: str, placer: FakePlacer) -> None:
         self.model = ConsoleModel(name, name)
@@ -126,7 +126,7 @@ def test_a_yes_gives_the_robot_back_and_both_see_it(stage: Callable[[Scene], Non
         assert on.anna.model.consent(on.clock.now_s()) is None
         await on.placer.arcs["ben-drive"].grant()
         assert on.asked() == "", "what was asked for is here"
-        assert await on.ben.console.do(Drive(1.0, 1.0))
+        assert await on.ben.console.do(DriveWish(1.0, 1.0))
         assert on.consents() == [("ben", OperatorAction.ASK_CONSENT), ("anna", OperatorAction.CONSENT)]
         [release] = [act for act in on.acts if act.action is OperatorAction.RELEASE]
         assert (release.user, release.detail) == ("anna", "ben may have it")
@@ -198,7 +198,7 @@ def test_behaviors_cannot_be_asked_and_who_does_not_wait_asks_nobody(stage: Call
     async def scene(on: Stage) -> None:
         on.manager.blockers = ("watch",)
         for person, remark in (
-            (on.ben, "no operator stands in the way of ben, but watch"),
+            (on.ben, "no operator blocks the claim of ben, but watch"),
             (on.anna, "anna does not wait for a robot"),
         ):
             person.console.begin_ask_consent()

@@ -8,22 +8,22 @@ from typing import Any
 import pytest
 from console_scenes import SCHEDULE
 
+from backbone.addresses import LAUNCHER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.keys import Conversation
-from backbone.naming import LAUNCHER, Subsystem
-from backbone.operators import OperatorActed, OperatorAction
+from backbone.mission_log.operators import OperatorActed, OperatorAction
+from backbone.naming import Subsystem
 from backbone.picture.health import HealthWord, MissionHealth
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.requests import Lease
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
-from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent, event_json, event_word
 from ui_console.model.views import AlarmKind, view_json
@@ -52,7 +52,7 @@ class RcManager(Component[Any]):
 
 
 class Robot(Component[Any]):
-    """Only stops and moves again; says nothing any more when it is told to."""
+    """Only stops and moves again; silent on request."""
 
     accepts = AskStop | EmergencyStop | LiftStop
 

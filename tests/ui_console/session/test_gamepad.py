@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -14,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
-from ui_console.model.driving import STICK_LASTS_S, DeadMan, Drive
+from ui_console.model.driving import STICK_LASTS_S, DeadMan, DriveWish
 from ui_console.session.gamepad import (
     ABS_X,
     ABS_Y,
@@ -84,14 +83,14 @@ def test_a_stick_that_rests_beside_its_middle_stands_still() -> None:
     stick = Stick(RANGES)
     for event in (Said(EV_KEY, BTN_TL, 1), Said(EV_ABS, ABS_Y, -2000), Said(EV_ABS, ABS_X, 3000)):
         stick.feel(event)
-    assert stick.wanted(4.0) == Drive(0.0, 0.0)
+    assert stick.wanted(4.0) == DriveWish(0.0, 0.0)
 
 
 def test_up_is_forward_and_right_turns_right() -> None:
     stick = Stick(RANGES)
     for event in (Said(EV_KEY, BTN_TR, 1), Said(EV_ABS, ABS_Y, -32768)):
         stick.feel(event)
-    assert stick.wanted(4.0) == Drive(4.0, 4.0)
+    assert stick.wanted(4.0) == DriveWish(4.0, 4.0)
     stick.feel(Said(EV_ABS, ABS_X, 32767))
     wanted = stick.wanted(4.0)
     assert wanted is not None
@@ -99,7 +98,7 @@ def test_up_is_forward_and_right_turns_right() -> None:
 
 
 class PlayedGamepad:
-    """Says what it is told to, then is unplugged, or hangs."""
+    """Yields the given events, then is unplugged, or hangs."""
 
     def __init__(self, script: list[tuple[float, Said]], *, unplugged: bool) -> None:
         self.script, self.unplugged = script, unplugged
@@ -141,7 +140,7 @@ def test_what_is_held_is_said_again_until_it_is_let_go() -> None:
     held = [(0.0, Said(EV_ABS, ABS_Y, -32768)), (0.0, Said(EV_KEY, BTN_TL, 1)), (1.0, Said(EV_KEY, BTN_TL, 0))]
     said = play(held, unplugged=False, for_s=3.0)
     assert said[-1] == "stop"
-    assert set(said[:-1]) == {(Drive(4.0, 4.0), STICK_LASTS_S)}
+    assert set(said[:-1]) == {(DriveWish(4.0, 4.0), STICK_LASTS_S)}
     assert 9 <= len(said[:-1]) <= 13
 
 
@@ -151,7 +150,7 @@ def test_a_shoulder_button_that_is_held_through_a_stop_drives_only_when_it_is_pr
         script = [(0.0, Said(EV_ABS, ABS_Y, -32768)), (0.0, Said(EV_KEY, BTN_TL, 1)), (2.0, Said(EV_KEY, BTN_TL, 0))]
         device = PlayedGamepad([*script, (0.5, Said(EV_KEY, BTN_TL, 1))], unplugged=False)
 
-        def hold(drive: Drive, lasts_s: float) -> None:
+        def hold(drive: DriveWish, lasts_s: float) -> None:
             if hand.press(drive, loop.time(), lasts_s):
                 driven_s.append(loop.time())
 
@@ -178,7 +177,7 @@ def test_a_gamepad_that_is_gone_while_it_is_held_stops_the_wheels() -> None:
 
 
 class FoundDevice:
-    """What evdev tells of a device."""
+    """evdev's description of a device."""
 
     def __init__(self, path: str) -> None:
         self.path, self.is_closed = path, False
@@ -195,7 +194,7 @@ class FoundDevice:
 
 def test_the_first_device_with_a_stick_and_a_shoulder_button_is_the_gamepad(monkeypatch: pytest.MonkeyPatch) -> None:
     evdev = SimpleNamespace(list_devices=lambda: ["mouse", "pad", "other pad"], InputDevice=FoundDevice)
-    monkeypatch.setitem(sys.modules, "evdev", evdev)
+    monkeypatch.setattr("ui_console.session.gamepad.evdev", evdev)
     device, ranges = find_gamepad()
     assert isinstance(device, FoundDevice)
     assert (device.path, ranges) == ("pad", {ABS_X: (0, 255), ABS_Y: (0, 255)})
@@ -204,7 +203,7 @@ def test_the_first_device_with_a_stick_and_a_shoulder_button_is_the_gamepad(monk
 @pytest.mark.parametrize("installed", [True, False])
 def test_without_a_gamepad_or_the_extra_it_is_said_what_to_do(installed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     evdev = SimpleNamespace(list_devices=lambda: ["mouse"], InputDevice=FoundDevice) if installed else None
-    monkeypatch.setitem(sys.modules, "evdev", evdev)
+    monkeypatch.setattr("ui_console.session.gamepad.evdev", evdev)
     with pytest.raises(NoGamepad) as refusal:
         find_gamepad()
     assert "scout-backbone[gamepad]" in refusal.value.remedy

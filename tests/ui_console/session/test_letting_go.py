@@ -18,13 +18,13 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import EmergencyStopped
-from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.messages import Drive as ArcDrive
 from resource_pool.messages import Halt as ArcHalt
 from resource_pool.messages import Jump as ArcJump
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, Drive, Halt, drive_towards
+from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, DriveWish, HaltWish, drive_towards
 from ui_console.session.scripted import ScriptDriver
 from ui_console.session.teleoperation import Teleoperation
 
@@ -60,7 +60,7 @@ def test_a_press_counts_only_if_its_control_was_let_go_since_that_was_required(p
                 assert counts is is_clean[control]
                 until_s[control] = now_s + silence_s[control]
         if not any(is_clean[control] and now_s < end_s for control, end_s in until_s.items()):
-            assert not isinstance(hand.due(now_s), Drive)
+            assert not isinstance(hand.due(now_s), DriveWish)
 
 
 def test_what_is_held_when_letting_go_is_required_halts_at_once() -> None:
@@ -68,7 +68,7 @@ def test_what_is_held_when_letting_go_is_required_halts_at_once() -> None:
     hand.press(FORWARD, 0.0)
     assert hand.due(0.0) == FORWARD
     hand.require_let_go()
-    assert hand.due(0.0) == Halt()
+    assert hand.due(0.0) == HaltWish()
     assert hand.due(0.1) is None
 
 
@@ -148,7 +148,7 @@ class Stage:
         return self.placer.arcs["console-7-drive"]
 
     def stop(self, by: str = "ben", reason: str = "") -> None:
-        """Somebody stops the robot: its commands are refused from now on, and everybody hears of it."""
+        """Stop the robot: its RC refuses commands from now on, and publishes the stop."""
         self.latch.stop(by, reason, self.clock.now_s(), f"ui_console/{by}")
         for arc in self.placer.arcs.values():
             arc.refusal = EmergencyStopped(
@@ -334,7 +334,7 @@ def test_a_jump_key_held_through_a_stop_does_not_jump_after_the_lift(stage: Call
 def test_a_robot_that_was_stopped_and_freed_before_it_is_granted_is_driven_by_the_first_press(
     stage: Callable[[Scene], None],
 ) -> None:
-    """Who takes it knows of the stop from the beginning, so that nobody has to press twice."""
+    """An operator who takes the robot knows of the stop from the beginning, so that no second press is needed."""
 
     async def scene(on: Stage) -> None:
         await on.console.give_back()

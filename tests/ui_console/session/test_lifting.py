@@ -1,4 +1,4 @@
-"""A stop is lifted by its author at once, by others if each author who is there agrees; silence keeps it."""
+"""The author of a stop lifts it at once, others if each author who is there agrees; silence keeps it."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
-from backbone.operators import OperatorActed, OperatorAction
 from backbone.wire import Envelope
 from resource_pool.arc_client import Stopper, StopState
 from resource_pool.stop_latch import StopLatch
 from ui_console.model.consent import CONSENT_WITHIN_S, Consent, NotAnOperator
 from ui_console.model.console import ConsoleModel
 from ui_console.model.lifting import AskFirst, AskLift, LiftNow, NotThatStop, decide_lift, is_agreed, lift_line
-from ui_console.session.observer import Observer, nobody_here
+from ui_console.session.observer import Observer, no_person_here
 
 PEOPLE = ["anna", "ben", "cleo"]
 
@@ -87,7 +87,7 @@ def test_who_stopped_under_no_name_is_known_by_the_console() -> None:
 
 # ---------------------------------------------------------------------- three people at consoles that only watch
 class Person:
-    """Somebody at a console, and what its screens show."""
+    """A person at a console, and the content of its screens."""
 
     def __init__(self, name: str, stage: Stage, console: str = "") -> None:
         self.name, self.clock = name, stage.clock
@@ -132,7 +132,7 @@ class Stage:
                 await self.clock.sleep_s(0.01)
 
     def lift(self, name: str) -> Any:
-        """Have this person lift the stop that is in force."""
+        """Lift the stop in force by this person."""
         console = self.people[name].console
         return asyncio.ensure_future(console.lift_stop("scout1", self.robot.latch.state.number))
 
@@ -258,7 +258,7 @@ def test_a_program_that_watches_under_an_authors_name_is_not_that_author(
         launch = on.launch(Subsystem.UI_CONSOLE, "logger", "console")
         bus = on.network.join(launch.address, on.clock)
         logger: Observer[Any] = Observer(
-            launch, bus, on.clock, show=lambda event: None, user="anna", answers_of=nobody_here
+            launch, bus, on.clock, show=lambda event: None, user="anna", answers_of=no_person_here
         )
         async with beside(logger):
             began_s = on.clock.now_s()

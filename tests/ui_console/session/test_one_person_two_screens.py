@@ -11,13 +11,13 @@ from fake_resource_pool import FakePlacer
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import ComponentState
 from backbone.nameserver.messages import Components
 from backbone.naming import Subsystem
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, AskWhy
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule, Why
@@ -25,7 +25,7 @@ from backbone.wire import Envelope, Message
 from resource_pool.arc_client import Suspended
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import Heard
-from ui_console.session.hand_over import AskHandOver, Outcome, decide
+from ui_console.session.hand_over import AskHandOver, ClaimOutcome, decide
 from ui_console.session.teleoperation import Teleoperation
 
 TIMES = st.floats(0, 100)
@@ -36,9 +36,9 @@ TIMES = st.floats(0, 100)
 def test_of_two_claims_of_one_person_the_newer_stands_and_never_both(one_s: float, other_s: float) -> None:
     first = decide(AskHandOver("scout1", "anna", one_s), "anna", "scout1", other_s, by_script=False)
     second = decide(AskHandOver("scout1", "anna", other_s), "anna", "scout1", one_s, by_script=False)
-    assert not (first is Outcome.GIVEN and second is Outcome.GIVEN)
+    assert not (first is ClaimOutcome.GIVEN and second is ClaimOutcome.GIVEN)
     if one_s != other_s:
-        assert {first, second} == {Outcome.GIVEN, Outcome.NEWER}
+        assert {first, second} == {ClaimOutcome.GIVEN, ClaimOutcome.NEWER}
 
 
 @pytest.mark.parametrize(
@@ -53,12 +53,12 @@ def test_of_two_claims_of_one_person_the_newer_stands_and_never_both(one_s: floa
 )
 def test_what_another_person_or_a_script_holds_stays_there(user: str, holds: str, by_script: bool) -> None:
     asked = AskHandOver("scout1", "anna", 50.0)
-    assert decide(asked, user, holds, 1.0, by_script=by_script) is Outcome.NOT_YOURS
+    assert decide(asked, user, holds, 1.0, by_script=by_script) is ClaimOutcome.NOT_YOURS
 
 
 # ---------------------------------------------------------------------- over the bus
 class RcManager(Component[NoParameters]):
-    """Tells who holds scout1."""
+    """Answers with the holder of scout1."""
 
     accepts = AskSchedule | AskWhy
     holder = ""
@@ -95,7 +95,7 @@ class Stage:
         )
 
     async def takes(self, console: Teleoperation) -> None:
-        """Have the console ask; it is granted unless another holds the robot."""
+        """Let the console claim; it is granted unless another one holds the robot."""
         await self.clock.sleep_s(1.0)
         console.take()
         await self.placer.wait(lambda: f"{console.name}-drive" in self.placer.arcs)

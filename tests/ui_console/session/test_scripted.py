@@ -36,7 +36,7 @@ def test_a_silence_is_one_line_until_there_is_an_answer() -> None:
 def test_a_robot_that_was_lost_is_told_in_a_sentence() -> None:
     [line] = heard(Heard(3.0, Suspended("arc", "lost", "console-1-drive", -1.0)))
     assert line["event"] == "suspended"
-    assert line["why"] == "what held it for this console has ended"
+    assert line["why"] == "the ARC that held it for this console has ended"
     [line] = heard(Heard(3.0, Suspended("arc", "higher", "console-9", -1.0)))
     assert line["why"] == "console-9 has the higher priority"
 

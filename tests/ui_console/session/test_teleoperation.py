@@ -16,8 +16,8 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Parameters, SetParameter, StoryEvent
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
-from backbone.operators import OperatorActed, OperatorAction
 from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction, Suspended
 from resource_pool.messages import Drive as ArcDrive

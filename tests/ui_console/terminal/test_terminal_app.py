@@ -18,10 +18,10 @@ from written_session import WrittenSession, settle
 
 from backbone.component.messages import StoryEvent
 from backbone.errors import Refusal
-from backbone.mission_log import AskLog, Log
+from backbone.mission_log.log import AskLog, Log
 from resource_pool.arc_client import Suspended
 from ui_console.model.consent import Consent, Settled, Sought
-from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
 from ui_console.model.events import (
     Attention,
     ConsentAsked,
@@ -43,8 +43,8 @@ from ui_console.terminal.widgets import DrivePad, Panel, Video
 SIZE = (120, 36)
 
 
-FORWARD, BACKWARD = Drive(4.0, 4.0), Drive(-4.0, -4.0)
-LEFT, RIGHT = Drive(-2.0, 2.0), Drive(2.0, -2.0)
+FORWARD, BACKWARD = DriveWish(4.0, 4.0), DriveWish(-4.0, -4.0)
+LEFT, RIGHT = DriveWish(-2.0, 2.0), DriveWish(2.0, -2.0)
 KEYS: list[tuple[str, list[Any]]] = [
     ("up", [FORWARD]),
     ("w", [FORWARD]),
@@ -145,7 +145,7 @@ async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds()
     screen = ConsoleApp(session)
     async with screen.run_test() as pilot:
         await pilot.press("plus", "w", "minus", "minus", "w", "equals_sign")
-        assert session.wanted == [Drive(5.0, 5.0), Drive(3.0, 3.0)]
+        assert session.wanted == [DriveWish(5.0, 5.0), DriveWish(3.0, 3.0)]
         await pilot.press(*["plus"] * 13)
         assert screen.speed_rad_s == SPEED_MOST_RAD_S
 
@@ -429,15 +429,15 @@ async def test_dragging_in_the_pad_drives_until_it_is_let_go() -> None:
 @pytest.mark.parametrize(
     ("forward", "right", "drive"),
     [
-        (1, 0, Drive(4, 4)),
-        (-2, 0, Drive(-4, -4)),
-        (0, 1, Drive(2, -2)),
-        (0, 0, Drive(0, 0)),
-        (1, 1, Drive(4, 4 / 3)),
+        (1, 0, DriveWish(4, 4)),
+        (-2, 0, DriveWish(-4, -4)),
+        (0, 1, DriveWish(2, -2)),
+        (0, 0, DriveWish(0, 0)),
+        (1, 1, DriveWish(4, 4 / 3)),
     ],
 )
 def test_a_stick_turns_on_the_spot_or_bends_the_way_and_never_exceeds_the_speed(
-    forward: float, right: float, drive: Drive
+    forward: float, right: float, drive: DriveWish
 ) -> None:
     found = drive_by_stick(forward, right, 4.0)
     assert (found.left_rad_s, found.right_rad_s) == pytest.approx((drive.left_rad_s, drive.right_rad_s))

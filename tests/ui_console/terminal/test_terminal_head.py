@@ -1,4 +1,4 @@
-"""The first and the last line: what fits, what is left out first, and what is never cut."""
+"""The first and the last line: facts that fit, facts left out first, and facts never cut."""
 
 from __future__ import annotations
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.component.messages import StoryEvent
-from backbone.log_question import LogQuestion
-from backbone.mission_log import AskLog, Log
-from ui_console.terminal.log_search import FOUND_SHOWN, Found, read_search
+from backbone.mission_log.log import AskLog, Log
+from backbone.mission_log.question import LogQuestion
+from ui_console.terminal.log_search import FOUND_SHOWN, LogResult, read_search
 
 
 @pytest.mark.parametrize(
@@ -38,5 +38,5 @@ def test_any_line_is_a_question_or_none(line: str) -> None:
 def test_the_title_says_how_much_was_found_and_how_much_of_it_is_shown() -> None:
     few = Log([StoryEvent(1.0, "backbone/launcher", "began", "mission", "")])
     many = Log(few.events, left_out=4000)
-    assert Found("began", AskLog(), few).title == "log: began (1 event)"
-    assert Found("began", AskLog(), many).title == f"log: began (4001 events, the newest {FOUND_SHOWN})"
+    assert LogResult("began", AskLog(), few).title == "log: began (1 event)"
+    assert LogResult("began", AskLog(), many).title == f"log: began (4001 events, the newest {FOUND_SHOWN})"

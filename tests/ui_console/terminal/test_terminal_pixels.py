@@ -1,4 +1,4 @@
-"""Real pixels: what the terminal is told is whole, and only terminals that know it are told."""
+"""Real pixels: the escape sequences are complete, and only terminals with the protocol get them."""
 
 from __future__ import annotations
 

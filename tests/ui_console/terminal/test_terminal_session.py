@@ -1,4 +1,4 @@
-"""How a screen ends, and what is told of it: in good order, by Ctrl-C, or by a bug."""
+"""Ends of a screen, and their reports: in good order, by Ctrl-C, or by a bug."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from textual.pilot import Pilot
 
 from backbone.bus.clock import MissionClock
 from backbone.component.messages import LifeState
-from backbone.endings import ExitCode
+from backbone.launcher.endings import ExitCode
 from ui_console.model.events import Heard
 from ui_console.session.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
 from ui_console.session.observer import Observer
@@ -24,7 +24,7 @@ from ui_console.terminal.session import TerminalSession
 
 
 class StandIn:
-    """A component that lives until it is told to end, and notes what happened by then."""
+    """A component that lives until it has to end, and notes the events until then."""
 
     def __init__(self, look: Callable[[], str] = str) -> None:
         self.clock = MissionClock.started_now()

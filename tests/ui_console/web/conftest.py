@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 from fake_resource_pool import FakePlacer
-from web_stage import MISSION, PASSES, WITHIN_S, Stage
+from web_stage import MISSION, RIGHTS, WITHIN_S, Stage
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import MissionClock
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from ui_console.web.door import Doorkeeper
+from ui_console.web.login import Authenticator
 from ui_console.web.server import WebServer
 
 
@@ -29,7 +29,9 @@ async def stage(local_mission: Any) -> AsyncIterator[Stage]:
             made.port = port
             is_ready.set()
 
-        serving = asyncio.create_task(WebServer(made.hub, Doorkeeper(PASSES)).run("127.0.0.1", 0, ready), name="server")
+        serving = asyncio.create_task(
+            WebServer(made.hub, Authenticator(RIGHTS)).run("127.0.0.1", 0, ready), name="server"
+        )
         try:
             async with asyncio.timeout(WITHIN_S):
                 await is_ready.wait()

@@ -1,4 +1,4 @@
-"""Over HTTPS a page and its socket are read by nobody on the way; real sockets on the loopback."""
+"""HTTPS keeps a page and its socket secret on the way; real sockets on the loopback."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from backbone.mission.class_facts import ClassFacts
 from ui_console.cli import app
 from ui_console.design.room import DesignRoom
 from ui_console.design.server import DesignServer, begin
-from ui_console.web.door import Doorkeeper, Pass
 from ui_console.web.encryption import NoCertificate, encryption_with
+from ui_console.web.login import Authenticator, TokenRights
 
 ANYBODY = "anybody"
 WITHIN_S = 15.0
@@ -66,7 +66,7 @@ async def port(papers: Papers, tmp_path: Path) -> AsyncIterator[int]:
         return {path: ClassFacts("") for path in class_paths}
 
     draft, kept = begin(str(tmp_path / "guard.xml"))
-    server = DesignServer(DesignRoom(draft, kept, look_up), Doorkeeper({ANYBODY: Pass("", 1)}))
+    server = DesignServer(DesignRoom(draft, kept, look_up), Authenticator({ANYBODY: TokenRights("", 1)}))
     listening: asyncio.Future[int] = asyncio.get_running_loop().create_future()
     end = asyncio.Event()
     encryption = encryption_with(str(papers.certificate), str(papers.key))

@@ -1,4 +1,4 @@
-"""Somebody at a page is asked whether a stop they set may be lifted, and one who closed the page is not."""
+"""A person at a page is asked whether their stop may be lifted; a person who closed the page is not."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from backbone.naming import Subsystem
 from ui_console.model.console import ConsoleModel
 from ui_console.model.views import AlarmKind, AlarmView
 from ui_console.session.observer import Observer
-from ui_console.web.door import Welcome
 from ui_console.web.hub import WebHub
+from ui_console.web.login import Welcome
 from ui_console.web.operator import Operator
-from ui_console.web.protocol import Decide, LiftStop
+from ui_console.web.protocol import Decide, LiftRequest
 
 WITHIN_S = 5.0
 
@@ -104,12 +104,12 @@ def test_one_page_asks_another_of_the_same_server_and_reads_the_answer(stage: Ca
     async def scene(on: Stage) -> None:
         anna, cleo = on.hub.enter(Welcome("anna", 100)), on.hub.enter(Welcome("cleo", 100))
         await on.hub.observer.stop_robot("scout1", "", "anna")
-        cleo.obey(LiftStop("scout1", on.robot.latch.state.number))
+        cleo.obey(LiftRequest("scout1", on.robot.latch.state.number))
         await on.until(lambda: on.question(anna))
         anna.obey(Decide(False))
         await on.until(lambda: "anna keeps scout1 stopped" in cleo.model.own(on.clock.now_s()).asked)
         assert anna.model.own(on.clock.now_s()).asked == ""
-        anna.obey(LiftStop("scout1", on.robot.latch.state.number))
+        anna.obey(LiftRequest("scout1", on.robot.latch.state.number))
         await on.until(lambda: not on.robot.latch.state.is_stopped)
 
     stage(scene)

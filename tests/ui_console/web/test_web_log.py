@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from web_stage import Browser, Stage
 
 from backbone.component.messages import LogLevel, StoryEvent
-from backbone.log_question import WrongSearch
-from backbone.mission_log import EVENTS_KEPT, MOST_EVENTS, Log
+from backbone.mission_log.log import EVENTS_KEPT, MOST_EVENTS, Log
+from backbone.mission_log.question import WrongSearch
 from backbone.moments import NoMoment, Now
 from ui_console.session import feed
 from ui_console.session.feed import LogAway

@@ -29,7 +29,7 @@ addEventListener("DOMContentLoaded", () => setInterval(() => {
 
 
 async def test_the_age_of_what_is_shown_counts_from_the_newest_beat_that_came_back(stage: Stage) -> None:
-    """The pure part: whatever came back late, out of order or never, nothing counts as younger than it is."""
+    """The pure part: beats may come back late, out of order or never; no content counts as younger than it is."""
     async with page_at(stage) as page:
         ages = await page.evaluate("""async () => {
           const { Freshness, makeClock } = await import("./freshness.js");
@@ -104,7 +104,7 @@ async def test_a_page_that_slept_drives_nothing_when_it_wakes_and_offers_the_los
         signal_all(asleep, signal.SIGSTOP)
         try:
             await wheels.wait_halted()
-            await stage.placer.wait(lambda: not stage.hub.guests)
+            await stage.placer.wait(lambda: not stage.hub.clients)
         finally:
             signal_all(asleep, signal.SIGCONT)
         await page.wait_for_selector("#lost:not([hidden])")
@@ -127,11 +127,11 @@ async def test_a_page_that_comes_back_has_its_robot_again_at_once(stage: Stage) 
             await take(page)
             cable.is_cut = True
             await page.get_by_text("THIS PAGE CANNOT STOP A ROBOT").wait_for()
-            assert len(stage.hub.guests) == 1
+            assert len(stage.hub.clients) == 1
             cable.is_cut = False
             await page.locator("#retake").click()
             await page.wait_for_selector("body[data-held=scout1]")
-            assert len(stage.hub.guests) == 1, "one page is one guest"
+            assert len(stage.hub.clients) == 1, "one page is one client"
 
 
 async def test_a_robot_that_was_lost_can_be_left(stage: Stage) -> None:

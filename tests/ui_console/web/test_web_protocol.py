@@ -10,39 +10,48 @@ from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ui_console.web.door import (
+from ui_console.web.login import (
     BURST,
     FAULTS_FORGIVEN,
     LOGIN_WITHIN_S,
     MAX_MESSAGE_BYTES,
     RATE_HZ,
-    Beat,
-    Doorkeeper,
-    Fault,
-    Offence,
-    Pass,
-    Visitor,
+    Authenticator,
+    BeatRequest,
+    ClientSession,
+    ProtocolViolation,
+    TokenRights,
+    ViolationKind,
     Welcome,
     WrongOperator,
+    new_rights,
     new_token,
-    passes_for,
     read_operator,
 )
-from ui_console.web.protocol import Intent, LetGo, LiftStop, SetParameter, Steer, StopWheels, Watch, understand
+from ui_console.web.protocol import (
+    Intent,
+    LiftRequest,
+    ReleaseRequest,
+    SetRequest,
+    Steer,
+    StopWheels,
+    Watch,
+    understand,
+)
 
 TOKEN = "the-right-one"  # noqa: S105  opens nothing
 
 
-def visitor(granted: Pass | None = None, now_s: float = 0.0) -> Visitor[Intent]:
-    return Visitor(Doorkeeper({TOKEN: granted or Pass("", 100)}), understand, now_s)
+def session(granted: TokenRights | None = None, now_s: float = 0.0) -> ClientSession[Intent]:
+    return ClientSession(Authenticator({TOKEN: granted or TokenRights("", 100)}), understand, now_s)
 
 
 def hello(**more: Any) -> bytes:
     return json.dumps({"do": "hello", "token": TOKEN, **more}).encode()
 
 
-def welcomed() -> Visitor[Intent]:
-    one = visitor()
+def welcomed() -> ClientSession[Intent]:
+    one = session()
     assert isinstance(one.heard(hello(user="anna"), 0.0), Welcome)
     return one
 
@@ -66,10 +75,10 @@ messages = st.one_of(
 @settings(max_examples=share(60))
 @given(st.lists(messages, max_size=12))
 def test_nobody_gets_in_without_the_token_whatever_is_said(said: list[str | bytes]) -> None:
-    one = visitor()
+    one = session()
     for number, data in enumerate(said):
         outcome = one.heard(data, 0.1 * number)
-        assert outcome is None or isinstance(outcome, Offence)
+        assert outcome is None or isinstance(outcome, ProtocolViolation)
         assert one.is_out, "the first wrong word is the last"
     assert one.welcome is None
 
@@ -86,20 +95,20 @@ def test_whatever_a_visitor_says_means_something_typed_or_is_an_offence(said: li
         elif isinstance(outcome, Steer):
             assert -1 <= outcome.forward <= 1
             assert -1 <= outcome.right <= 1
-        was_out = was_out or (isinstance(outcome, Offence) and outcome.is_fatal)
+        was_out = was_out or (isinstance(outcome, ProtocolViolation) and outcome.is_fatal)
         assert one.is_out is was_out
 
 
 @given(st.text(max_size=100))
 def test_only_the_right_token_opens(token: str) -> None:
-    found = Doorkeeper({TOKEN: Pass("", 7)}).open_with(token)
-    assert (found == Pass("", 7)) is (token == TOKEN)
+    found = Authenticator({TOKEN: TokenRights("", 7)}).rights_of(token)
+    assert (found == TokenRights("", 7)) is (token == TOKEN)
     assert token == TOKEN or found is None
 
 
 @given(st.integers(-1000, 1000) | st.none(), st.integers(0, 500))
 def test_nobody_gets_more_priority_than_the_token_is_good_for(asked: int | None, most: int) -> None:
-    outcome = visitor(Pass("", most)).heard(hello(priority=asked), 0.0)
+    outcome = session(TokenRights("", most)).heard(hello(priority=asked), 0.0)
     assert isinstance(outcome, Welcome)
     assert 0 <= outcome.priority <= most
     if asked is None or asked >= most:
@@ -107,16 +116,16 @@ def test_nobody_gets_more_priority_than_the_token_is_good_for(asked: int | None,
 
 
 def test_a_token_made_for_somebody_has_that_name() -> None:
-    assert visitor(Pass("anna", 5)).heard(hello(user="eve"), 0.0) == Welcome("anna", 5)
-    assert visitor().heard(hello(user="  a\n b "), 0.0) == Welcome("a b", 100)
-    assert visitor().heard(hello(), 0.0) == Welcome("somebody", 100)
-    assert visitor().heard(hello(page="7f-01"), 0.0) == Welcome("somebody", 100, "7f-01")
+    assert session(TokenRights("anna", 5)).heard(hello(user="eve"), 0.0) == Welcome("anna", 5)
+    assert session().heard(hello(user="  a\n b "), 0.0) == Welcome("a b", 100)
+    assert session().heard(hello(), 0.0) == Welcome("unnamed", 100)
+    assert session().heard(hello(page="7f-01"), 0.0) == Welcome("unnamed", 100, "7f-01")
 
 
 def test_who_shows_no_token_in_time_is_late() -> None:
-    one = visitor(now_s=3.0)
+    one = session(now_s=3.0)
     assert one.must_log_in_by_s == 3.0 + LOGIN_WITHIN_S
-    assert one.late().fault is Fault.LATE
+    assert one.late().kind is ViolationKind.LATE
     assert one.heard(hello(), 9.0) is None
     assert welcomed().must_log_in_by_s is None
 
@@ -124,8 +133,8 @@ def test_who_shows_no_token_in_time_is_late() -> None:
 def test_a_message_that_is_too_long_ends_it_before_it_is_read() -> None:
     one = welcomed()
     outcome = one.heard(b'{"do":"why","name":"' + b"a" * MAX_MESSAGE_BYTES + b'"}', 1.0)
-    assert isinstance(outcome, Offence)
-    assert (outcome.fault, outcome.is_fatal) == (Fault.OVERSIZED, True)
+    assert isinstance(outcome, ProtocolViolation)
+    assert (outcome.kind, outcome.is_fatal) == (ViolationKind.OVERSIZED, True)
     assert one.heard(b'{"do":"stop"}', 2.0) is None
 
 
@@ -133,11 +142,11 @@ def test_a_few_meaningless_messages_are_forgiven() -> None:
     one = welcomed()
     for _ in range(FAULTS_FORGIVEN):
         outcome = one.heard(b"{", 1.0)
-        assert isinstance(outcome, Offence)
+        assert isinstance(outcome, ProtocolViolation)
         assert not outcome.is_fatal
         assert one.heard(b'{"do":"stop"}', 1.0) == StopWheels()
     outcome = one.heard(b"{", 1.0)
-    assert isinstance(outcome, Offence)
+    assert isinstance(outcome, ProtocolViolation)
     assert outcome.is_fatal
 
 
@@ -164,32 +173,32 @@ def test_a_few_meaningless_messages_are_forgiven() -> None:
 )
 def test_what_is_out_of_range_means_nothing(said: bytes) -> None:
     outcome = welcomed().heard(said, 1.0)
-    assert isinstance(outcome, Offence)
-    assert outcome.fault is Fault.MALFORMED
+    assert isinstance(outcome, ProtocolViolation)
+    assert outcome.kind is ViolationKind.MALFORMED
 
 
 def test_words_become_intents() -> None:
     one = welcomed()
-    assert one.heard(b'{"do":"beat","number":7}', 1.0) == Beat(7)
-    assert one.heard(b'{"do":"lift","robot":"scout1","number":3}', 1.0) == LiftStop("scout1", 3)
+    assert one.heard(b'{"do":"beat","number":7}', 1.0) == BeatRequest(7)
+    assert one.heard(b'{"do":"lift","robot":"scout1","number":3}', 1.0) == LiftRequest("scout1", 3)
     said = b'{"do":"drive","moment":3,"forward":0.5,"right":-1,"speed_rad_s":4}'
     assert one.heard(said, 1.0) == Steer(3, 0.5, -1.0, 4.0)
-    assert one.heard('{"do":"release"}', 1.0) == LetGo()
+    assert one.heard('{"do":"release"}', 1.0) == ReleaseRequest()
     assert one.heard(b'{"do":"watch","robots":["scout1"]}', 1.0) == Watch(["scout1"])
     setting = one.heard(b'{"do":"set","name":"watch-scout1","parameter":"pause_s","value":[1,"a"]}', 1.0)
-    assert setting == SetParameter("watch-scout1", "pause_s", [1, "a"])
+    assert setting == SetRequest("watch-scout1", "pause_s", [1, "a"])
 
 
 @settings(max_examples=share(50))
 @given(st.floats(1.2, 20.0), st.floats(0.0, 1e6))
 def test_who_floods_is_out_soon(times_too_many: float, begins_s: float) -> None:
-    one = visitor(now_s=begins_s)
+    one = session(now_s=begins_s)
     one.heard(hello(), begins_s)
     step_s = 1.0 / (RATE_HZ * times_too_many)
     most = int(BURST / (1.0 - 1.0 / times_too_many)) + 3
     outcomes = [one.heard(b'{"do":"stop"}', begins_s + number * step_s) for number in range(most)]
-    faults = [outcome.fault for outcome in outcomes if isinstance(outcome, Offence)]
-    assert faults == [Fault.FLOOD]
+    faults = [outcome.kind for outcome in outcomes if isinstance(outcome, ProtocolViolation)]
+    assert faults == [ViolationKind.FLOOD]
     assert one.is_out
 
 
@@ -200,11 +209,11 @@ def test_who_keeps_to_the_rate_is_heard_for_ever() -> None:
 
 
 def test_tokens_are_one_for_all_or_one_for_each() -> None:
-    [(token, granted)] = passes_for([], 50).items()
-    assert (granted, len(token) >= 32) == (Pass("", 50), True)
-    assert sorted(passes_for([("anna", 1), ("ben", 2)], 50).values(), key=lambda one: one.user) == [
-        Pass("anna", 1),
-        Pass("ben", 2),
+    [(token, granted)] = new_rights([], 50).items()
+    assert (granted, len(token) >= 32) == (TokenRights("", 50), True)
+    assert sorted(new_rights([("anna", 1), ("ben", 2)], 50).values(), key=lambda one: one.user) == [
+        TokenRights("anna", 1),
+        TokenRights("ben", 2),
     ]
     assert len({new_token() for _ in range(100)}) == 100
 

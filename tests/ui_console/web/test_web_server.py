@@ -12,14 +12,14 @@ from collections.abc import Awaitable, Iterator
 
 import pytest
 from fake_resource_pool import FakeArc
-from web_stage import ANYBODY, HEIGHT_PX, HIGH, LOW, PASSES, WIDTH_PX, WITHIN_S, Stage
+from web_stage import ANYBODY, HEIGHT_PX, HIGH, LOW, RIGHTS, WIDTH_PX, WITHIN_S, Stage
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import CloseCode
 
 from resource_pool.messages import Drive, Halt
-from ui_console.web import door, reception
-from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper
-from ui_console.web.reception import CannotListen
+from ui_console.web import login, page_server
+from ui_console.web.login import MAX_MESSAGE_BYTES, Authenticator
+from ui_console.web.page_server import CannotListen
 from ui_console.web.server import WebServer
 
 
@@ -93,7 +93,7 @@ async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back
         anna.socket.transport.abort()
         await stage.placer.wait(lambda: arc.released)
         assert isinstance(arc.commands[-1][2], Halt)
-        await stage.placer.wait(lambda: not stage.hub.guests)
+        await stage.placer.wait(lambda: not stage.hub.clients)
 
 
 async def test_who_loses_the_robot_is_told_who_took_it_and_why(stage: Stage) -> None:
@@ -165,7 +165,7 @@ async def test_pictures_of_any_robot_that_somebody_holds_can_be_watched(stage: S
             await anna.wait(lambda: len(anna.view.get("robots", [])) == 3, "robots")
             await anna.say(do="watch", robots=[*robots, "scout9"])
             await ben.say(do="watch", robots=["scout2"])
-            await stage.placer.wait(lambda: sum(len(one.outbox.watched) for one in stage.hub.guests) == 5)
+            await stage.placer.wait(lambda: sum(len(one.outbox.watched) for one in stage.hub.clients) == 5)
             for number in range(40):
                 for arc in arcs.values():
                     arc.publish(bytes([number]) * (WIDTH_PX * HEIGHT_PX), WIDTH_PX, HEIGHT_PX, number)
@@ -177,7 +177,7 @@ async def test_pictures_of_any_robot_that_somebody_holds_can_be_watched(stage: S
             await anna.wait(lambda: len(anna.view["drawn"]) == 3, "the latency from lens to screen")
             await anna.say(do="watch", robots=[])
             await ben.say(do="watch", robots=[])
-            await stage.placer.wait(lambda: not any(one.outbox.watched for one in stage.hub.guests))
+            await stage.placer.wait(lambda: not any(one.outbox.watched for one in stage.hub.clients))
             packed = stage.hub.pictures_packed
             arcs["scout2"].publish(bytes(WIDTH_PX * HEIGHT_PX), WIDTH_PX, HEIGHT_PX, 99)
             await stage.clock.sleep_s(0.1)
@@ -257,9 +257,9 @@ async def test_others_do_not_notice_one_that_stops_reading(stage: Stage) -> None
             for said in ({"do": "hello", "token": LOW}, {"do": "take", "robot": "scout2"}):
                 body = json.dumps(said).encode()
                 deaf.sendall(bytes([0x81, 0x80 | len(body)]) + bytes(4) + body)  # masked with zeros
-            await stage.placer.wait(lambda: len(stage.hub.guests) == 2)
+            await stage.placer.wait(lambda: len(stage.hub.clients) == 2)
             await anna.wait(lambda: anna.has_alarm("ben at 127.0.0.1 has read nothing"), "alarm")
-            await stage.placer.wait(lambda: len(stage.hub.guests) == 1)
+            await stage.placer.wait(lambda: len(stage.hub.clients) == 1)
             await stage.placer.wait(lambda: not stage.placer.arcs)
         finally:
             deaf.close()
@@ -269,7 +269,7 @@ async def test_others_do_not_notice_one_that_stops_reading(stage: Stage) -> None
 
 async def test_who_says_nothing_at_all_is_let_go(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     async with stage.browser() as anna:
-        monkeypatch.setattr(door, "LOGIN_WITHIN_S", 0.2)
+        monkeypatch.setattr(login, "LOGIN_WITHIN_S", 0.2)
         async with stage.connection() as silent:
             with pytest.raises(ConnectionClosed):
                 async with asyncio.timeout(WITHIN_S):
@@ -281,17 +281,17 @@ async def test_only_so_many_operators_are_served_and_the_next_is_told_so(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with stage.browser() as anna, stage.connection() as ben:
-        monkeypatch.setattr(reception, "MOST_OPERATORS", 1)
+        monkeypatch.setattr(page_server, "MOST_OPERATORS", 1)
         await ben.send(json.dumps({"do": "hello", "token": LOW}))
-        with pytest.raises(ConnectionClosed, match="found 1 guest there"):
+        with pytest.raises(ConnectionClosed, match="found 1 client there"):
             async with asyncio.timeout(WITHIN_S):
                 await ben.recv()
-        await anna.wait(lambda: anna.has_alarm("ben found 1 guest there"), "alarm")
+        await anna.wait(lambda: anna.has_alarm("ben found 1 client there"), "alarm")
 
 
 async def test_an_address_that_cannot_be_had_is_refused_with_a_remedy(stage: Stage) -> None:
     with pytest.raises(CannotListen, match=str(stage.port)) as refused:
-        await WebServer(stage.hub, Doorkeeper(PASSES)).run("127.0.0.1", stage.port, lambda port: None)
+        await WebServer(stage.hub, Authenticator(RIGHTS)).run("127.0.0.1", stage.port, lambda port: None)
     assert "--port" in refused.value.remedy
 
 
@@ -330,7 +330,7 @@ async def test_why_is_answered(stage: Stage) -> None:
 async def test_the_recording_says_who_came_and_who_left(stage: Stage) -> None:
     async with stage.browser(ANYBODY, user="Carla"):
         pass
-    await stage.placer.wait(lambda: not stage.hub.guests)
+    await stage.placer.wait(lambda: not stage.hub.clients)
     await stage.placer.wait(lambda: any("Carla left" in row.what for row in stage.hub.team.log()))
     told = [row.what for row in stage.hub.team.log() if row.subject == "web"]
     assert told == ["Carla sat down: with priority 10", "Carla left: the browser has gone away"]

@@ -1,4 +1,4 @@
-"""Operators of one server share what is known of the mission, and nothing of their own."""
+"""Operators of one server share the model of the mission, and nothing of their own."""
 
 from __future__ import annotations
 

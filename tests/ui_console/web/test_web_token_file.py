@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone import run_files
-from ui_console.web.door import Doorkeeper, Pass, passes_for
+from ui_console.web.login import Authenticator, TokenRights, new_rights
 from ui_console.web.token_file import TokenFile, TokensNotKept, kept_or_new
 
-ANNA, BEN = Pass("anna", 120), Pass("ben", 80)
+ANNA, BEN = TokenRights("anna", 120), TokenRights("ben", 80)
 operators = st.dictionaries(st.sampled_from(["anna", "ben", "carla"]), st.integers(0, 200))
 
 
@@ -27,7 +27,7 @@ def private(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monkey
 
 @given(operators, operators)
 def test_who_had_a_token_has_the_same_with_the_priority_of_now(before: dict[str, int], now: dict[str, int]) -> None:
-    earlier, new = passes_for(before.items(), 50), passes_for(now.items(), 60)
+    earlier, new = new_rights(before.items(), 50), new_rights(now.items(), 60)
     kept = kept_or_new(new, earlier)
     assert sorted(kept.values(), key=str) == sorted(new.values(), key=str), "nobody more, nobody less"
     tokens = {granted.user: token for token, granted in earlier.items()}
@@ -39,8 +39,8 @@ def test_a_restarted_server_opens_with_the_tokens_of_its_forerunner(tmp_path: Pa
     first = kept_or_new({"one": ANNA, "two": BEN}, TokenFile(tmp_path, 8420).read())
     TokenFile(tmp_path, 8420).keep(first)
     second = kept_or_new({"three": ANNA}, TokenFile(tmp_path, 8420).read())
-    assert Doorkeeper(second).open_with("one") == ANNA
-    assert Doorkeeper(second).open_with("two") is None, "ben is not served any more"
+    assert Authenticator(second).rights_of("one") == ANNA
+    assert Authenticator(second).rights_of("two") is None, "ben is not served any more"
     assert TokenFile(tmp_path, 8421).read() == {}, "another port is another server"
 
 

@@ -68,7 +68,7 @@ async def wait_until(is_so: Callable[[], Any], what: str, within_s: float = 10.0
 
 
 class Wheels:
-    """What the wheels of a robot were told."""
+    """Commands to the wheels of a robot."""
 
     def __init__(self, stage: Stage, robot: str = "scout1") -> None:
         self._stage, self._robot = stage, robot

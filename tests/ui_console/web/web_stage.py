@@ -14,26 +14,26 @@ from fake_resource_pool import FakeArc, FakePlacer
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from backbone.addresses import LAUNCHER, RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
-from backbone.mission_log import AskLog, AskPeople, MissionLog, PeopleKnown
-from backbone.naming import LAUNCHER, Subsystem, address
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.mission_log.log import AskLog, AskPeople, MissionLog, PeopleKnown
+from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.wire import Envelope, Message
-from resource_pool.messages import EmergencyQuestion, EmergencyStop, EmergencyStopped, LiftStop
 from resource_pool.stop_latch import StopLatch
-from ui_console.web.door import Pass
+from resource_pool.stop_messages import EmergencyQuestion, EmergencyStop, EmergencyStopped, LiftStop
 from ui_console.web.hub import WebHub
+from ui_console.web.login import TokenRights
 
 MISSION = "web-test"
 HIGH, LOW, ANYBODY = "high-token", "low-token", "anybody"
-PASSES = {HIGH: Pass("anna", 100), LOW: Pass("ben", 50), ANYBODY: Pass("", 10)}
+RIGHTS = {HIGH: TokenRights("anna", 100), LOW: TokenRights("ben", 50), ANYBODY: TokenRights("", 10)}
 WITHIN_S = 15.0
 WIDTH_PX, HEIGHT_PX = 32, 24
 
@@ -110,12 +110,12 @@ class FakeRobot:
         return self.latch.state.is_stopped
 
     def stop(self, by: str, console: str, reason: str = "") -> None:
-        """Be stopped by somebody elsewhere."""
+        """Stop by an operator elsewhere."""
         self.latch.stop(by, reason, self._clock.now_s(), console)
         self._tell()
 
     def free(self) -> None:
-        """Have its stop lifted by somebody elsewhere."""
+        """Lift the stop by an operator elsewhere."""
         self.latch.lift(self.latch.state.number, "somebody", self._clock.now_s())
         self._tell()
 
@@ -140,7 +140,7 @@ class FakeRobot:
 
 
 class Stage:
-    """A mission with a web console and nobody before it yet."""
+    """A mission with a web console and no operator yet."""
 
     def __init__(self, network: Any, clock: MissionClock, placer: FakePlacer, rc_manager: Bus) -> None:
         self.placer, self.clock, self.rc_manager = placer, clock, rc_manager
@@ -157,18 +157,18 @@ class Stage:
 
     @property
     def address(self) -> str:
-        """Of the page, for somebody who says a name."""
+        """Address of the page, for a person who states a name."""
         return f"http://127.0.0.1:{self.port}/#token={ANYBODY}"
 
     def place_robots(self, *names: str) -> None:
-        """Have robots that can be stopped, and that nobody holds."""
+        """Add robots that can be stopped, without holders."""
         for name in names:
             bus = self._network.join(address(Subsystem.RESOURCE_POOL, name), self.clock)
             self.robots[name] = FakeRobot(bus, self.clock, name, self._stop_changed)
         self.publish_schedule(**dict.fromkeys(names, ""))
 
     def keep_log(self, events: Iterable[StoryEvent]) -> None:
-        """Have a launcher that has kept these events."""
+        """Add a launcher that has kept these events."""
         log, bus = MissionLog(), self._network.join(LAUNCHER, self.clock)
         for event in events:
             log.add(event)
@@ -180,7 +180,7 @@ class Stage:
         self._launchers.append(bus)
 
     def _stop_changed(self, latch: StopLatch) -> None:
-        """Have the ARCs of a stopped robot refuse what moves it."""
+        """Let the ARCs of a stopped robot refuse commands that move it."""
         state = latch.state
         facts = {"rc": state.rc, "number": state.number, "is_stopped": state.is_stopped, "by": state.by}
         refusal = EmergencyStopped(f"{state.rc} was stopped by {state.by}", **facts, reason="", since_s=state.at_s)
@@ -211,7 +211,7 @@ class Stage:
         return connect(f"ws://127.0.0.1:{self.port}/socket", compression=None, proxy=None, **options)
 
     def grant_all(self) -> None:
-        """Let every ARC have its robot at once, as if nobody else were there."""
+        """Grant every ARC its robot at once, as if no other ARC were there."""
 
         def grant(arc: FakeArc) -> None:
             arc.bus.start(arc.grant())  # type: ignore[attr-defined]
@@ -229,7 +229,7 @@ class Stage:
         self.rc_manager.publish(RC_MANAGER, Conversation.SCHEDULE, schedule)
 
     def answer_who_holds(self) -> None:
-        """Have the RC manager know of every ARC; those that are granted hold their robot."""
+        """Let the RC manager know every ARC; granted ARCs hold their robots."""
 
         async def answer(_asked: Envelope[Any]) -> Message:
             now_s = self.clock.now_s()

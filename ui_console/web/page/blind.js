@@ -1,4 +1,4 @@
-// What is across the screen while this page cannot stop a robot, or what it shows is old.
+// The warning across the screen while this page cannot stop a robot, or its content is old.
 
 import { set } from "./text.js";
 
@@ -7,8 +7,8 @@ import { set } from "./text.js";
 const LOOK_EVERY_MS = 250;
 
 /**
- * Says that the page is cut off, since when, and what else stops robots; everything is gray meanwhile. A server that
- * does not hear the mission counts as well: its page is connected, and stops nothing.
+ * Shows that the page is cut off, since when, and other means to stop robots; the page is gray meanwhile. A server
+ * without a link to the mission counts as well: its page is connected, and cannot stop a robot.
  */
 export class Blindness {
   /**
@@ -28,7 +28,7 @@ export class Blindness {
   }
 
   /**
-   * Since when the server does not hear the mission, in milliseconds; negative: it does.
+   * Since when the server has no link to the mission, in milliseconds; negative: it has one.
    *
    * @param {number} ageMs
    */

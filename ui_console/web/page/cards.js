@@ -1,4 +1,4 @@
-// One card for each robot: its newest picture, who has it, and what can be done about it. One of them is large.
+// One card for each robot: its newest picture, its holder, and the operator's actions. One card is large.
 
 import { make } from "./dom.js";
 import { actWhenHeld } from "./holding.js";
@@ -9,10 +9,10 @@ import { lasting, set } from "./text.js";
 /** @import { Act, Picture, Say } from "./types.d.ts" */
 
 const LOOK_EVERY_MS = 250;
-const HOLD = "hold to lift"; // what the model says of a stop that nobody else has a say in; the button says it
-const MOST_WATCHED = 16; // what the server takes
+const HOLD = "hold to lift"; // the model's line for a stop that this operator alone may lift; the button shows it
+const MOST_WATCHED = 16; // the server's limit
 
-/** Shows all robots, one of them on the stage; `act(what, robot, more)` does what a person wants. */
+/** Shows all robots, one of them on the stage; `act(what, robot, more)` carries out a person's action. */
 export class Cards {
   /** @param {{ stage: HTMLElement, thumbs: HTMLElement, say: Say, act: Act }} given */
   constructor({ stage, thumbs, say, act }) {
@@ -30,7 +30,7 @@ export class Cards {
   }
 
   /**
-   * Show these robots; a card that was there stays, with its picture.
+   * Show these robots; an existing card stays, with its picture.
    *
    * @param {RobotView[]} robots
    * @param {Partial<OwnView>} own
@@ -69,7 +69,7 @@ export class Cards {
   }
 
   /**
-   * Show this one large; who was about to press something on a card still is.
+   * Show this one large; a press that is under way on a card still hits its button.
    *
    * @param {string} name
    */
@@ -102,12 +102,12 @@ export class Cards {
     return document.activeElement?.closest(".robot")?.getAttribute("data-robot") ?? this.large;
   }
 
-  /** What is held down on a card counts no more. */
+  /** A button that is held down on a card counts no more. */
   letGo() {
     for (const card of this.cards.values()) card.dropLift();
   }
 
-  /** The connection ended: who has which robot is not known here. */
+  /** The connection ended: this page no longer knows the robots' holders. */
   cut() {
     for (const card of this.cards.values()) {
       card.root.classList.remove("is-mine");
@@ -128,7 +128,7 @@ class Card {
     this.root.dataset.robot = name;
     this.root.setAttribute("aria-label", `robot ${name}`);
     this.screen = new Screen({ name, drawn });
-    // What stands over the picture of a stopped robot: whose stop it is, and far from every Stop what lifts it.
+    // Over the picture of a stopped robot: the authors of the stop, and the lift button far from every Stop.
     this.standing = make("div", "standing");
     this.standing.hidden = true;
     this.whose = make("p", "whose");
@@ -200,7 +200,7 @@ class Card {
 
   /** @param {StopView | null} stop */
   fillStop(stop) {
-    if (stop?.number !== this.stop?.number) this.dropLift(); // what is held was meant for another stop
+    if (stop?.number !== this.stop?.number) this.dropLift(); // the held button was meant for another stop
     this.stop = stop;
     this.root.classList.toggle("is-stopped", stop !== null);
     this.standing.hidden = stop === null;

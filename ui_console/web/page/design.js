@@ -1,4 +1,4 @@
-// The designer's page: joins the connection, the parts, the tree, the details, and what lies below.
+// The designer's page: joins the connection, the parts, the tree, the details, and the panes below.
 
 import { Acts } from "./design_acts.js";
 import { Adding } from "./design_adding.js";
@@ -67,7 +67,7 @@ followTheme(find("theme", HTMLSelectElement));
 let wasDown = true;
 
 /**
- * What was said last is not done: say so where it was meant.
+ * The server refused the last message: show that at its place.
  *
  * @param {string} text
  * @param {string} remedy
@@ -79,7 +79,7 @@ function refused(text, remedy) {
   if (!adding.isAskedAgain(underway, why)) notice(text, remedy);
 }
 
-// ---------------------------------------------------------------- what is heard
+// ---------------------------------------------------------------- messages of the server
 /** @param {LinkChange} to */
 function changed({ is, why }) {
   const shown = find("link");
@@ -89,7 +89,7 @@ function changed({ is, why }) {
   if (is === "fresh") {
     if (wasDown) came();
     return;
-  } // else it was only not heard for a moment
+  } // else the server was only silent for a moment
   wasDown = true;
   changes.drop();
   if (is === "refused") {
@@ -164,7 +164,7 @@ function saved({ saved, problems }) {
 async function fileChanged({ file_changed, name }) {
   const overwrite = {
     label: "Overwrite it",
-    doc: "What somebody else wrote there is gone.",
+    doc: "The changes of others in that file are lost.",
     act: () => change(() => ({ do: "save", name, overwrite: true })),
   };
   const take = {
@@ -178,7 +178,7 @@ async function fileChanged({ file_changed, name }) {
 }
 
 /**
- * Do what a key means in the tree; returns whether it means anything.
+ * Carry out a key in the tree; returns whether it has a meaning.
  *
  * @param {KeyboardEvent} event
  */

@@ -1,4 +1,4 @@
-// What buttons and keys do to the chosen element and to the draft; all that dragging does can be done by them too.
+// Actions of buttons and keys on the chosen element and the draft; they can do everything that dragging can.
 
 import { ask, choose } from "./design_dialogs.js";
 import { notice, titleOf } from "./design_status.js";
@@ -76,7 +76,7 @@ export class Acts {
   }
 
   /**
-   * Do what a key of the tree means; returns whether it means anything.
+   * Carry out a key of the tree; returns whether it has a meaning.
    *
    * @param {KeyboardEvent} event
    */
@@ -106,7 +106,7 @@ export class Acts {
   }
 
   /**
-   * Have the buttons allow what can be done to the chosen element.
+   * Enable the buttons whose actions the chosen element allows.
    *
    * @param {ElementView} element
    */

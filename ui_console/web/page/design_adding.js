@@ -1,4 +1,4 @@
-// What is added to an element: the questions of an offer, and again when its answers were refused.
+// Additions to an element: the questions of an offer, again after refused answers.
 
 import { ask } from "./design_dialogs.js";
 
@@ -12,11 +12,11 @@ export class Adding {
     this.places = places;
     this.view = view;
     /** @type {OfferView | null} */
-    this.asked = null; // the questions of the dialog whose answers were said last
+    this.asked = null; // the questions of the dialog whose answers were sent last
   }
 
   /**
-   * Take an offer at an element, once what it asks was answered.
+   * Take an offer at an element, once its questions are answered.
    *
    * @param {Path} path
    * @param {OfferView} offer

@@ -1,4 +1,4 @@
-// An element in the hand: taken up by a button or a key, put into the one that is chosen next.
+// A carried element: taken up by a button or a key, put into the next chosen element.
 
 import { notice } from "./design_status.js";
 import { isWithin } from "./design_tree.js";
@@ -19,7 +19,7 @@ export class Carrying {
     this.carried = null;
   }
 
-  /** Take up the chosen element, or drop what is in the hand. */
+  /** Take up the chosen element, or drop the carried one. */
   toggle() {
     if (this.carried) this.drop();
     else this.take(this.tree.at);
@@ -46,7 +46,7 @@ export class Carrying {
   }
 
   /**
-   * Put what is carried into an element, or beside it; returns whether that was done.
+   * Put the carried element into another one, or beside it; returns whether that was done.
    *
    * @param {Path} path
    */

@@ -3,10 +3,10 @@
 /** @import { DraftChange, MakeChange } from "./design_types.d.ts" */
 
 /**
- * Says a change as soon as the one before it was done; what it is about is looked at only then, or refused as too old.
+ * Sends a change as soon as the one before it was done; it is made only then, so that it is not refused as too old.
  *
  * `say` returns whether it was sent, `revision` the draft's, undefined if none is known yet; `refused` is called when a
- * change cannot be said.
+ * change cannot be sent.
  */
 export class Changes {
   /**
@@ -20,7 +20,7 @@ export class Changes {
     /** @type {MakeChange[]} */
     this.waiting = [];
     /** @type {DraftChange | null} */
-    this.underway = null; // what was said and is neither done nor refused yet
+    this.underway = null; // the change that was sent and is neither done nor refused yet
   }
 
   /** @param {MakeChange} make */
@@ -29,13 +29,13 @@ export class Changes {
     this.pump();
   }
 
-  /** The server has done or refused what was said last. */
+  /** The server has carried out or refused the last change. */
   handled() {
     this.underway = null;
     this.pump();
   }
 
-  /** The connection ended: nothing of it is said any more. */
+  /** The connection ended: drop all changes. */
   drop() {
     this.underway = null;
     this.waiting.length = 0;

@@ -1,9 +1,9 @@
-// The element that is chosen, and what waits until all about it is shown.
+// The chosen element, and the action that waits until it is shown.
 
 /** @import { DesignView, ElementView, Select } from "./design_messages.d.ts" */
 /** @import { Path } from "./design_types.d.ts" */
 
-/** Numbers this page's choices: an answer to an older one is not what is chosen now. */
+/** Numbers this page's choices: an answer to an older choice is ignored. */
 export class Choice {
   /** @param {{ view: Partial<DesignView>, say: (message: Select) => void }} given */
   constructor({ view, say }) {
@@ -25,13 +25,13 @@ export class Choice {
     this.say({ do: "select", path, number: this.number });
   }
 
-  /** All about the chosen element; undefined: a newer choice is on its way. */
+  /** The chosen element; undefined: a newer choice is on its way. */
   get element() {
     return this.view.selected === this.number ? this.view.element : undefined;
   }
 
   /**
-   * Do something as soon as all about the chosen element has been heard.
+   * Run an action as soon as the chosen element has arrived.
    *
    * @param {(element: ElementView) => void} act
    */

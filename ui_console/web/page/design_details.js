@@ -1,4 +1,4 @@
-// All about the chosen element: what can be set of it, and what is wrong.
+// The chosen element: its properties, and its problems.
 
 import { makeInput } from "./design_dialogs.js";
 import { keyOf } from "./design_tree.js";
@@ -8,15 +8,15 @@ import { find, keepingFocus, make, makeButton } from "./dom.js";
 /** @import { Input, Path } from "./design_types.d.ts" */
 
 /**
- * Where a property of an element is written: what is set, and what was said last and is not done yet.
+ * The field of a property: the value that is set, and the value that was sent last and is not set yet.
  *
  * @typedef {{ path: Path, property: Property, input: Input, refused: HTMLElement, is: string,
  *   said: string | null }} Field
  */
 
 /**
- * What can be set of the chosen element; `set(path, property, value)` is called when a field was changed. A value that
- * was refused stays in its field, marked, until it is changed; Escape brings back what is set.
+ * Properties of the chosen element; `set(path, property, value)` is called when a field was changed. A refused value
+ * stays in its field, marked, until it is changed; Escape brings back the value that is set.
  */
 export class Details {
   /**
@@ -57,7 +57,7 @@ export class Details {
 
   /** @param {ElementView} element */
   rebuild({ path, properties }) {
-    const set = make("button", "", "Set"); // what Enter presses
+    const set = make("button", "", "Set"); // Enter presses it
     set.hidden = properties.length === 0;
     this.fields = new Map(properties.map((one) => [propertyKey(one), this.field(path, one)]));
     const labels = [...this.fields.values()].map((field) => labelled(field));
@@ -83,7 +83,7 @@ export class Details {
   }
 
   /**
-   * Have the value set that is written in a field, once.
+   * Send the value of a field, once.
    *
    * @param {Field} field
    */
@@ -95,7 +95,7 @@ export class Details {
   }
 
   /**
-   * A value was not taken: say so where it stands.
+   * A value was refused: show that at its field.
    *
    * @param {Path} path
    * @param {{ name: string, is_parameter?: boolean }} property
@@ -111,7 +111,7 @@ export class Details {
   }
 
   /**
-   * Show the value, unless another one is just being written, or was refused and nothing has changed since.
+   * Show the value, unless a person is writing another one, or one was refused and nothing has changed since.
    *
    * @param {Property} one
    */
@@ -163,7 +163,7 @@ function takeBack(field) {
 const propertyKey = ({ name, is_parameter }) => `${is_parameter ? "parameter " : ""}${name}`;
 
 /**
- * Show all problems; `go(path)` is called with the element of the one that was pressed.
+ * Show all problems; `go(path)` is called with the element of a pressed one.
  *
  * @param {HTMLElement} root
  * @param {ProblemRow[]} rows

@@ -1,8 +1,8 @@
-// Questions: one dialog to answer, one to choose, one to read. Each is a promise; null means that nothing was chosen.
+// Questions: one dialog to answer, one to choose, one to read. Each is a promise; null: the person chose nothing.
 
 import { find, make, makeButton, query } from "./dom.js";
 
-/** @import { Asked } from "./design_messages.d.ts" */
+/** @import { Prompt } from "./design_messages.d.ts" */
 /** @import { Input } from "./design_types.d.ts" */
 
 /**
@@ -10,7 +10,7 @@ import { find, make, makeButton, query } from "./dom.js";
  *
  * @param {string} title
  * @param {string} doc
- * @param {Asked[]} asks
+ * @param {Prompt[]} asks
  * @param {string} [refused] Why earlier answers were not taken.
  * @returns {Promise<string[] | null>}
  */
@@ -96,7 +96,7 @@ export function read(title, text, line = 1) {
 }
 
 /**
- * Makes an input, or a select where what can be meant can be listed.
+ * Makes an input, or a select if the choices can be listed.
  *
  * @param {string[]} choices
  * @returns {Input}
@@ -121,7 +121,7 @@ function item(option, choose) {
 /**
  * A labelled input; Enter in a select is the form's, as in any other.
  *
- * @param {Asked} asked
+ * @param {Prompt} asked
  * @param {string} id
  */
 function field(asked, id) {

@@ -1,4 +1,4 @@
-// Dragging by mouse, pen or finger: one path for all of them, for a finger drags nothing by the browser's own means.
+// Dragging by mouse, pen or finger: one implementation for all, because browsers have no dragging by finger.
 
 import { around, make } from "./dom.js";
 
@@ -7,20 +7,20 @@ import { around, make } from "./dom.js";
 const BEGINS_AFTER_PX = 6; // chosen: a click that shakes is still a click
 const EDGE_PX = 48; // chosen: about a finger; nearer to the edge than this the tree scrolls
 const SCROLL_PX = 10; // a frame
-const BORDER_SHARE = 0.28; // chosen: of a row's height, above and below, where the place between rows is meant
+const BORDER_SHARE = 0.28; // chosen: of a row's height, above and below, that means the place between rows
 
 /**
- * What is held by a pointer; it is dragged once it has a ghost.
+ * The element held by a pointer; it is dragged once it has a ghost.
  *
  * @typedef {{ pointer: number, x: number, y: number, source: HTMLElement, what: Dragged, ghost: HTMLElement | null,
  *   place: DropPlace | null }} Held
  */
 
 /**
- * Whatever has `data-drag` can be dragged: by a mouse anywhere, by a finger at its `.handle`, so that fingers still
+ * Elements with `data-drag` can be dragged: by a mouse anywhere, by a finger at their `.handle`, so that fingers still
  * scroll.
  *
- * `what(source)` says what is dragged, or null; `place(what, row, part)` says what a drop there would mean, or null.
+ * `what(source)` returns the dragged element, or null; `place(what, row, part)` the meaning of a drop there, or null.
  */
 export class Drag {
   /**
@@ -96,7 +96,7 @@ export class Drag {
   }
 
   /**
-   * Show where it would go now.
+   * Show its place if it were dropped now.
    *
    * @param {Held} held
    * @param {HTMLElement} ghost

@@ -5,14 +5,6 @@ export interface AskAnswer {
   path: number[];
 }
 
-export interface Asked {
-  name: string;
-  doc: string;
-  proposed: string;
-  choices: string[];
-  is_required: boolean;
-}
-
 export interface DesignView {
   welcome: DesignerWelcomed;
   tree: ElementRow[];
@@ -74,7 +66,7 @@ export interface NoticeAnswer {
 export interface OfferView {
   label: string;
   doc: string;
-  asks: Asked[];
+  asks: Prompt[];
 }
 
 export interface PaletteRow {
@@ -93,6 +85,14 @@ export interface ProblemRow {
   message: string;
   remedy: string;
   path: number[];
+}
+
+export interface Prompt {
+  name: string;
+  doc: string;
+  proposed: string;
+  choices: string[];
+  is_required: boolean;
 }
 
 export interface Property {
@@ -142,7 +142,7 @@ export interface TurnView {
   who: string;
 }
 
-export interface Beat {
+export interface BeatRequest {
   do: "beat";
   number: number;
 }
@@ -240,7 +240,7 @@ export type Heard = { view: Partial<DesignView>; answer?: undefined } | { answer
 
 export type Said =
   | Hello
-  | Beat
+  | BeatRequest
   | Select
   | TakeOffer
   | SetProperty

@@ -5,7 +5,7 @@ import { keepingFocus, make, makeButton, query } from "./dom.js";
 
 /** @import { PaletteRow } from "./design_messages.d.ts" */
 
-/** `add(label)` adds a part to the chosen element, `learn(type)` asks its class what it is. */
+/** `add(label)` adds a part to the chosen element, `learn(type)` looks its class up. */
 export class Palette {
   /**
    * @param {{ root: HTMLElement, filter: HTMLInputElement, add: (label: string) => void,
@@ -16,7 +16,7 @@ export class Palette {
     this.filter = filter;
     this.add = add;
     this.learn = learn;
-    this.learning = ""; // the type that was asked last
+    this.learning = ""; // the type that was looked up last
     /** @type {PaletteRow[]} */
     this.rows = [];
     filter.addEventListener("input", () => this.draw());

@@ -1,4 +1,4 @@
-// Where an element or a part may go, and what it means to let go of it there.
+// Places for an element or a part, and the meaning of a drop there.
 
 import { isWithin, numberOf, pathOf } from "./design_tree.js";
 
@@ -6,7 +6,7 @@ import { isWithin, numberOf, pathOf } from "./design_tree.js";
 /** @import { Tree } from "./design_tree.js" */
 /** @import { Change, Dragged, DropPlace, Path, RowPart } from "./design_types.d.ts" */
 
-const AT_THE_MISSION = ["behavior", "resource", "world", "type"]; // what the server puts in the right section by itself
+const AT_THE_MISSION = ["behavior", "resource", "world", "type"]; // the server puts these into their sections by itself
 
 export class Places {
   /** @param {{ tree: Tree, view: Partial<DesignView>, change: Change }} given */
@@ -17,7 +17,7 @@ export class Places {
   }
 
   /**
-   * What is dragged by an element of the page; null: nothing that is known.
+   * The dragged thing of an element of the page; null: none is known.
    *
    * @param {HTMLElement} source
    * @returns {Dragged | null}
@@ -31,7 +31,7 @@ export class Places {
   }
 
   /**
-   * What it would mean to let go of something here; null: it cannot go there.
+   * The meaning of a drop here; null: it is not possible.
    *
    * @param {Dragged} what
    * @param {HTMLElement} node
@@ -66,7 +66,7 @@ export class Places {
   }
 
   /**
-   * The element that gets what is let go of here: itself, its ARC for a wish, or the nearest above that can hold it.
+   * The element that gets a drop here: itself, its ARC for a wish, or the nearest ancestor that can hold it.
    *
    * @param {string} tag
    * @param {Path} path

@@ -1,4 +1,4 @@
-// What the designer's page says in passing: how the draft is, who else is here, and notices.
+// Status line of the designer's page: state of the draft, other designers, and notices.
 
 import { find, makeNotice } from "./dom.js";
 
@@ -14,7 +14,7 @@ const NOTICES = 3;
 export const titleOf = ({ source }) => source.slice(source.lastIndexOf("/") + 1);
 
 /**
- * Show how the draft is, and which commands it allows.
+ * Show the state of the draft, and enable the commands it allows.
  *
  * @param {DraftStatus} status
  */
@@ -32,7 +32,7 @@ export function showStatus(status) {
 }
 
 /**
- * Show who else works on the draft.
+ * Show the other designers.
  *
  * @param {string[]} people
  * @param {string} [user] Who this is.
@@ -43,7 +43,7 @@ export function showPeople(people, user) {
 }
 
 /**
- * Say something that a person has seen when they say so, or when newer ones need its place.
+ * Show a notice until the person closes it, or newer ones need its place.
  *
  * @param {string} text
  * @param {string} remedy

@@ -1,11 +1,11 @@
-// The tree of the mission: rows, one of them chosen, folded or not, gone through by keys.
+// The tree of the mission: rows, one of them chosen, folded or not, with keys to move.
 
 import { around, make, query, queryAll } from "./dom.js";
 
 /** @import { ElementRow } from "./design_messages.d.ts" */
 /** @import { Path } from "./design_types.d.ts" */
 
-const FOLDED_AT_FIRST = ["core", "types"]; // what is the same in most missions, and filled by what is added elsewhere
+const FOLDED_AT_FIRST = ["core", "types"]; // the same in most missions, and filled by additions elsewhere
 
 /** @param {Path} path */
 export const keyOf = (path) => path.join("/");
@@ -17,11 +17,11 @@ export const keyOf = (path) => path.join("/");
 export const pathOf = (key) => (key ? key.split("/").map(Number) : []);
 
 /**
- * The number of an element in what holds it.
+ * The number of an element in its parent.
  *
  * @param {Path} path
  */
-export const numberOf = (path) => path.at(-1) ?? 0; // nothing holds the mission itself
+export const numberOf = (path) => path.at(-1) ?? 0; // the mission itself has no parent
 
 /**
  * @param {Path} path
@@ -31,15 +31,15 @@ export const isWithin = (path, above) =>
   above.every((number, depth) => path[depth] === number) && path.length >= above.length;
 
 /**
- * What is folded stays so wherever it is moved.
+ * A folded element stays folded when it is moved.
  *
  * @param {ElementRow} row
  */
 const nameOf = (row) => `${row.path.length} ${row.tag} ${row.told}`;
 
 /**
- * Shows rows; `choose(path, isTouched)` is called when a hand or a key chooses one, `key(event)` for keys that the tree
- * does not know, and returns whether it did something.
+ * Shows rows; `choose(path, isTouched)` is called when a pointer or a key chooses one, `key(event)` for keys that the
+ * tree does not know; it returns whether the key had a meaning.
  */
 export class Tree {
   /**
@@ -120,7 +120,7 @@ export class Tree {
   }
 
   /**
-   * Mark the element that the server says is chosen.
+   * Mark the element that the server reports as chosen.
    *
    * @param {Path} path
    */
@@ -158,13 +158,13 @@ export class Tree {
     }
   }
 
-  /** The rows that are in no folded one. */
+  /** The rows outside of folded ones. */
   shown() {
     const shown = [];
     /** @type {Path | null} */
     let folded = null;
     for (const row of this.rows) {
-      // in the order of the text, so what is in a folded one follows it
+      // in the order of the text, so the content of a folded element follows it
       if (folded !== null && isWithin(row.path, folded)) continue;
       shown.push(row);
       folded = this.isFolded(row) ? row.path : null;
@@ -208,7 +208,7 @@ export class Tree {
   }
 
   /**
-   * Do what a key means that goes through the tree; returns whether it means anything.
+   * Carry out a key that moves through the tree; returns whether it has a meaning.
    *
    * @param {string} key
    * @param {ElementRow} row The chosen one.
@@ -240,7 +240,7 @@ export class Tree {
 const isFoldedAtFirst = (row) => row.path.length === 1 && FOLDED_AT_FIRST.includes(row.tag);
 
 /**
- * Something that a screen reader says in other words.
+ * An element with other words for a screen reader.
  *
  * @param {string} className
  * @param {string} text

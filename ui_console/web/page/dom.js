@@ -83,7 +83,7 @@ export function around(event, selector) {
 }
 
 /**
- * Makes a text of this kind that goes away when a person has seen it.
+ * Makes a text of this kind that a person can close.
  *
  * @param {string} kind
  * @param {string} text
@@ -114,7 +114,7 @@ export function stepped(key, all, chosen) {
 }
 
 /**
- * Draws what is in `root` anew; the focus stays on the element with the same `data-key`.
+ * Draws the content of `root` anew; the focus stays on the element with the same `data-key`.
  *
  * @param {HTMLElement} root
  * @param {() => void} draw

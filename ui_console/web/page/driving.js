@@ -1,4 +1,4 @@
-// Hands: pad, keys and gamepad become one stick, which is told again and again while it is held, and never otherwise.
+// Controls: pad, keys and gamepad become one stick, which is sent repeatedly while it is held, and never otherwise.
 
 import { DRIVES } from "./keys.js";
 
@@ -11,11 +11,11 @@ const BUTTONS = { 0: "jump", 1: "stop_mine", 3: "stop_all", 8: "release", 9: "ta
 const DEAD_ZONE = 0.12; // chosen: worn sticks rest within it
 
 /**
- * Says where the stick is while something holds it, and one stop when nothing does any more.
+ * Sends the stick's position while a control is held, and one stop after it.
  *
- * `does` is called with what a gamepad's button asks for; `hint` is shown while something is held that counts no more.
- * What is held when `letGo` is called counts no more, until it was let go and is held anew: a key pressed, a finger put
- * down, the gamepad's shoulder button pressed again.
+ * `does` is called with the action of a gamepad's button; `hint` is shown while a held control counts no more. A
+ * control that is held when `letGo` is called counts no more, until it was let go and is held anew: a key pressed, a
+ * finger put down, the gamepad's shoulder button pressed again.
  */
 export class Driving {
   /**
@@ -30,7 +30,7 @@ export class Driving {
     this.isClogged = isClogged;
     this.speed = speed;
     this.moment = moment;
-    this.pressedAt = 0; // the moment at which what is held was pressed
+    this.pressedAt = 0; // the moment at which the held control was pressed
     this.isOn = false;
     /** @type {Set<string>} */
     this.keys = new Set();
@@ -63,7 +63,7 @@ export class Driving {
   }
 
   /**
-   * Whether there is a robot to drive; hands count only from then on.
+   * Whether there is a robot to drive; controls count only from then on.
    *
    * @param {boolean} isOn
    */
@@ -75,7 +75,7 @@ export class Driving {
   }
 
   /**
-   * What is wanted now: [forward, right], or null if nothing is held.
+   * The wish now: [forward, right], or null if no control is held.
    *
    * @returns {Stick | null}
    */
@@ -131,7 +131,7 @@ export class Driving {
     this.update();
   }
 
-  /** Nothing is held any more, whatever the hands do; a stop is said if something was, or if it has to be. */
+  /** Count no control as held; send a stop if one was held, or if it has to be sent. */
   letGo(always = false) {
     const wasHeld = this.timer !== 0;
     if (wasHeld) this.hint.hidden = false;
@@ -170,20 +170,20 @@ export class Driving {
     } else if (this.timer === 0) {
       this.hint.hidden = true;
       this.pressedAt = this.moment();
-      this.timer = setInterval(() => this.tell(), SAY_EVERY_MS);
-      this.tell();
+      this.timer = setInterval(() => this.send(), SAY_EVERY_MS);
+      this.send();
     }
   }
 
-  tell() {
+  send() {
     const wanted = this.wanted();
-    if (wanted === null || this.isClogged()) return; // what cannot leave now must not arrive late
+    if (wanted === null || this.isClogged()) return; // a message that cannot leave now must not arrive late
     const [forward, right] = wanted;
     this.say({ do: "drive", moment: this.pressedAt, forward, right, speed_rad_s: this.speed() });
   }
 }
 
-/** A gamepad as it was felt last. Pure: `feel` gets what the browser says of it. */
+/** The newest state of a gamepad. Pure: `feel` gets the browser's report. */
 export class Gamepad {
   /** @param {(what: string) => void} does */
   constructor(does) {
@@ -195,14 +195,14 @@ export class Gamepad {
     this.pressed = null;
   }
 
-  /** What is held counts no more. */
+  /** Held buttons count no more. */
   spend() {
     this.stick = null;
     this.isSpent = true;
   }
 
   /**
-   * Take in how it is; undefined: it is away, or it is another window's.
+   * Take in its state; undefined: it is away, or another window has it.
    *
    * @param {{ buttons: readonly { pressed: boolean }[], axes: readonly number[] } | undefined} device
    */

@@ -1,8 +1,8 @@
-// How old what is shown can be at most. Pure: times are milliseconds of a clock that the caller has.
+// Largest possible age of the page's content. Pure: times are milliseconds of the caller's clock.
 
 /**
- * Each beat goes to the server and comes back with what it says next. What is shown is at most as old as the newest
- * beat that came back: that holds however long anything waited on its way, at the server, or in a page that slept.
+ * Each beat goes to the server and comes back with its next message. The content is at most as old as the newest beat
+ * that came back: that holds for any delay on the way, at the server, or in a page that slept.
  */
 export class Freshness {
   constructor() {
@@ -13,7 +13,7 @@ export class Freshness {
   }
 
   /**
-   * A connection began: whatever it brings is newer than this.
+   * A connection began: all its messages are newer than this.
    *
    * @param {number} now
    */

@@ -1,4 +1,4 @@
-// This operator's own part: what is held, what was lost, who asks for it.
+// This operator's own part: the robot held, the robot lost, the questions of others.
 
 import { find } from "./dom.js";
 import { lasting, set } from "./text.js";
@@ -9,7 +9,7 @@ import { lasting, set } from "./text.js";
 
 const MEMORY = "held";
 
-/** Shows `own` of the view; `act(what, name)` does what a person wants. */
+/** Shows `own` of the view; `act(what, name)` carries out a person's action. */
 export class Hand {
   /** @param {{ act: Act, driving: Driving }} given */
   constructor({ act, driving }) {
@@ -65,7 +65,7 @@ export class Hand {
   }
 
   /**
-   * The connection ended: what was held may be somebody else's by now.
+   * The connection ended: another operator may have the robot by now.
    *
    * @param {string} why
    * @param {number} ageMs
@@ -88,7 +88,7 @@ export class Hand {
     this.own = own;
     this.now_s = now_s;
     if (isOther(before, own))
-      this.driving.letGo(own.is_held); // what is held down was meant for another moment
+      this.driving.letGo(own.is_held); // a held control was meant for an earlier moment
     else if (own.moment !== before?.moment) this.driving.letGo();
     this.driving.turn(own.is_held);
     if (own.is_asked) this.memory.forget();
@@ -108,7 +108,7 @@ export class Hand {
     document.body.classList.toggle("is-asking", own.is_asked);
   }
 
-  /** Say which robot was lost, when and why, and offer it again: the server's word first, then what this page saw. */
+  /** Show the lost robot with time and reason, and offer it again: by the server's report, else by this page's own. */
   showLost() {
     const told = this.own?.lost ?? null;
     const kept = told === null ? this.memory.kept : null;
@@ -134,7 +134,7 @@ export class Hand {
 }
 
 /**
- * Is this another robot, hold or stop than that, so that whatever is held down has to be let go first?
+ * Is this another robot, hold or stop than that, so that held controls have to be let go first?
  *
  * @param {OwnView | null} before
  * @param {OwnView} own
@@ -149,7 +149,7 @@ export function isOther(before, own) {
   );
 }
 
-/** What this tab held when its connection ended: it outlives the connection, a reload, and the server. */
+/** The robot this tab held when its connection ended: the record outlives the connection, a reload, and the server. */
 class Memory {
   /**
    * @param {string} robot

@@ -1,9 +1,9 @@
-// A button that acts only when it was held for a second, by pointer or by Enter: nobody lifts a stop by pressing twice.
+// A button that acts only when it was held for a second, by pointer or by Enter: a double press never lifts a stop.
 
-export const HOLD_MS = 1000; // chosen: longer than any double press, short enough for whoever means it
+export const HOLD_MS = 1000; // chosen: longer than any double press, short enough for a person who means it
 
 /**
- * Have `act` called once the button was held; whatever else happens lets it go. Space never holds: it stops.
+ * Call `act` once the button was held; any other event lets it go. Space never holds: it stops.
  *
  * @param {HTMLButtonElement} button
  * @param {() => void} act

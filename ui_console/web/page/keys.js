@@ -1,4 +1,4 @@
-// What a key means at this moment. Pure: a key and where it is pressed go in, an act comes out.
+// The meaning of a key at this moment. Pure: a key and its place go in, an act comes out.
 
 /** @type {Record<string, [number, number]>} */
 export const DRIVES = {
@@ -18,11 +18,10 @@ const SPEEDS = { "+": "faster", "=": "faster", "-": "slower" };
 const NO_TEXT = ["range", "checkbox", "radio", "button", "submit", "reset", "color", "file"];
 
 /**
- * Returns {act, isTaken}, or null: the key means what it means to the browser. If `isTaken`, the browser must not do
- * anything with it.
+ * Returns {act, isTaken}, or null: the key is left to the browser. If `isTaken`, the browser must ignore it.
  *
- * Stops are heard wherever the focus is, in dialogs and in fields too. Drives are heard everywhere but where arrows and
- * letters write, and not while a dialog asks for something.
+ * Stops work with any focus, in dialogs and in fields too. Drives work everywhere but where arrows and letters write,
+ * and not while a dialog is open.
  *
  * @typedef {{ key: string, code: string, isRepeat: boolean, hasModifier: boolean }} Key Of the event.
  * @typedef {{ isText: boolean, isRed: boolean, isDialog: boolean, isHeld: boolean }} Place A text is written there; a
@@ -54,7 +53,7 @@ function isStopTaken(key, at) {
 }
 
 /**
- * Says whether what is typed there is written.
+ * Returns whether typed keys are written there.
  *
  * @param {HTMLElement} element
  */
@@ -63,7 +62,7 @@ export function isText(element) {
   return element.tagName === "INPUT" && !NO_TEXT.includes(/** @type {HTMLInputElement} */ (element).type);
 }
 
-/** Listens to every key of the page; `does` is called with an act and the key's code, `isHeld` says what is driven. */
+/** Takes every key of the page; `does` is called with an act and the key's code, `isHeld`: a robot is held. */
 export class Keys {
   /** @param {{ does: (what: string, code: string) => void, isHeld: () => boolean }} given */
   constructor({ does, isHeld }) {
@@ -104,7 +103,7 @@ export class Keys {
 }
 
 /**
- * Have the letter written that stops otherwise.
+ * Write the letter that stops otherwise.
  *
  * @param {KeyboardEvent} event
  */

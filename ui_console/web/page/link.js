@@ -1,21 +1,21 @@
-// The connection to the server: says who is there, comes back by itself, hands on what is heard, knows how old it is.
+// The connection to the server: authenticates, reconnects by itself, passes messages on, knows their age.
 
 import { Freshness, makeClock } from "./freshness.js";
 
-/** @import { Beat } from "./messages.d.ts" */
+/** @import { BeatRequest } from "./messages.d.ts" */
 /** @import { LinkChange, LinkState, Picture } from "./types.d.ts" */
 
 const AGAIN_FIRST_MS = 500; // chosen: a server that was restarted is back soon
 const AGAIN_MOST_MS = 5000; // chosen: a person waits no longer before looking
-const BEAT_EVERY_MS = 250; // chosen: what is shown is known to be fresh to a quarter of a second
+const BEAT_EVERY_MS = 250; // chosen: the age of the content is known to a quarter of a second
 const LOOK_EVERY_MS = 100;
-const OLD_MS = 800; // chosen: with the looks between, it is said before what is shown is a second old
-const SILENT_MS = 2000; // chosen: eight beats that did not come back; no browser tells that a network is gone
+const OLD_MS = 800; // chosen: with the looks between, the warning comes before the content is a second old
+const SILENT_MS = 2000; // chosen: eight beats that did not come back; no browser reports that a network is gone
 const NOT_LET_IN = 1008;
 
 /**
- * One connection at a time; `heard` gets objects, `saw` gets pictures, `changed` gets {is, why, ageMs}, where `is` says
- * whether what is shown is "fresh", "old" (nothing came back for most of a second), "down", or "refused" (wrong token).
+ * One connection at a time; `heard` gets objects, `saw` gets pictures, `changed` gets {is, why, ageMs}, where `is` is
+ * the state of the content: "fresh", "old" (no beat for most of a second), "down", or "refused" (wrong token).
  *
  * @template {{ view?: { beat?: number } }} Heard
  * @template {object} Said
@@ -48,7 +48,7 @@ export class Link {
     setInterval(() => this.look(), LOOK_EVERY_MS);
     document.addEventListener("visibilitychange", () => {
       if (document.hidden) return;
-      this.seenSince = this.now(); // a page that nobody saw was not called often
+      this.seenSince = this.now(); // browsers rarely run the timers of a hidden page
       this.beat();
     });
   }
@@ -63,7 +63,7 @@ export class Link {
     return this.is === "fresh" || this.is === "old";
   }
 
-  /** How old what is shown can be, in milliseconds. */
+  /** Largest possible age of the content, in milliseconds. */
   get ageMs() {
     return this.freshness.age(this.now());
   }
@@ -107,7 +107,7 @@ export class Link {
     if (this.isUp) this.say({ do: "beat", number: this.freshness.beat(this.now()) });
   }
 
-  /** Find out how old what is shown is; in a page that nobody sees that matters to nobody. */
+  /** Find out the age of the content; not in a hidden page, where no person needs it. */
   look() {
     if (!this.isUp || document.hidden) return;
     const now = this.now(),
@@ -117,7 +117,7 @@ export class Link {
     else this.become("fresh", "");
   }
 
-  /** Nothing is heard any more: whatever this connection still brings is too old. */
+  /** End the connection: its further messages would be too old. */
   giveUp() {
     const silent = this.socket;
     this.socket = null;
@@ -143,9 +143,9 @@ export class Link {
   }
 
   /**
-   * Say something if it can be said now: nothing is kept for later, least of all a drive.
+   * Send a message if it can leave now: none is kept for later, least of all a drive.
    *
-   * @param {Said | Beat} message
+   * @param {Said | BeatRequest} message
    */
   say(message) {
     if (!this.isUp || this.socket?.readyState !== WebSocket.OPEN) return false;
@@ -153,7 +153,7 @@ export class Link {
     return true;
   }
 
-  /** Is what was said still waiting to leave this device? */
+  /** Do messages still wait to leave this device? */
   get isClogged() {
     return this.socket !== null && this.socket.bufferedAmount > 1024;
   }

@@ -1,4 +1,4 @@
-// The mission's log: the newest as it is told, or what a search found, all of which can be kept as a file.
+// The mission's log: the newest events, or the result of a search, which can be saved as a file.
 
 import { find, make, makeButton } from "./dom.js";
 import { table } from "./table.js";
@@ -7,14 +7,14 @@ import { seconds, set } from "./text.js";
 /** @import { FoundEvent, LogFound, LoggedEvent, LogRefused, SearchLog, View } from "./messages.d.ts" */
 /** @import { Say } from "./types.d.ts" */
 
-const SHOWN = 100; // chosen: as the server hands it out; more at a touch
-const HEADS = ["at", "level", "about", "what", "who", "told by"];
+const SHOWN = 100; // chosen: the server's part; more at a touch
+const HEADS = ["at", "level", "about", "what", "who", "reported by"];
 const FIELDS = /** @type {const} */ (["text", "robot", "person", "level", "since", "until"]);
 
 /**
- * What was found so far. Pure: parts go in, the newest event first, in whatever order they come.
+ * The result so far. Pure: parts go in, the newest event first, in any order of their arrival.
  *
- * The server hands out one part after the other, so that an answer of ten thousand events delays no picture.
+ * The server sends one part after the other, so that an answer of ten thousand events delays no picture.
  */
 export class Found {
   /** @param {number} number */
@@ -41,7 +41,7 @@ export class Found {
     return this.events.length >= this.total;
   }
 
-  /** One line for people: how much was found, up to when, and what is missing. */
+  /** One line for people: size and end of the result, and its gaps. */
   line() {
     const count = `${this.total} event${this.total === 1 ? "" : "s"} found, up to ${seconds(this.asked)}`;
     const more = this.leftOut > 0 ? `; ${this.leftOut} older ones are left out, search a shorter time` : "";
@@ -57,7 +57,7 @@ export class Found {
   }
 }
 
-/** The search form and its table; `say` sends to the server, `redraw` has the table drawn anew. */
+/** The search form and its table; `say` sends to the server, `redraw` draws the table anew. */
 export class Log {
   /**
    * @param {{ form: HTMLFormElement, status: HTMLElement, exporting: HTMLElement, say: Say, redraw: () => void }} given
@@ -87,7 +87,7 @@ export class Log {
   }
 
   /**
-   * Take in what the view says of the mission: which robots and people can be asked for.
+   * Take in the robots and people of the view, which a search can name.
    *
    * @param {Partial<View>} view
    */
@@ -115,7 +115,7 @@ export class Log {
     set(this.status, this.say(said) ? "Searching…" : "NOT CONNECTED: nothing was searched.");
   }
 
-  /** Show the newest as it is told. */
+  /** Show the newest events. */
   forget() {
     this.found = this.underway = null;
     this.isExporting = false;
@@ -123,7 +123,7 @@ export class Log {
     this.redraw();
   }
 
-  /** The connection ended: what was asked is not answered any more. */
+  /** The connection ended: open questions get no answer any more. */
   cut() {
     if (this.underway === null && !this.isExporting) return;
     this.underway = null;
@@ -180,7 +180,7 @@ export class Log {
   }
 
   /**
-   * Returns what to show: what was found, else the newest.
+   * Returns the events to show: the result, else the newest.
    *
    * @param {LoggedEvent[]} newest
    */
@@ -212,7 +212,7 @@ function cells(row) {
 }
 
 /**
- * Have a list offer these words after its first ones; returns whether it did not yet.
+ * Make a list offer these words after its first ones; returns whether that changed it.
  *
  * @param {HTMLElement} list
  * @param {string[]} words

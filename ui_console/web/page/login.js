@@ -1,4 +1,4 @@
-// Who is there: the token comes with the address or is asked for, and is kept for this tab only.
+// Login: the token comes with the address or from a form, and is kept for this tab only.
 
 import { find } from "./dom.js";
 import { set } from "./text.js";

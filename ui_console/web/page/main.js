@@ -1,4 +1,4 @@
-// The page: joins the connection, the cards, the hands and the tables.
+// The page: joins the connection, the cards, the controls and the tables.
 
 import { Blindness } from "./blind.js";
 import { Cards } from "./cards.js";
@@ -18,7 +18,7 @@ import { followTheme } from "./theme.js";
 /** @import { Answer, Heard, Said, View } from "./messages.d.ts" */
 /** @import { Act, LinkChange, Say } from "./types.d.ts" */
 
-const TOUCHED_EVERY_MS = 5000; // chosen: far below the two minutes after which nobody is thought to be here
+const TOUCHED_EVERY_MS = 5000; // chosen: far below the two minutes after which the operator counts as away
 /** @type {Partial<View>} */
 const view = {};
 
@@ -61,7 +61,7 @@ new Keys({
 });
 followTheme(find("theme", HTMLSelectElement));
 
-// ---------------------------------------------------------------- coming in
+// ---------------------------------------------------------------- login
 const login = new Login({ form: find("login", HTMLFormElement), enter: (hello) => link.open(hello) });
 
 /** @param {LinkChange} to */
@@ -84,7 +84,7 @@ function changed({ is, why, ageMs }) {
   blindness.look();
 }
 
-// ---------------------------------------------------------------- what is heard
+// ---------------------------------------------------------------- messages of the server
 /** @param {Heard} message */
 function heard(message) {
   if (message.answer) {
@@ -123,7 +123,7 @@ function answered(answer) {
   else if ("told" in answer ? !answer.told : !answer.done) notice("It did not answer so; the alarms say what it said.");
 }
 
-// ---------------------------------------------------------------- what is wanted
+// ---------------------------------------------------------------- the operator's actions
 /** @type {Record<string, (name: string, more: { number?: number, parameter?: string, value?: unknown }) => Said>} */
 const words = {
   take: (name) => ({ do: "take", robot: name }),
@@ -138,7 +138,7 @@ const words = {
   parameters: (name) => ({ do: "parameters", name }),
   set: (name, { parameter = "", value }) => ({ do: "set", name, parameter, value }),
 };
-const LET_GO = ["take", "release", "lift", "consent"]; // what is held down was not meant for what comes of these
+const LET_GO = ["take", "release", "lift", "consent"]; // a held control was not meant for the outcome of these
 
 /** @type {Act} */
 function act(what, name = "", more = {}) {

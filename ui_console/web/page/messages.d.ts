@@ -351,17 +351,7 @@ export interface Acknowledge {
   key?: string;
 }
 
-export interface AskParameters {
-  do: "parameters";
-  name: string;
-}
-
-export interface AskWhy {
-  do: "why";
-  name: string;
-}
-
-export interface Beat {
+export interface BeatRequest {
   do: "beat";
   number: number;
 }
@@ -399,11 +389,7 @@ export interface JumpOnce {
   moment: number;
 }
 
-export interface LetGo {
-  do: "release";
-}
-
-export interface LiftStop {
+export interface LiftRequest {
   do: "lift";
   robot: string;
   number: number;
@@ -420,6 +406,15 @@ export interface MoreLog {
   first: number;
 }
 
+export interface ParametersRequest {
+  do: "parameters";
+  name: string;
+}
+
+export interface ReleaseRequest {
+  do: "release";
+}
+
 export interface SearchLog {
   do: "search_log";
   text?: string;
@@ -431,7 +426,7 @@ export interface SearchLog {
   number: number;
 }
 
-export interface SetParameter {
+export interface SetRequest {
   do: "set";
   name: string;
   parameter: string;
@@ -446,11 +441,11 @@ export interface Steer {
   speed_rad_s: number;
 }
 
-export interface StopAll {
+export interface StopAllRequest {
   do: "stop_all";
 }
 
-export interface StopRobot {
+export interface StopRequest {
   do: "stop_robot";
   robot: string;
 }
@@ -469,6 +464,11 @@ export interface Watch {
   robots: string[];
 }
 
+export interface WhyRequest {
+  do: "why";
+  name: string;
+}
+
 export type Answer =
   | WhyAnswer
   | RefusedAnswer
@@ -481,24 +481,24 @@ export type Heard = { view: Partial<View>; answer?: undefined } | { answer: Answ
 
 export type Said =
   | Hello
-  | Beat
+  | BeatRequest
   | Steer
   | StopWheels
   | JumpOnce
   | TakeOver
-  | LetGo
+  | ReleaseRequest
   | MayI
   | Decide
   | DismissLost
-  | StopRobot
-  | StopAll
-  | LiftStop
+  | StopRequest
+  | StopAllRequest
+  | LiftRequest
   | Watch
   | Drawn
-  | AskWhy
+  | WhyRequest
   | SearchLog
   | MoreLog
   | Acknowledge
-  | AskParameters
-  | SetParameter
+  | ParametersRequest
+  | SetRequest
   | Here;

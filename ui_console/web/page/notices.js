@@ -1,4 +1,4 @@
-// What a person is told in passing: newest alarm, refusals, and longer answers to read.
+// Notices: newest alarm, refusals, and longer answers to read.
 
 import { find, make, makeButton, makeNotice } from "./dom.js";
 import { set } from "./text.js";
@@ -9,7 +9,7 @@ import { set } from "./text.js";
 const SHOWN_MS = 12000; // chosen: long enough to be read twice
 
 /**
- * Show the first alarm that nobody has seen.
+ * Show the first unacknowledged alarm.
  *
  * @param {AlarmView[]} alarms
  * @param {Act} act
@@ -46,7 +46,7 @@ export function showHealth(health) {
 }
 
 /**
- * Say it without standing in the way of anything, least of all of Stop.
+ * Show a notice that covers no button, least of all Stop.
  *
  * @param {string} text
  */

@@ -1,4 +1,4 @@
-// The screen of one robot: its newest picture, and how old that is.
+// The screen of one robot: its newest picture, and the picture's age.
 
 import { make } from "./dom.js";
 
@@ -7,7 +7,7 @@ import { make } from "./dom.js";
 const STALE_MS = 1000; // as in the console model: do not drive by it
 const RATE_OVER_MS = 2000; // chosen: a rate a person can read
 
-/** Draws what it is given, the newest only; `drawn` is called with the number of each picture that is on the screen. */
+/** Draws the newest picture only; `drawn` is called with the number of each picture that is on the screen. */
 export class Screen {
   /** @param {{ name: string, drawn: (number: number) => void }} given */
   constructor({ name, drawn }) {
@@ -30,7 +30,7 @@ export class Screen {
   }
 
   /**
-   * A picture came: the newest that is not drawn yet takes the place of an older one.
+   * Take in a picture: the newest one replaces an older one that is not drawn yet.
    *
    * @param {Picture} picture
    */
@@ -69,7 +69,7 @@ export class Screen {
   }
 
   /**
-   * Say how old the picture is, from the lens on; returns whether it is too old to drive by.
+   * Show the picture's age, from the lens on; returns whether it is too old to drive by.
    *
    * @param {number} now
    */

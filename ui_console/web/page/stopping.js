@@ -1,13 +1,13 @@
-// Emergency stops: said at once, and not believed before the robot's own word is heard.
+// Emergency stops: sent at once, and shown as certain only after the robot's own confirmation.
 
 import { set } from "./text.js";
 
-/** @import { RobotView, StopAll, StopRobot } from "./messages.d.ts" */
+/** @import { RobotView, StopAllRequest, StopRequest } from "./messages.d.ts" */
 /** @import { Say } from "./types.d.ts" */
 
 const CONFIRMED_WITHIN_MS = 1000; // chosen: wheels stand within 0.7 s wherever the link is there
 
-/** Stops one robot or all, and says in `shown` which ones are not known to stand. */
+/** Stops one robot or all, and shows in `shown` the robots whose stop is not confirmed. */
 export class Stopping {
   /** @param {{ say: Say, shown: HTMLElement }} given */
   constructor({ say, shown }) {
@@ -16,7 +16,7 @@ export class Stopping {
     /** @type {RobotView[]} */
     this.robots = [];
     /** @type {Map<string, number>} */
-    this.pending = new Map(); // robot → when it was told to stop
+    this.pending = new Map(); // robot → time of its stop
     this.unsent = "";
     setInterval(() => this.look(performance.now()), 100);
   }
@@ -34,19 +34,19 @@ export class Stopping {
   }
 
   /**
-   * @param {StopRobot | StopAll} message
+   * @param {StopRequest | StopAllRequest} message
    * @param {string[]} names
    */
   stop(message, names) {
     const isSent = this.say(message);
-    this.unsent = isSent ? "" : `NOT SENT: ${names.join(", ") || "no robot"} was not told to stop.`;
+    this.unsent = isSent ? "" : `NOT SENT: no stop went to ${names.join(", ") || "any robot"}.`;
     for (const name of names) this.pending.set(name, performance.now());
     if (!isSent) this.pending.clear();
     this.look(performance.now());
   }
 
   /**
-   * Take in what is heard of the robots.
+   * Take in the state of the robots.
    *
    * @param {RobotView[]} robots
    */

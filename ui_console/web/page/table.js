@@ -3,7 +3,7 @@
 import { make } from "./dom.js";
 
 /**
- * Each cell knows its head, so that a narrow screen can show rows as lists; the roles say that it is a table still.
+ * Each cell has its head, so that a narrow screen can show rows as lists; the roles keep it a table for screen readers.
  *
  * @param {(string | HTMLElement)[]} heads
  * @param {(string | HTMLElement)[][]} rows

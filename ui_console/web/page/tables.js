@@ -1,4 +1,4 @@
-// Tables of the mission. What is shown was decided by the console model; here it only becomes rows.
+// Tables of the mission. The console model has decided their content; here it only becomes rows.
 
 import { keepingFocus, make, makeButton, stepped } from "./dom.js";
 import { table } from "./table.js";
@@ -72,7 +72,7 @@ export class Tables {
     const tab = this.buttons.get("alarms");
     const alarms = (view.alarms ?? []).filter((alarm) => !alarm.acknowledged_by).length;
     if (tab) set(tab, alarms ? `alarms (${alarms})` : "alarms");
-    const isFound = this.chosen === "log" && this.log.found !== null; // what was found does not change
+    const isFound = this.chosen === "log" && this.log.found !== null; // the result of a search does not change
     if (this.section in changed && !isFound) this.draw();
   }
 
@@ -80,7 +80,7 @@ export class Tables {
     return /** @type {keyof View} */ (this.chosen === "schedule" ? "requests" : this.chosen);
   }
 
-  /** Returns what the chosen table shows now; none: nothing is known of it yet. */
+  /** Returns the content of the chosen table; none: it is not known yet. */
   content() {
     const view = this.view;
     if (view[this.section] === undefined) return [];
@@ -112,8 +112,8 @@ export class Tables {
 
   draw() {
     const isPressed = this.panel.querySelector("input:focus, button:active") !== null;
-    const isHeld = isPressed && this.chosen !== "log"; // what is pressed in the log asks for another table
-    this.panel.classList.toggle("is-held", isHeld); // somebody is typing or pressing here: it says that it stands still
+    const isHeld = isPressed && this.chosen !== "log"; // a press in the log leads to another table
+    this.panel.classList.toggle("is-held", isHeld); // while a person types or presses here the table stands still
     const content = isHeld ? [] : this.content();
     if (content.length === 0) return;
     keepingFocus(this.panel, () => this.panel.replaceChildren(...content));

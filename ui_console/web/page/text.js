@@ -1,7 +1,7 @@
 // Words and numbers for people.
 
 /**
- * Change the text only if it is another: screen readers say what changes.
+ * Change the text only if it differs: screen readers read changes aloud.
  *
  * @param {Element} element
  * @param {string} text
@@ -11,7 +11,7 @@ export function set(element, text) {
 }
 
 /**
- * A time or a rest; nothing if there is none.
+ * A time or a remaining time; empty if there is none.
  *
  * @param {number} [time_s]
  */
@@ -20,7 +20,7 @@ export function seconds(time_s) {
 }
 
 /**
- * For how long, to read at a glance: " 7 s ago", " 3 min ago"; nothing if that is not known.
+ * An age, to read at a glance: " 7 s ago", " 3 min ago"; empty if it is not known.
  *
  * @param {number} [age_s]
  */
@@ -30,7 +30,7 @@ export function lasting(age_s) {
 }
 
 /**
- * So much of a name as there is room for: names differ at their ends, so those are kept.
+ * A name shortened to the room: names differ at their ends, so the ends are kept.
  *
  * @param {string} name
  * @param {number} room

@@ -1,9 +1,9 @@
-// Light or dark: as the system has it, unless this browser was told otherwise.
+// Light or dark: the system's choice, unless this browser has its own.
 
 const KEY = "theme";
 
 /**
- * Have the page look as chosen, now and whenever that changes; `choice` is a select of "", "light" and "dark".
+ * Apply the chosen look, now and at each change; `choice` is a select of "", "light" and "dark".
  *
  * @param {HTMLSelectElement} choice
  */

@@ -1,4 +1,4 @@
-// Who had which resource, who has it, who comes next: drawn as large as it is shown, so that its words can be read.
+// Past, present and predicted holders of each resource: drawn as large as it is shown, so that its words can be read.
 
 import { drawn } from "./svg.js";
 import { seconds, shortened } from "./text.js";

@@ -1,0 +1,71 @@
+"""Settings of a Zenoh session, as plain data: of a client and of a hub. Pure.
+
+Measured settings: clients of one hub, no scouting, lease 2 s (docs/decisions/0003-zenoh-settings.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from backbone.authentication import USER
+
+LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses its own link
+RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
+OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine is there within this
+WAIT_BEFORE_CLOSE_US = 1_000_000  # chosen: the longest time for which a hung consumer may block a sender
+_QUIET = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
+_RETRY = {"period_init_ms": RETRY_FIRST_MS, "period_max_ms": RETRY_MOST_MS, "period_increase_factor": RETRY_FACTOR}
+
+
+def client_settings(endpoint: str, secret: str = "") -> dict[str, object]:
+    """Return the settings of a client of the hub at ``endpoint``.
+
+    Args:
+        endpoint: Endpoint of the hub.
+        secret: Secret that the client proves without sending it; empty: the hub asks for none.
+    """
+    return {
+        "scouting": _QUIET,
+        "transport": _transport({"usrpwd": {"user": USER, "password": secret}} if secret else {}),
+        "mode": "client",
+        "connect": {
+            "endpoints": [endpoint],
+            "timeout_ms": OPEN_TIMEOUT_MS,
+            "exit_on_failure": True,
+            "retry": _RETRY,
+        },
+    }
+
+
+def hub_settings(listen: list[str], connect: list[str], dictionary_file: str) -> dict[str, object]:
+    """Return the settings of a hub that listens at some endpoints and joins the hubs at others.
+
+    Args:
+        listen: Its endpoints.
+        connect: Endpoints of other hubs.
+        dictionary_file: Users and secrets of its clients; empty: it authenticates no client.
+    """
+    settings: dict[str, object] = {
+        "scouting": {**_QUIET, "delay": 0},
+        "transport": _transport({"usrpwd": {"dictionary_file": dictionary_file}} if dictionary_file else {}),
+        "mode": "router",
+        "listen": {"endpoints": listen, "exit_on_failure": True},
+    }
+    if connect:
+        settings["connect"] = {"endpoints": connect, "timeout_ms": -1, "exit_on_failure": False, "retry": _RETRY}
+    return settings
+
+
+def _transport(auth: Mapping[str, object]) -> dict[str, object]:
+    return {
+        "unicast": {"open_timeout": 2000, "accept_timeout": 2000},
+        "link": {
+            "tx": {
+                "lease": LINK_LEASE_MS,
+                "keep_alive": 4,
+                "queue": {"congestion_control": {"block": {"wait_before_close": WAIT_BEFORE_CLOSE_US}}},
+            }
+        },
+        "shared_memory": {"enabled": False},
+        "auth": auth,
+    }

@@ -1,0 +1,360 @@
+"""The command line ``scout-backbone``.
+
+Rules of this file: it declares commands and decides nothing. A command imports the one module that does its work, so
+that ``--help`` and ``check`` stay quick. Data goes to stdout, messages to stderr. Exit codes are those of ``ExitCode``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from backbone.command_line.options import (
+    AsJson,
+    CommandTable,
+    ComponentName,
+    Endpoint,
+    MissionFile,
+    MissionName,
+    NameOrCause,
+    SecretFile,
+    Version,
+    chosen,
+    complete_name,
+    complete_person,
+    complete_resource,
+    finite,
+    hub_endpoint,
+    run,
+)
+from backbone.component.log_level import LogLevel
+from backbone.launcher.endings import ExitCode, say
+from backbone.spoken import counted
+
+app = typer.Typer(
+    cls=CommandTable,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    help="Operate teams of small robots that share scarce hardware.\n\n"
+    "Exit codes: 0 done, 1 unexpected, 2 usage, 3 mission file invalid, 4 cannot reach or start the backbone, "
+    "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
+)
+
+# Named, as a mission names its classes: imports run downwards only.
+EXPERIMENTS = "mission_control.laboratory.experiments.cli"
+SIMULATION = "mission_control.laboratory.simulation.campaign"
+LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to compute
+LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer time is a typing error
+MOST_SEEDS = 1_000_000  # chosen: a day of work
+LARGEST_SEED = 2**32 - 1  # the limit of numpy
+MOST_EVENTS = 10_000  # as in mission_log
+PIPE_WIDTH = 180  # chosen: no table is wider, so files and pipes get whole tables
+
+
+def main() -> None:
+    """Run the command line."""
+    try:
+        app()
+    except KeyboardInterrupt:
+        sys.exit(ExitCode.INTERRUPTED)
+
+
+def read_or_exit(mission_file: Path) -> Any:
+    """Return the checked mission description, or print every fault and exit with 3."""
+    from backbone.mission.reader import MissionInvalid, read_mission
+
+    try:
+        return read_mission(mission_file)
+    except MissionInvalid as invalid:
+        print(invalid)
+        raise typer.Exit(int(ExitCode.MISSION_INVALID)) from None
+
+
+@app.callback()
+def _before_each_command(version: Version = False) -> None:
+    """Read the options that go before a command."""
+
+
+@app.command()
+def check(
+    mission_file: MissionFile,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Also work out placement and the first minute of the schedule.")
+    ] = False,
+    for_s: Annotated[
+        float | None,
+        typer.Option(
+            "--for", min=0.1, max=LONGEST_DRY_RUN_S, callback=finite, help="Mission seconds of the dry run; or 60."
+        ),
+    ] = None,
+    trace: Annotated[
+        Path | None, typer.Option("--trace", help="Write the dry run's scheduling decisions, JSON lines.")
+    ] = None,
+) -> None:
+    """Check a mission file whole: every fault at once as file:line:column. Starts nothing."""
+    if not dry_run and (for_s is not None or trace is not None):
+        raise typer.BadParameter("--for and --trace need --dry-run")
+    description = read_or_exit(mission_file)
+    say(
+        f"{mission_file}: mission {description.name} is fine: {counted(len(description.resources), 'resource')}, "
+        f"{counted(len(description.types), 'component type')} on {counted(len(description.hosts), 'host')}"
+    )
+    if dry_run:
+        from backbone.command_line.rehearsing import print_dry_run
+
+        raise typer.Exit(int(print_dry_run(description, for_s, trace, _width())))
+
+
+@app.command()
+def schema() -> None:
+    """Print the XML schema of mission files."""
+    from backbone.mission.declaration.xsd import xsd_text
+
+    print(xsd_text())
+
+
+@app.command()
+def up(
+    mission_file: MissionFile,
+    headless: Annotated[bool, typer.Option("--headless", help="No live picture; one line a step.")] = False,
+    detach: Annotated[bool, typer.Option("--detach", help="Return when all is ready; the mission goes on.")] = False,
+    speed: Annotated[
+        float, typer.Option("--speed", min=0.01, max=100.0, callback=finite, help="Mission seconds a second.")
+    ] = 1.0,
+    trace: Annotated[Path | None, typer.Option("--trace", help="Write every scheduling decision, JSON lines.")] = None,
+    for_s: Annotated[
+        float | None,
+        typer.Option("--for", min=0.0, max=LONGEST_MISSION_S, callback=finite, help="End after these mission seconds."),
+    ] = None,
+    tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
+) -> None:
+    """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
+    description = read_or_exit(mission_file)
+    if detach:
+        from backbone.launcher.detached import up_detached
+
+        raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
+    from backbone.command_line.mission_console import bring_up_on_console
+    from backbone.launcher.core_launches import UpOptions
+    from backbone.launcher.verdict import VerdictPipe
+
+    options, live = UpOptions(speed=speed, trace=trace, for_s=for_s), not headless and sys.stdout.isatty()
+    verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
+    run(lambda: bring_up_on_console(description, options, live=live, verdict=verdict))
+
+
+@app.command()
+def status(
+    as_json: AsJson = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Keep showing it.")] = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Show health, components by subsystem, who holds which resource, and the schedule; 6 if the mission failed."""
+    from backbone.command_line.status import Shown, show_status
+
+    where, shown = chosen(mission, connect, secret_file), Shown(as_json=as_json, watch=watch, width=_width())
+    run(lambda: show_status(where, shown))
+
+
+@app.command()
+def why(
+    name: NameOrCause,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Explain why a request waits or runs, until when, and why a component is on its host."""
+    from backbone.command_line.asking import print_reasons
+
+    where = chosen(mission, connect, secret_file)
+    run(lambda: print_reasons(where, name, as_json=as_json))
+
+
+@app.command()
+def story(
+    name: NameOrCause,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Print the events about a component, request or resource, with their causes."""
+    from backbone.command_line.asking import print_story
+
+    where = chosen(mission, connect, secret_file)
+    run(lambda: print_story(where, name, as_json=as_json))
+
+
+@app.command()
+def log(
+    since: Annotated[
+        str, typer.Option("--since", help="Not before: 5m (s, m, h, d ago), 14:05 (time of day), 123.4 (mission time).")
+    ] = "0",
+    until: Annotated[str, typer.Option("--until", help="Not after; as --since.")] = "",
+    robot: Annotated[
+        str, typer.Option("--robot", autocompletion=complete_resource, help="Only events about this robot, or name.")
+    ] = "",
+    person: Annotated[
+        str, typer.Option("--person", autocompletion=complete_person, help="Only actions and mentions of this person.")
+    ] = "",
+    level: Annotated[LogLevel, typer.Option("--level", help="Only events of at least this level.")] = LogLevel.INFO,
+    text: Annotated[str, typer.Option("--text", help="Only events that contain this text.")] = "",
+    most: Annotated[
+        int, typer.Option("--most", min=1, max=MOST_EVENTS, help="Largest number of events, the newest.")
+    ] = 1_000,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Print the events of the mission and the actions of people: the newest that match, oldest first."""
+    from backbone.command_line.asking import print_log
+    from backbone.mission_log.question import LogQuestion
+
+    where, question = chosen(mission, connect, secret_file), LogQuestion(text, robot, person, level, since, until)
+    run(lambda: print_log(where, question, most, as_json=as_json))
+
+
+@app.command()
+def start(
+    type_: Annotated[str, typer.Argument(metavar="TYPE", help="Component type of the mission.")],
+    name: Annotated[str, typer.Option("--name", help="Name; default: numbered by the placer.")] = "",
+    host: Annotated[str, typer.Option("--host", help="The only possible host.")] = "",
+    parameter: Annotated[
+        list[str] | None, typer.Option("--parameter", help="NAME=VALUE, value as JSON or text; repeatable.")
+    ] = None,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Start one more component through the placer."""
+    from backbone.command_line.ordering import start_component
+    from backbone.placer.messages import Start
+
+    where = chosen(mission, connect, secret_file)
+    order = Start(type_, name, dict(map(_parameter, parameter or [])), host)
+    run(lambda: start_component(where, order))
+
+
+@app.command()
+def stop(
+    name: ComponentName,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Stop one component; it is not restarted."""
+    from backbone.command_line.ordering import stop_component
+
+    where = chosen(mission, connect, secret_file)
+    run(lambda: stop_component(where, name))
+
+
+@app.command(name="set", context_settings={"ignore_unknown_options": True})  # a priority may be below 0
+def set_(
+    name: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=complete_name, help="A component, an ARC, a console, or a node of the behavior tree."
+        ),
+    ],
+    parameter: Annotated[
+        str | None,
+        typer.Argument(help="priority, parent, minimum_runtime_s, maximum_runtime_s, or a parameter of the component."),
+    ] = None,
+    value: Annotated[str | None, typer.Argument(help="The new value, JSON or text; left out: show it.")] = None,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Set priority, parent or a run time of an owner of ARCs, or any parameter; without a value show it."""
+    if value is not None and as_json:
+        raise typer.BadParameter("--json shows attributes; leave the value out")
+
+    from backbone.command_line.ordering import print_attributes, set_attribute
+
+    where = chosen(mission, connect, secret_file)
+    if parameter is not None and value is not None:
+        run(lambda: set_attribute(where, name, parameter, _value(value)))
+    run(lambda: print_attributes(where, name, parameter, as_json=as_json))
+
+
+@app.command()
+def down(mission: MissionName = None) -> None:
+    """Stop a mission of this machine in reverse order: ask, then SIGTERM, then SIGKILL; says which was needed."""
+    from backbone.launcher.detached import take_down
+
+    run(lambda: take_down(mission))
+
+
+@app.command()
+def creator(
+    host: Annotated[str, typer.Option("--host", help="Name of this machine in the mission.")],
+    connect: Annotated[str, typer.Option("--connect", callback=hub_endpoint, help="The mission's hub, tcp/HOST:PORT.")],
+    mission: Annotated[str, typer.Option("--mission", help="Name of the mission.")],
+    secret_file: SecretFile = None,
+    tag: Annotated[list[str] | None, typer.Option("--tag", help="A tag of this machine; repeatable.")] = None,
+) -> None:
+    """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""
+    from backbone.command_line.offering import offer_this_machine
+
+    run(lambda: offer_this_machine(mission, connect, secret_file, host, tuple(tag or [])))
+
+
+@app.command()
+def simulate(
+    seeds: Annotated[int, typer.Option("--seeds", min=1, max=MOST_SEEDS, help="How many missions.")] = 100,
+    first: Annotated[int, typer.Option("--first", min=0, max=LARGEST_SEED, help="Seed of the first.")] = 0,
+    chaos: Annotated[
+        bool, typer.Option("--chaos", help="Lose and delay messages; pause, end and starve processes; cut links.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run missions of random shape in one process on virtual time; report the first broken law with its seed."""
+    campaign = import_module(SIMULATION)
+    outcome = campaign.simulate(first, seeds, chaos=chaos, tell=say)
+    print(json.dumps(outcome.to_json()) if as_json else outcome.summary())
+    if outcome.finding is not None:
+        for line in outcome.finding.lines():
+            say(line)
+        raise typer.Exit(int(ExitCode.MISSION_FAILED))
+
+
+@app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def experiment(context: typer.Context) -> None:
+    """Run the papers' experiments on simulated robots: 'surveillance', 'load'; see 'experiment --help'."""
+    import_module(EXPERIMENTS).run(context.args)
+
+
+def _width() -> int | None:
+    """Return the width of tables; None: the terminal's."""
+    return None if sys.stdout.isatty() else PIPE_WIDTH
+
+
+def _parameter(given: str) -> tuple[str, object]:
+    name, equals, value = given.partition("=")
+    if not equals or not name:
+        raise typer.BadParameter(f"{given!r} is not NAME=VALUE")
+    return name, _value(value)
+
+
+def _value(text: str) -> object:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,26 @@
+"""Event loop: runs a command's coroutine to its end."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+import uvloop
+
+from backbone.errors import BackboneError
+from backbone.launcher.endings import complaint_of, say
+
+
+def exit_code_of(work: Callable[[], Awaitable[int]]) -> int:
+    """Return the exit code of a command's coroutine; a refusal becomes one line and its own code."""
+
+    async def guarded() -> int:
+        return await work()
+
+    try:
+        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            return runner.run(guarded())
+    except BackboneError as error:
+        line, code = complaint_of(error)
+        say(line)
+        return int(code)

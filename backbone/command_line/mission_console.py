@@ -1,0 +1,188 @@
+"""``scout-backbone up`` on a terminal: progress while the mission comes up, then its live picture."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import sys
+from typing import IO
+
+from rich.console import Console
+from rich.live import Live
+
+from backbone.addresses import LAUNCHER, RC_MANAGER
+from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import ComponentState, StoryEvent
+from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.launcher.bring_up import run_mission
+from backbone.launcher.core_launches import UpOptions
+from backbone.launcher.endings import ExitCode, complaint_of
+from backbone.launcher.outcome import Outcome
+from backbone.launcher.verdict import VerdictPipe
+from backbone.mission.model import MissionDescription
+from backbone.mission_log.operators import OperatorActed
+from backbone.naming import Subsystem
+from backbone.picture.health import HealthWord, MissionHealth
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture, holders_line
+from backbone.picture.screen import live_screen
+from backbone.picture.words import absence_line
+from backbone.printable import printable_all
+from backbone.printable_text import printable_lines
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import Schedule
+from backbone.spoken import counted
+from backbone.wire import Envelope
+
+EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
+PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start is over by then
+REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds; more costs a core that the mission needs
+
+
+class ConsoleObserver:
+    """Tells a person what happens: lines while it comes up and goes down, a live picture or lines between.
+
+    Args:
+        console: Where to.
+        live: True: a picture that is redrawn; False: lines.
+        verdict: Pipe to the command that waits until all is ready; None: no command waits.
+    """
+
+    def __init__(self, console: Console, *, live: bool, verdict: VerdictPipe | None = None) -> None:
+        self._console, self._live, self._verdict = console, live, verdict
+        self._picture = MissionPicture("")
+        self._told = self._health_told = ""
+        self._is_up, self._last_progress_s = False, 0.0
+
+    def began(self, step: str) -> None:
+        """Say nothing yet: a step that hangs is named by ``Outcome.failure``."""
+
+    def done(self, step: str, took_s: float) -> None:
+        """Print the step with its time."""
+        self.tell(f"  ✓ {step:<42} {took_s * 1000:7.0f} ms")
+
+    def announce(self, line: str) -> None:
+        """Print the line."""
+        self.tell(f"  {line}")
+
+    def connected(self, bus: Bus) -> None:
+        """Listen to what components tell people, and to the mission's health."""
+        self._picture.mission = bus.mission
+        bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
+        consoles = f"{Subsystem.UI_CONSOLE}/*"
+        bus.subscribe(consoles, Conversation.STATUS, ComponentState, self._heard, latest=True)
+        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
+
+    def tell(self, line: str) -> None:
+        """Print one line, also for the command that waits until all is ready."""
+        self._print(line)
+        if self._verdict is not None:
+            self._verdict.talk(line)
+
+    def decide(self, exit_code: int) -> None:
+        """Give the command that waits its exit code, unless it has one."""
+        if self._verdict is not None:
+            self._verdict.decide(exit_code)
+
+    def _print(self, line: str) -> None:
+        _tell_if_possible(printable_lines(line), self._console.file)
+
+    async def up(self, bus: Bus, clock: Clock) -> None:
+        """Show the mission until cancelled."""
+        self.tell("all ready; end with Ctrl-C or 'scout-backbone down'")
+        self.decide(ExitCode.DONE)
+        self._is_up = True
+        if self._live:
+            await self._show_live(bus, clock)
+        else:
+            bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard_schedule, latest=True)
+            await asyncio.Event().wait()
+
+    async def _show_live(self, bus: Bus, clock: Clock) -> None:
+        console, picture = self._console, self._picture
+        with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
+            while True:
+                await look(bus, clock.now_s(), before=picture, rate=clock.rate)
+                live.update(live_screen(picture, picture.log.newest(EVENTS_KEPT), console.height), refresh=True)
+                await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
+
+    def _heard_health(self, envelope: Envelope[MissionHealth]) -> None:
+        heard = printable_all(envelope.body)
+        if not self._is_up:
+            self._heard_while_coming_up(heard, envelope.stamp_s)
+            return
+        told = f"health {heard.word}"
+        names = ", ".join(absence.name for absence in heard.absent)
+        if (told := f"{told}: {names}" if names else told) == self._health_told or self._live:
+            return
+        is_first, self._health_told = not self._health_told, told
+        if is_first and heard.word is HealthWord.OK:
+            return
+        self._print(f"{envelope.stamp_s:9.2f} s  health {heard.word}")
+        for absence in heard.absent:
+            self._print(f"{'':9}    {absence_line(absence, envelope.stamp_s)}")
+
+    def _heard_while_coming_up(self, heard: MissionHealth, at_s: float) -> None:
+        """Say every now and then what a start that takes long waits for."""
+        if at_s - self._last_progress_s >= PROGRESS_EVERY_S:
+            self._last_progress_s = at_s
+            for absence in heard.absent:
+                self.tell(f"  … {absence_line(absence, at_s)}")
+
+    def _heard(self, envelope: Envelope[StoryEvent | OperatorActed | ComponentState]) -> None:
+        said = printable_all(envelope.body)
+        self._picture.take(said, envelope.source)
+        if not self._live and not isinstance(said, ComponentState):
+            [event] = self._picture.log.newest(1)
+            self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")
+
+    def _heard_schedule(self, envelope: Envelope[Schedule]) -> None:
+        schedule = envelope.body
+        if any(request.state in (RequestState.CONNECTING, RequestState.REVOKING) for request in schedule.requests):
+            return
+        line = self._picture.people.named(holders_line(schedule))
+        if line != self._told:
+            self._told = line
+            self._print(f"{schedule.at_s:9.2f} s  {line}")
+
+
+def _tell_if_possible(line: str, file: IO[str]) -> None:
+    """Print the line; a mission goes on also when its disk is full or nobody reads any longer."""
+    with contextlib.suppress(OSError):
+        print(line, file=file, flush=True)
+
+
+async def bring_up_on_console(
+    description: MissionDescription, options: UpOptions, *, live: bool, verdict: VerdictPipe | None = None
+) -> int:
+    """Run the mission, tell a person about it, and return the exit code."""
+    console = Console(file=sys.stdout if live else sys.stderr, markup=False, emoji=False)
+    observer = ConsoleObserver(console, live=live, verdict=verdict)
+    observer.tell(f"mission {description.name} comes up")
+    try:
+        outcome = await run_mission(description, options, observer)
+    except (Refusal, LinkError) as error:
+        observer.tell(f"could not be started: {error}")
+        observer.decide(complaint_of(error)[1])
+        raise
+    except BackboneError as error:
+        outcome = Outcome(failure=error)
+    for last in last_lines(outcome):
+        observer.tell(last)
+    code = ExitCode.DONE if outcome.went_well else ExitCode.MISSION_FAILED
+    observer.decide(code)
+    return code
+
+
+def last_lines(outcome: Outcome) -> list[str]:
+    """Return what a person should know of a mission that has ended."""
+    lines = []
+    if outcome.ready_after_s is not None:
+        lines.append(f"was ready after {outcome.ready_after_s:.2f} s")
+    if outcome.pushed:
+        lines.append("more than asking was needed: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
+    if outcome.failure is not None:
+        return [*lines, f"the mission failed: {outcome.failure}"]
+    return [*lines, f"down: {counted(len(outcome.ended), 'component')} ended, nothing is left"]

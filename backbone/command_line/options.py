@@ -1,0 +1,189 @@
+"""Shared parts of the command lines: options, completed names, whole summaries, and a table of commands.
+
+A completion imports its modules when a shell asks for it, so that ``--help`` stays quick.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from typer.core import TyperGroup
+
+from backbone.command_line.where import Where
+from backbone.errors import BackboneError
+
+DISTRIBUTION = "scout-backbone"
+
+
+class CommandTable(TyperGroup):
+    """Shows each command's summary whole, and converts only those values that need it.
+
+    Typer cuts summaries at the end of the line. It also loads pydantic to convert a value, even if the value is absent
+    or a shell asks for completions; that import takes longer than everything else that ``status`` loads.
+    """
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        for command in self.commands.values():
+            command.short_help = command.short_help or _first_paragraph(command.help or "")
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words before the command's name."""
+        _convert_only_what_needs_it(self.get_params(ctx))
+        return super().parse_args(ctx, args)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
+        """Find the command that the words name."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None:
+            _convert_only_what_needs_it(command.get_params(ctx))
+        return name, command, rest
+
+
+def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
+    for parameter in parameters:
+        parameter.process_value = partial(_processed, parameter.process_value, parameter.required)
+
+
+def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: object) -> Any:
+    """Return the value as the command gets it; an absent optional value, or one beside completions, stays as it is."""
+    is_absent = value is None and not is_required
+    return value if is_absent or ctx.resilient_parsing else process_value(ctx, value)
+
+
+def _first_paragraph(text: str) -> str:
+    return " ".join(text.partition("\n\n")[0].split())
+
+
+def run(work: Callable[[], Awaitable[int]]) -> NoReturn:
+    """Run a command's coroutine and end the process with its exit code; a refusal becomes one line."""
+    from backbone.command_line.event_loop import exit_code_of
+
+    raise typer.Exit(exit_code_of(work))
+
+
+def chosen(mission: str | None, endpoint: str | None, secret_file: Path | None) -> Where:
+    """Return the mission that the options name; a hub elsewhere needs the mission's name."""
+    if endpoint is not None and mission is None:
+        raise typer.BadParameter("--connect needs --mission NAME")
+    return Where(mission, endpoint, secret_file)
+
+
+def print_version(is_asked: bool) -> None:
+    """Print the installed version and end the command; for the option ``--version``."""
+    if is_asked:
+        from importlib.metadata import version
+
+        print(f"{DISTRIBUTION} {version(DISTRIBUTION)}")
+        raise typer.Exit
+
+
+ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/]+:[0-9]{1,5}([?#]\S*)?|unixsock-stream/\S+")
+
+
+def hub_endpoint(value: str | None) -> str | None:
+    """Refuse a text that is no endpoint of a hub; for options that take an endpoint."""
+    if value is not None and ENDPOINT.fullmatch(value) is None:
+        raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
+    return value
+
+
+def complete_mission() -> list[str]:
+    """Return the missions that are up on this machine."""
+    from backbone.run_files import find_all
+
+    try:
+        return [run_file.mission for run_file in find_all()]
+    except (BackboneError, OSError):
+        return []
+
+
+def picture_for(ctx: typer.Context) -> Any:
+    """Return the picture of the mission that the typed words name; None if it is not up.
+
+    The bus is loaded only if a mission is up.
+    """
+    mission, endpoint = ctx.params.get("mission"), ctx.params.get("connect")
+    can_ask = (mission and ENDPOINT.fullmatch(endpoint)) if endpoint is not None else complete_mission()
+    if not can_ask:
+        return None
+    from backbone.command_line.completion import picture_now
+
+    secret_file = ctx.params.get("secret_file")
+    return picture_now(mission, endpoint, Path(secret_file) if secret_file is not None else None)
+
+
+def complete_name(ctx: typer.Context) -> list[str]:
+    """Return the names that questions may use in the mission that is up."""
+    picture = picture_for(ctx)
+    if picture is None:
+        return []
+    from backbone.command_line.completion import names_of
+
+    return names_of(picture)
+
+
+def complete_resource(ctx: typer.Context) -> list[str]:
+    """Return the resources of the mission that is up."""
+    picture = picture_for(ctx)
+    if picture is None:
+        return []
+    from backbone.command_line.completion import resources_of
+
+    return resources_of(picture)
+
+
+def complete_person(ctx: typer.Context) -> list[str]:
+    """Return the people at the consoles of the mission that is up."""
+    picture = picture_for(ctx)
+    if picture is None:
+        return []
+    from backbone.command_line.completion import people_of
+
+    return people_of(picture)
+
+
+Version = Annotated[
+    bool, typer.Option("--version", callback=print_version, is_eager=True, help="Show the version and exit.")
+]
+MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
+MissionName = Annotated[
+    str | None,
+    typer.Option("--mission", autocompletion=complete_mission, help="Name of the mission; needed if several are up."),
+]
+Endpoint = Annotated[
+    str | None,
+    typer.Option(
+        "--connect", callback=hub_endpoint, help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission."
+    ),
+]
+SecretFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--secret-file",
+        envvar="SCOUT_SECRET_FILE",
+        help="File with the mission's secret, with --connect; '-' reads it from standard input.",
+    ),
+]
+NameOrCause = Annotated[
+    str,
+    typer.Argument(
+        autocompletion=complete_name,
+        help="A component, resource, host, person or alarm; or a cause as stories show it: rc_manager#112.",
+    ),
+]
+ComponentName = Annotated[str, typer.Argument(autocompletion=complete_name, help="A component of the mission.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+def finite(value: float | None) -> float | None:
+    """Refuse NaN, which no range refuses; for options with a range."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
+    return value

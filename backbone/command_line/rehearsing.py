@@ -1,0 +1,42 @@
+"""``check --dry-run``: prints what a mission would do, and writes its trace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from backbone.dry_run.run import FIRST_MINUTE_S, dry_run
+from backbone.dry_run.screen import screen
+from backbone.launcher.endings import ExitCode, say
+from backbone.mission.model import MissionDescription
+from backbone.scheduling.own_planner import WrongPlanner
+
+
+def print_dry_run(
+    description: MissionDescription, for_s: float | None, trace: Path | None, width: int | None
+) -> ExitCode:
+    """Print a dry run, write its trace if a file is named, and return the exit code.
+
+    Args:
+        description: The mission.
+        for_s: Mission seconds; None: the first minute.
+        trace: File for the trace.
+        width: Of tables; None: as the terminal.
+    """
+    try:
+        dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
+    except WrongPlanner as refused:
+        say(f"{refused} (remedy: {refused.remedy})")
+        return ExitCode.MISSION_INVALID
+    Console(width=width, markup=False, emoji=False).print(screen(dry))
+    if trace is not None:
+        try:
+            dry.write_trace(trace)
+        except OSError as error:
+            say(f"the trace cannot be written: {error}")
+            return ExitCode.UNEXPECTED
+    if not dry.can_come_up:
+        say(f"mission {description.name} cannot come up as it is")
+        return ExitCode.MISSION_INVALID
+    return ExitCode.DONE

@@ -1,0 +1,55 @@
+"""Signs of life of the processes of one machine: the present work of each, and for how long it has been silent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
+
+from backbone.component.heartbeat import Vitals
+from backbone.creator.silence import Silence
+
+ReadVitals = Callable[[str, int], Vitals | None]
+
+
+class Sign(NamedTuple):
+    """What was seen of one process.
+
+    Attributes:
+        pid: The process.
+        silent_s: Seconds of the machine for which it has shown no sign of life.
+        beats: True if it has ever beaten.
+    """
+
+    pid: int
+    silent_s: float
+    beats: bool
+
+
+class SignsOfLife:
+    """What the processes of one machine show of themselves.
+
+    Args:
+        read_vitals: Reads the vitals of a process, given run directory and pid.
+    """
+
+    def __init__(self, read_vitals: ReadVitals) -> None:
+        self._read_vitals = read_vitals
+        self._silences: dict[int, Silence] = {}
+        self._doing: dict[int, str] = {}
+
+    def look(self, run_directory: str, pids: Iterable[int], now_s: float) -> Iterator[Sign]:
+        """Yield the sign of each of these processes that has vitals."""
+        for pid in pids:
+            if (vitals := self._read_vitals(run_directory, pid)) is not None:
+                self._doing[pid] = vitals.doing
+                silent_s = self._silences.setdefault(pid, Silence()).look(vitals, now_s)
+                yield Sign(pid, silent_s, vitals.beats > 0)
+
+    def doing(self, pid: int) -> str:
+        """Return the present work of the process; empty if it is unknown."""
+        return self._doing.get(pid, "")
+
+    def forget(self, pid: int) -> None:
+        """Forget a process that has ended."""
+        self._silences.pop(pid, None)
+        self._doing.pop(pid, None)

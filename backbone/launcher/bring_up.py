@@ -1,0 +1,123 @@
+"""Bring a mission up in the papers' order, keep its core services alive, take it down in reverse.
+
+The launcher is a component (``backbone/launcher``), which lists its processes and can be stopped. It starts only the
+core services, and asks the placer to start all other components.
+
+Source: RAM 2002, "Backbone": nameserver, component database, placer, creators, static dependency
+database, RC manager, then the mission.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import time
+
+from backbone import run_files
+from backbone.addresses import LAUNCHER
+from backbone.authentication import secret_of
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.launch import Launch
+from backbone.component.messages import Stop, Stopping
+from backbone.component.process import run_with_heartbeat
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.creator.zygote import Zygote
+from backbone.errors import BackboneError
+from backbone.heaps import share_heaps
+from backbone.launcher.core_launches import CORE_POLICY, UpOptions, launcher_launch, service_launch
+from backbone.launcher.launcher import LISTING_TIME_S, Launcher
+from backbone.launcher.other_hosts import endpoint_for_others
+from backbone.launcher.outcome import BringUpObserver, Outcome
+from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up
+from backbone.mission.model import MissionDescription
+from backbone.naming import component_of
+
+START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of it
+
+
+async def run_mission(description: MissionDescription, options: UpOptions, observer: BringUpObserver) -> Outcome:
+    """Bring the mission up, run it, take it down; return when all its processes and files are gone.
+
+    Raises:
+        MissionAlreadyUp: A mission of this name runs on this machine.
+        RunFolderUnusable: The run folder is not writable.
+        TraceUnwritable: The trace is not writable.
+        BackboneError: The nameserver did not start.
+    """
+    began_s = time.monotonic()
+    share_heaps()
+    refuse_if_up(description.name)
+    if options.trace is not None:
+        run_files.require_writable(options.trace)
+    directory = run_files.prepare(description.name)
+    try:
+        endpoint = prepare_endpoint(description, directory)
+        clock = MissionClock(began_s, options.speed)
+        own = launcher_launch(description, endpoint, clock, directory)
+        observer.began("nameserver")
+        zygote = await Zygote.spawn_fresh(run_directory=str(directory))
+        try:
+            return await _with_hub(zygote, own, clock, description, options, observer, began_s)
+        finally:
+            await zygote.close()
+    finally:
+        run_files.remove(description.name)
+
+
+async def _with_hub(
+    zygote: Zygote,
+    own: Launch,
+    clock: MissionClock,
+    description: MissionDescription,
+    options: UpOptions,
+    observer: BringUpObserver,
+    began_s: float,
+) -> Outcome:
+    keeper = ProcessKeeper(zygote, clock)
+    others = endpoint_for_others(description)
+    hub = service_launch(own, "nameserver", "nameserver", description, {"listen": [others] if others else []})
+    await keeper.start_hub(hub, CORE_POLICY)
+    config = client_config(own.endpoint, secret_of(own.run_directory))
+    bus = await ZenohBus.open_when_up(own.mission, own.address, clock, config)
+    observer.connected(bus)
+    keeper.use(bus)
+    await keeper.wait_ready(hub.name, START_TIME_S)
+    observer.done("nameserver", time.monotonic() - began_s)
+    run_files.write(
+        run_files.RunFile(
+            mission=own.mission,
+            endpoint=own.endpoint,
+            launcher_pid=os.getpid(),
+            clock_origin_monotonic_s=clock.origin_monotonic_s,
+            clock_rate=clock.rate,
+            host=own.host,
+            source=description.source,
+        )
+    )
+    launcher = Launcher(
+        own, bus, clock, keeper=keeper, description=description, options=options, observer=observer, began_s=began_s
+    )
+    loop = asyncio.get_running_loop()
+    loop.add_signal_handler(signal.SIGTERM, launcher.end, signal.SIGTERM.name)
+    loop.add_signal_handler(signal.SIGINT, launcher.interrupted)
+    try:
+        await run_with_heartbeat(own, clock, launcher.run(), lambda: launcher.feedback or str(launcher.state))
+    except BackboneError as error:
+        launcher.outcome.failure = launcher.outcome.failure or error
+    finally:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.remove_signal_handler(number)
+        launcher.outcome.ended += await keeper.close()
+    return launcher.outcome
+
+
+async def end_mission(bus: Bus) -> None:
+    """Ask the launcher to take its mission down.
+
+    Raises:
+        LinkError: The launcher did not answer.
+    """
+    await bus.ask(LAUNCHER, Stop(f"ordered by {component_of(bus.source)}"), Stopping, within_s=LISTING_TIME_S)

@@ -1,0 +1,118 @@
+"""``up --detach`` and ``down``: start a launcher without a terminal, and end one."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.errors import LinkError
+from backbone.launcher.bring_up import end_mission
+from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.verdict import await_verdict
+from backbone.mission_log.operators import OperatorAction, publish_action
+
+ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty components on a busy machine needs 5 s
+
+
+def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path | None, for_s: float | None) -> int:
+    """Start a launcher in a session of its own; return 0 when all is ready, else the exit code of its failure.
+
+    Only the launcher's verdict decides, because its process still lives while it cleans up after a failure.
+    """
+    told, telling = os.pipe()
+    command = [sys.executable, "-m", "backbone.command_line.cli", "up", str(mission_file.absolute()), "--headless"]
+    command += ["--tell-fd", str(telling), "--speed", str(speed)]
+    command += ["--trace", str(trace.absolute())] if trace else []
+    command += ["--for", str(for_s)] if for_s is not None else []
+    launcher = subprocess.Popen(  # noqa: S603  our own command line
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        pass_fds=[telling],
+    )
+    os.close(telling)
+    try:
+        with os.fdopen(told, encoding="utf-8", errors="replace") as lines:
+            exit_code = await_verdict(lines, say)
+    except KeyboardInterrupt:
+        launcher.send_signal(signal.SIGTERM)  # it cleans up by itself
+        raise
+    if exit_code is None:
+        return _died(launcher)
+    if exit_code == ExitCode.DONE:
+        say(f"mission {mission} goes on as process {launcher.pid}; end it: scout-backbone down --mission {mission}")
+    return exit_code
+
+
+def _died(launcher: subprocess.Popen[bytes]) -> int:
+    """Return the exit code for a launcher that ended without a verdict."""
+    try:
+        ended = launcher.wait(KILL_S)
+    except subprocess.TimeoutExpired:
+        say(f"the launcher, process {launcher.pid}, gave no verdict and does not end")
+        return ExitCode.MISSION_FAILED
+    how = signal.Signals(-ended).name if ended < 0 else f"exit code {ended}"
+    say(f"the launcher ended without a verdict: {how}")
+    return ended if ended > 0 else ExitCode.MISSION_FAILED
+
+
+async def take_down(mission: str | None) -> int:
+    """End a mission of this machine and return when its launcher has ended."""
+    found = run_files.find(mission)
+    launcher = psutil.Process(found.launcher_pid)
+    waiting = os.pidfd_open(launcher.pid)
+    if launcher.status() == psutil.STATUS_STOPPED:
+        say(f"the launcher, process {launcher.pid}, was stopped; it is continued so that it can end its mission")
+        launcher.send_signal(signal.SIGCONT)
+    try:
+        for what, seconds, act in (
+            ("asking", ASKED_S, None),
+            ("SIGTERM", TERM_S, signal.SIGTERM),
+            ("SIGKILL", KILL_S, signal.SIGKILL),
+        ):
+            if act is None:
+                if not await _ask(found):
+                    continue
+            else:
+                launcher.send_signal(act)
+            if select.select([waiting], [], [], seconds)[0]:
+                say(f"mission {found.mission} is down; {what} was enough")
+                return ExitCode.DONE if what != "SIGKILL" else ExitCode.MISSION_FAILED
+    finally:
+        os.close(waiting)
+    say(f"mission {found.mission}: process {launcher.pid} does not end")
+    return ExitCode.MISSION_FAILED
+
+
+async def _ask(found: run_files.RunFile) -> bool:
+    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+    try:
+        bus = await ZenohBus.open_when_up(
+            found.mission,
+            f"ui_console/down-{os.getpid()}",
+            clock,
+            client_config(found.endpoint, run_files.secret(found)),
+        )
+    except LinkError as error:
+        say(f"the hub cannot be reached: {error}")
+        return False
+    try:
+        publish_action(bus, clock, OperatorAction.STOP_MISSION, found.mission, "by command")
+        await end_mission(bus)
+    except LinkError as error:
+        say(f"the launcher does not answer: {error}")
+        return False
+    finally:
+        await bus.close()
+    return True

@@ -1,0 +1,118 @@
+"""The creator of a machine that is offered to a mission elsewhere: its process, its folder, its types."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from backbone import run_files
+from backbone.addresses import COMPONENT_DATABASE
+from backbone.authentication import keep_secret
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.component.messages import Absence
+from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
+from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPolicy, creator_name
+from backbone.creator.preload import arc_modules
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.creator.zygote import Zygote
+
+READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
+REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
+POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0)
+
+
+@dataclass(frozen=True)
+class Offered:
+    """The offered machine, and the mission that may use it.
+
+    Attributes:
+        endpoint: Endpoint of the mission's hub.
+        host: Name of this machine in the mission.
+        secret: Secret of the mission; empty: the hub asks for none.
+    """
+
+    mission: str
+    endpoint: str
+    host: str
+    tags: tuple[str, ...] = ()
+    secret: str = ""
+
+
+class KeptCreator:
+    """The creator of this machine, with a zygote and a folder of its own; the mission's secret is in the folder.
+
+    Attributes:
+        on_fell: Called when the creator has ended unexpectedly.
+    """
+
+    def __init__(self, launch: Launch, offered: Offered) -> None:
+        self.on_fell: Callable[[ProcessFell], None] = lambda _fell: None
+        self.on_changed: Callable[[], None] = lambda: None
+        self._launch, self._offered = launch, offered
+        self._keeper: ProcessKeeper | None = None
+
+    async def start(self, bus: Bus, clock: Clock) -> None:
+        """Start the creator and return when it is ready.
+
+        Raises:
+            LinkError: The mission's component database did not answer.
+            StartFailed: The creator did not become ready; the end of its log is in the detail.
+            NameTaken: The mission already has a creator of this host.
+        """
+        answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
+        types = [counted.component_type for counted in answered.types]
+        directory = run_files.prepare(f"{self._launch.mission}-{self._launch.host}")
+        if self._offered.secret:
+            keep_secret(directory, self._offered.secret)
+        self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))
+        self._keeper = ProcessKeeper(self._zygote, clock)
+        self._keeper.on_fell = self.on_fell
+        self._keeper.on_changed = self.on_changed
+        self._keeper.use(bus)
+        await self._keeper.start(self._creator_launch(types, directory), POLICY, READY_WITHIN_S)
+
+    def processes(self) -> list[ProcessState]:
+        """Return the creator's process."""
+        return self._keeper.processes() if self._keeper is not None else []
+
+    def absences(self) -> list[Absence]:
+        """Return the creator as absent while it does not run or respond."""
+        return self._keeper.absences() if self._keeper is not None else []
+
+    async def close(self) -> None:
+        """End the creator and all its components. Idempotent."""
+        keeper, self._keeper = self._keeper, None
+        if keeper is not None:
+            await keeper.close()
+            await self._zygote.close()
+
+    def _creator_launch(self, types: list[ComponentType], directory: Path) -> Launch:
+        return msgspec.structs.replace(
+            self._launch,
+            name=creator_name(self._launch.host),
+            type=TYPE,
+            class_path=_creator_class(types),
+            parameters={
+                "tags": list(self._offered.tags),
+                "preload": arc_modules(types),
+                "types": [msgspec.to_builtins(one) for one in types],
+            },
+            requester=self._launch.address,
+            run_directory=str(directory),
+        )
+
+
+def _creator_class(types: Iterable[ComponentType]) -> str:
+    """Return the class of creators in this mission.
+
+    Raises:
+        UnknownType: The mission has no type ``creator``.
+    """
+    found = [component_type.class_path for component_type in types if component_type.name == TYPE]
+    if not found:
+        raise UnknownType(f"the mission has no component type {TYPE!r}")
+    return found[0]

@@ -1,0 +1,318 @@
+"""Launcher: starts core services and mission, keeps both running while the mission is up, and ends them in reverse."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import signal
+import time
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import ClassVar
+
+import msgspec
+
+from backbone.addresses import NAMESERVER, PLACER
+from backbone.authentication import SECRET_NAME
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import Component, NoParameters
+from backbone.component.launch import Launch
+from backbone.component.messages import Absence, LogLevel, Stop, Stopping
+from backbone.component.peer_monitor import PeerMonitor
+from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnded, Processes, ProcessFell, StartFailed
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
+from backbone.launcher.health_watch import HealthWatch
+from backbone.launcher.other_hosts import OtherHosts
+from backbone.launcher.outcome import BringUpObserver, Outcome
+from backbone.mission.behavior_orders import behavior_orders
+from backbone.mission.model import MissionDescription
+from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
+from backbone.mission_log.operators import OperatorAction, publish_action
+from backbone.nameserver.messages import Components, ListComponents
+from backbone.naming import Subsystem, address
+from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
+from backbone.placer.wishes import Wish, keep_placed
+from backbone.waiting import end_tasks
+from backbone.wire import Accepts, Envelope, Message
+
+log = logging.getLogger(__name__)
+
+STOP_TIME_S = 10.0  # chosen: request, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
+LISTING_TIME_S = 1.0  # chosen: a thousand round trips
+MEET_TIME_S = 5.0  # chosen: the placer knows a creator milliseconds after its token rises, on a busy machine later
+MEET_EACH_S = 0.1  # chosen: too short to notice, and a hundred times the cost of a question
+
+
+class Launcher(Component[NoParameters]):
+    """Starts the core services and the mission, restarts core services, stops all."""
+
+    accepts: ClassVar[Accepts | None] = ListProcesses | AskLog | AskPeople
+
+    def __init__(
+        self,
+        launch: Launch,
+        bus: Bus,
+        clock: Clock,
+        *,
+        keeper: ProcessKeeper,
+        description: MissionDescription,
+        options: UpOptions,
+        observer: BringUpObserver,
+        began_s: float,
+    ) -> None:
+        super().__init__(launch, bus, clock)
+        self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
+        self._began_s = began_s
+        self._wishes: list[Wish] = []
+        self._awaited: set[str] = set()
+        self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
+        self._log = LogKeeper(bus)
+        self.outcome = Outcome()
+        self._others = OtherHosts(description, clock.now_s())
+        self._others_changed = asyncio.Event()
+        keeper.on_fell = self._core_service_fell
+        keeper.on_silent = self._core_service_silent
+        keeper.on_changed = self.changed
+
+    async def connect(self) -> None:
+        """Start the core services in order; start each when the one before is ready."""
+        for launch in core_launches(self._description, self.launch, self._options):
+            async with self._step(launch.name):
+                await self._keeper.start(launch, CORE_POLICY, READY_WITHIN_S)
+        self.bus.watch_alive(f"{Subsystem.BACKBONE}/*", self._backbone_changed)
+
+    async def serve(self) -> None:
+        """Start the mission through the placer and keep it running; publish its health."""
+        self.start_task(self._health_watch.run(), "health")
+        try:
+            await self._start_mission()
+        except BackboneError as error:
+            self.outcome.failure = error
+            self.end(f"could not come up: {error}")
+            return
+        self.outcome.ready_after_s = time.monotonic() - self._began_s
+        self.report("all ready")
+        source = self._description.source
+        publish_action(self.bus, self.clock, OperatorAction.START_MISSION, self._description.name, f"from {source}")
+        watching = asyncio.create_task(self._observer.up(self.bus, self.clock), name="observer")
+        try:
+            if self._options.for_s is None:
+                await watching
+            else:
+                await self.clock.sleep_s(self._options.for_s)
+                self.end(f"ran for {self._options.for_s:g} s")
+        finally:
+            await end_tasks(watching)
+
+    def interrupted(self) -> None:
+        """End because the operator pressed Ctrl-C."""
+        publish_action(self.bus, self.clock, OperatorAction.STOP_MISSION, self._description.name, "Ctrl-C")
+        self.end(signal.SIGINT.name)
+
+    async def answer(self, asked: Envelope[Message]) -> Message:
+        """Answer ``ListProcesses`` for the core services, ``AskLog`` and ``AskPeople``."""
+        match asked.body:
+            case ListProcesses():
+                return Processes(self.launch.host, [], self._keeper.processes())
+            case AskLog() as wanted:
+                return self._log.log.answer(wanted)
+            case AskPeople():
+                return PeopleKnown(self._log.log.people.consoles)
+        return await super().answer(asked)
+
+    def absences(self) -> list[Absence]:
+        """Return the absent core services, components and machines, and the absences of the health watch."""
+        return [*self._own_absences(), *self._health_watch.absences()]
+
+    def _own_absences(self) -> list[Absence]:
+        core = [msgspec.structs.replace(absence, vital=True) for absence in self._keeper.absences()]
+        mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
+        if self.outcome.ready_after_s is None:
+            mission.append(Absence(self._description.name, 0.0, "the mission is coming up", self._being_started()))
+        return [*core, *mission, *self._others.absences()]
+
+    def _being_started(self) -> str:
+        """Return the components for which the start waits, with their feedback."""
+        processes = self._health_watch.picture.processes
+        doing = {name: processes[name].doing for name in self._awaited if name in processes}
+        starts = [f"{name} ({doing[name]})" if doing.get(name) else name for name in sorted(self._awaited)]
+        return f"starts {', '.join(starts)}" if starts else "starts its services"
+
+    async def drain(self) -> None:
+        """Stop the mission in reverse order of its start, then the core services except the nameserver."""
+        async with self._step("stop consoles"):
+            await self._stop_consoles()
+        async with self._step("stop mission"):
+            await self._stop_mission()
+        if self._others.offering:
+            async with self._step("stop creators of other hosts"):
+                await self._stop_other_hosts()
+        async with self._step("stop core services"):
+            for launch in reversed(core_launches(self._description, self.launch, self._options)):
+                self.outcome.ended.append(await self._keeper.end(launch.name, "the mission ends"))
+
+    # ------------------------------------------------------------------ start
+    def _backbone_changed(self, address: str, stands: bool) -> None:
+        if self._others.token_changed(address, stands, self.clock.now_s()):
+            self.changed()
+        self._others_changed.set()
+
+    async def _wait_for_other_hosts(self) -> None:
+        """Return as soon as every declared machine has its creator in the mission."""
+        if self._others.missing:
+            self._observer.announce(
+                f"the mission's secret, for its other hosts: {Path(self.launch.run_directory) / SECRET_NAME}"
+            )
+        for host in self._others.missing:
+            self._observer.announce(
+                f"waiting for host {host}; copy the secret there and type: {self._others.command(host)}"
+            )
+        while self._others.missing:
+            await asyncio.gather(*(self._wait_for_host(host) for host in self._others.missing))
+
+    async def _wait_for_host(self, host: str) -> None:
+        async with self._step(f"host {host}"):
+            while host in self._others.missing:
+                self.report(f"waits for host {', '.join(self._others.missing)}")
+                self._others_changed.clear()
+                await self._others_changed.wait()
+
+    async def _start_mission(self) -> None:
+        await self._wait_for_other_hosts()
+        description = self._description
+        hardware = [Start(c.type, c.name, c.parameters, c.host, process=c.process) for c in description.components]
+        hardware += [Start(r.type, r.name, r.rc_parameters(), r.host, process=r.process) for r in description.resources]
+        async with self._step(
+            "simulated world and resource controllers" if description.components else "resource controllers"
+        ):
+            await self._start_all(hardware)
+        async with self._step("behaviors"):
+            await self._start_all(behavior_orders(description))
+
+    async def _start_all(self, orders: list[Start]) -> None:
+        """Start all components and keep them running; return when all run.
+
+        Raises:
+            Refusal: The first refusal of a start.
+        """
+        placed = [asyncio.get_running_loop().create_future() for _ in orders]
+        for order, first in zip(orders, placed, strict=True):
+            self.start_task(self._keep(order, first), f"keep {order.name}")
+        await asyncio.gather(*placed)
+
+    async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
+        """Keep one wish of the mission file; an order to stop suspends it until the component is started again."""
+
+        def now_placed(_placement: Placement, _was_there: bool) -> None:
+            self._awaited.discard(order.name)
+            if not placed.done():
+                placed.set_result(None)
+
+        self._awaited.add(order.name)
+        subsystem = next(each.subsystem for each in self._description.types if each.name == order.type)
+        component = address(subsystem, order.name)
+        while True:
+            wish = Wish(order.name, started=placed.done())
+            self._wishes.append(wish)
+            try:
+                stopped = await self._keep_placed(wish, order, component, now_placed)
+            except Refusal as refusal:
+                placed.set_exception(refusal)
+                return
+            finally:
+                self._wishes.remove(wish)
+            if not placed.done():  # stopped before it ran: the bring-up does not wait for it
+                placed.set_result(None)
+            self._awaited.discard(order.name)
+            self.publish_event(order.name, f"is not wanted any more: {stopped}")
+            monitor = PeerMonitor(self.bus, component)
+            try:
+                await monitor.wait_there()
+            finally:
+                monitor.close()
+
+    async def _keep_placed(
+        self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
+    ) -> str:
+        """Keep it placed; repeat a refused start while another machine is missing or is new to the placer."""
+        until_s = time.monotonic() + MEET_TIME_S
+        while True:
+            try:
+                return await keep_placed(
+                    self.bus, self.clock, wish, order, at, on_placed=now_placed, on_changed=self.changed
+                )
+            except (NoHost, StartFailed):
+                if not self._others.names or (not self._others.missing and time.monotonic() >= until_s):
+                    raise
+            if self._others.missing:
+                until_s = time.monotonic() + MEET_TIME_S
+            await self.clock.sleep_s(MEET_EACH_S * self.clock.rate)
+
+    # ------------------------------------------------------------------ stop
+    async def _stop_consoles(self) -> None:
+        """Ask every console to stop; each gives its robot back."""
+        with contextlib.suppress(LinkError):  # without a nameserver no console can be reached
+            listing = await self.bus.ask(
+                NAMESERVER, ListComponents(subsystem=Subsystem.UI_CONSOLE), Components, within_s=LISTING_TIME_S
+            )
+            stops = (
+                self.bus.ask(console.address, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
+                for console in listing.components
+            )
+            await asyncio.gather(*stops, return_exceptions=True)
+
+    async def _stop_mission(self) -> None:
+        """Stop behaviors first, which stop their children, then the remaining ARCs, then hardware."""
+        description = self._description
+        roots = [order.name for order in behavior_orders(description)]
+        hardware = [r.name for r in description.resources] + [c.name for c in description.components]
+        for name in reversed(roots):
+            await self._stop(name)
+        with contextlib.suppress(LinkError, Refusal):  # without a placer the creators end the rest
+            left = await self.bus.ask(PLACER, ListPlacements(), Placements, within_s=LISTING_TIME_S)
+            others = [p.name for p in left.placements if p.name not in hardware]
+            await asyncio.gather(*(self._stop(name) for name in others))
+        await asyncio.gather(*(self._stop(r.name) for r in description.resources))
+        await asyncio.gather(*(self._stop(c.name) for c in description.components))
+
+    async def _stop(self, name: str) -> None:
+        try:
+            ended = await self.bus.ask(PLACER, StopComponent(name, "the mission ends"), Ended, within_s=STOP_TIME_S)
+        except (Refusal, LinkError) as error:
+            log.info("%s: %s", name, error)
+            return
+        self.outcome.ended.append(ProcessEnded(name, ended.by, 0))
+
+    async def _stop_other_hosts(self) -> None:
+        """Ask the other machines to end their creators, and wait; a silent machine ends its creator by itself."""
+        stops = (
+            self.bus.ask(offer, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
+            for offer in self._others.offering
+        )
+        await asyncio.gather(*stops, return_exceptions=True)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(STOP_TIME_S):
+                while self._others.offering:
+                    self._others_changed.clear()
+                    await self._others_changed.wait()
+        for offer in self._others.offering:
+            self._observer.announce(f"{offer} did not confirm its end; a machine that is cut off ends all by itself")
+
+    # ------------------------------------------------------------------ watch
+    def _core_service_fell(self, fell: ProcessFell) -> None:
+        self.publish_event(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
+
+    def _core_service_silent(self, name: str, silent_s: float) -> None:
+        said = f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again"
+        self.publish_event(name, said, LogLevel.WARNING)
+        self.changed()
+
+    @contextlib.asynccontextmanager
+    async def _step(self, step: str) -> AsyncIterator[None]:
+        self._observer.began(step)
+        began_s = time.monotonic()
+        yield
+        self._observer.done(step, time.monotonic() - began_s)

@@ -1,0 +1,54 @@
+"""Outcome of a mission, and the observer that shows its bring-up to a person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from backbone.bus.interface import Bus, Clock
+from backbone.creator.messages import EndedBy, ProcessEnded
+
+
+@dataclass
+class Outcome:
+    """The outcome of a mission.
+
+    Attributes:
+        ready_after_s: Seconds of the machine from the start until all was ready; None if it was never ready.
+        failure: Why it failed; None if it did not fail.
+        ended: How each process ended, in the order of their ends.
+    """
+
+    ready_after_s: float | None = None
+    failure: BaseException | None = None
+    ended: list[ProcessEnded] = field(default_factory=list)
+
+    @property
+    def pushed(self) -> list[ProcessEnded]:
+        """Processes that needed a signal, because they were starting or did not answer."""
+        return [end for end in self.ended if end.by in (EndedBy.SIGTERM, EndedBy.SIGKILL)]
+
+    @property
+    def went_well(self) -> bool:
+        """True if it came up, nothing failed, and every process ended in good order or by SIGTERM."""
+        killed = any(end.by is EndedBy.SIGKILL for end in self.ended)
+        return self.ready_after_s is not None and self.failure is None and not killed
+
+
+class BringUpObserver(Protocol):
+    """Shows a mission's bring-up, run and end to a person."""
+
+    def began(self, step: str) -> None:
+        """Show that this step has begun."""
+
+    def done(self, step: str, took_s: float) -> None:
+        """Show that this step is done after these seconds of the machine."""
+
+    def announce(self, line: str) -> None:
+        """Show a message to the person."""
+
+    def connected(self, bus: Bus) -> None:
+        """Subscribe to the mission's messages. Called when only the hub is up."""
+
+    async def up(self, bus: Bus, clock: Clock) -> None:
+        """Run while the mission is up; cancelled when it ends."""

@@ -1,0 +1,159 @@
+"""Bring-up of one component: a host is chosen, its creator starts the component, and another host follows if it dies.
+
+A component starts on no host while a silent host may still run it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from backbone.addresses import NAMESERVER
+from backbone.bus.interface import Bus, Clock
+from backbone.creator.messages import Spawned, StartFailed
+from backbone.errors import LinkError, NoResponder
+from backbone.nameserver.messages import Resolve, Resolved, UnknownName
+from backbone.placer.creators import ANSWER_EACH_S, SPAWN_WITHIN_S, Creators, Fate, creator_of
+from backbone.placer.decisions import PlacementPhase, PlacementRecord
+from backbone.placer.messages import CreatorSilent, NoHost, Started, StoppedMeanwhile
+from backbone.placer.news import News
+from backbone.placer.placement_book import PlacementBook
+
+CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
+OLD_LIFE_S = 5.0  # chosen: longer than any lease that keeps tokens of a lost host's components
+SPAWN_TRIES = 3  # chosen: two creators may die for other reasons; a third dies of the order
+
+
+class BringUp:
+    """Starts components whose records are in the book."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        book: PlacementBook,
+        creators: Creators,
+        news: News,
+        *,
+        note: Callable[[str, str], object],
+        is_meeting: Callable[[], bool],
+    ) -> None:
+        """Start components through these creators.
+
+        Args:
+            bus: For questions to nameserver and creators.
+            clock: The mission's clock.
+            book: All placements; the choice of hosts.
+            creators: Answer for orders whose answer was lost.
+            news: What happens meanwhile.
+            note: Subject, event → the story.
+            is_meeting: True while a creator is met that may give a host.
+        """
+        self._bus, self._clock, self._book, self._creators, self._news = bus, clock, book, creators, news
+        self._note, self._is_meeting = note, is_meeting
+
+    async def bring_up(self, record: PlacementRecord) -> Started:
+        """Start the component on a host and return when it is ready.
+
+        Raises:
+            Refusal: It does not run; the record stays STARTING, or RUNNING and suspect if the outcome is unknown.
+        """
+        name = record.spawn.name
+        await self._unfenced(record)
+        for tries_left in reversed(range(SPAWN_TRIES)):
+            await self._choose(record)
+            if record.phase is not PlacementPhase.STARTING:  # it returned with a host that was only cut off
+                return started(record)
+            self._note(name, f"goes to {record.host}: {'; '.join(record.reasons)}")
+            spawn = record.spawn
+            try:
+                spawned = await self._bus.ask(creator_of(record.host), spawn, Spawned, within_s=SPAWN_WITHIN_S)
+                pid = spawned.pid
+            except StartFailed as refusal:
+                self._refuse_unwanted(record)
+                if self._book.is_alive(record.host) or not tries_left:
+                    raise
+                self._note(name, f"was ended with {record.host}: {refusal.detail}")
+                continue
+            except LinkError as error:
+                self._note(name, f"was ordered on {record.host} without an answer: {error}")
+                fate, pid = await self._creators.fate_of_spawn(record)
+                if fate is Fate.HOST_LOST:
+                    await self._unfenced(record)
+                    if self._book.is_alive(record.host):  # it was only cut off, and may have started it
+                        fate, pid = await self._creators.fate_of_spawn(record)
+                self._refuse_unwanted(record)
+                lost = fate is Fate.HOST_LOST or (fate is Fate.NOT_DONE and isinstance(error, NoResponder))
+                if lost and tries_left:
+                    continue
+                if fate is not Fate.DONE:
+                    raise self._silent(record, fate, error) from error
+            if record.unwanted:
+                await self._creators.end(record.host, name, "was stopped while it started")
+                self._refuse_unwanted(record)
+            self._book.started(name, pid, self._clock.now_s())
+            self._note(name, f"is ready on {record.host}, pid {pid}")
+            break
+        return started(record)
+
+    async def _unfenced(self, record: PlacementRecord) -> None:
+        """Return when no silent host can run the component any more, or when it has returned with its host."""
+        name = record.spawn.name
+        while record.phase is PlacementPhase.STARTING and not record.unwanted:
+            until_s = self._book.fenced_until_s(name, self._clock.now_s())
+            if until_s is None:
+                return
+            record.doing = "waits until the silent host has ended it"
+            await self._news.or_at(until_s)
+
+    async def _choose(self, record: PlacementRecord) -> None:
+        """Choose a host unless the component has returned; wait a while if only a creator's return makes one possible.
+
+        Raises:
+            NoHost: No host is possible.
+        """
+        name, until_s = record.spawn.name, self._clock.now_s() + CREATOR_BACK_S * self._clock.rate
+        while record.phase is PlacementPhase.STARTING:
+            self._refuse_unwanted(record)
+            try:
+                self._book.choose(name, self._clock.now_s())
+            except NoHost as refusal:
+                if not (self._is_meeting() or self._book.may_find_host(name)) or self._clock.now_s() >= until_s:
+                    raise
+                self._note(name, f"waits for a creator: {refusal.detail}")
+                await self._news.or_at(until_s)
+            else:
+                return
+
+    def _refuse_unwanted(self, record: PlacementRecord) -> None:
+        if record.unwanted:
+            raise StoppedMeanwhile(f"{record.spawn.name} was stopped before it had started")
+
+    def _silent(self, record: PlacementRecord, fate: Fate, error: LinkError) -> CreatorSilent:
+        name, host = record.spawn.name, record.host
+        if fate in (Fate.NOT_DONE, Fate.HOST_LOST):
+            return CreatorSilent(f"{name}: {error}; it does not run on {host}", name=name, outcome="not_running")
+        self._book.unsure(name, self._clock.now_s())
+        return CreatorSilent(f"{name}: {error}; whether it runs on {host} is unknown", name=name, outcome="unknown")
+
+    async def old_life_ended(self, record: PlacementRecord) -> None:
+        """Return when the name is free or has returned, because a component dies a moment after its creator."""
+        name, until_s = record.spawn.name, self._clock.now_s() + OLD_LIFE_S * self._clock.rate
+        while self._clock.now_s() < until_s and record.phase is PlacementPhase.STARTING and not record.unwanted:
+            try:
+                await self._bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=ANSWER_EACH_S)
+            except UnknownName:
+                return
+            except LinkError as error:
+                self._note(name, f"it is unknown whether its old process has ended: {error}")
+            await self._news.or_at(min(until_s, self._clock.now_s() + ANSWER_EACH_S / 5 * self._clock.rate))
+
+    async def pause(self, record: PlacementRecord, pause_s: float) -> None:
+        """Return after this many seconds of the machine, or when the component is unwanted."""
+        until_s = self._clock.now_s() + pause_s * self._clock.rate
+        while self._clock.now_s() < until_s and not record.unwanted:
+            await self._news.or_at(until_s)
+
+
+def started(record: PlacementRecord) -> Started:
+    """Return the answer to the order that started this component."""
+    return Started(record.address, record.host, record.pid, list(record.reasons))

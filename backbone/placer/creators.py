@@ -1,0 +1,137 @@
+"""Creators: the placer's questions and orders to the creators of all hosts, and what a lost answer leaves open."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from backbone.addresses import NAMESERVER
+from backbone.bus.interface import Bus, Clock
+from backbone.component.asking import ask_until_answered
+from backbone.component.messages import LifeState
+from backbone.creator.messages import (
+    START_MOST_S,
+    EndedBy,
+    EndProcess,
+    ListProcesses,
+    NotHere,
+    ProcessEnded,
+    Processes,
+    creator_name,
+)
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.errors import LinkError
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.naming import Subsystem
+from backbone.placer.decisions import PlacementRecord
+from backbone.placer.messages import CreatorSilent
+from backbone.placer.news import News
+from backbone.placer.placement_book import PlacementBook
+
+ANSWER_EACH_S, ANSWER_WITHIN_S = 1.0, 5.0  # chosen: a killed core service is back within one second
+SPAWN_WITHIN_S = START_MOST_S + 5.0  # chosen: a creator's limit and a moment; silence ends a start long before
+END_MARGIN_S = 5.0  # chosen: the same for ends
+
+
+class Fate(Enum):
+    """Outcome of an order that was not answered."""
+
+    DONE = "done"
+    NOT_DONE = "not done"
+    HOST_LOST = "host lost"
+    UNKNOWN = "unknown"
+
+
+class Creators:
+    """Asks the creators of all hosts."""
+
+    def __init__(self, bus: Bus, clock: Clock, book: PlacementBook, news: News) -> None:
+        self._bus, self._clock, self._book, self._news = bus, clock, book, news
+
+    async def listed(self) -> Components:
+        """Return the nameserver's list of creators.
+
+        Raises:
+            LinkError: The nameserver did not answer.
+        """
+        return await ask_until_answered(
+            self._bus,
+            self._clock,
+            NAMESERVER,
+            ListComponents(type=CREATOR),
+            Components,
+            each_s=ANSWER_EACH_S,
+            within_s=ANSWER_WITHIN_S,
+        )
+
+    async def processes_on(self, host: str) -> Processes | None:
+        """Return the list of the host's creator; None if it does not answer or is gone."""
+        until_s = self._clock.now_s() + ANSWER_WITHIN_S * self._clock.rate
+        while self._clock.now_s() < until_s and self._book.is_alive(host):
+            try:
+                return await self._bus.ask(creator_of(host), ListProcesses(), Processes, within_s=ANSWER_EACH_S)
+            except LinkError:
+                await self._news.or_at(self._clock.now_s() + ANSWER_EACH_S / 5 * self._clock.rate)
+        return None
+
+    async def end(self, host: str, name: str, reason: str) -> EndedBy:
+        """End the component on this host.
+
+        Raises:
+            CreatorSilent: The creator lives but does not answer; the outcome is unknown.
+        """
+        order = EndProcess(name, reason)
+        within_s = order.ask_s + order.term_s + END_MARGIN_S
+        try:
+            return (await self._bus.ask(creator_of(host), order, ProcessEnded, within_s=within_s)).by
+        except NotHere:
+            return EndedBy.ITSELF
+        except LinkError as error:
+            processes = await self.processes_on(host)
+            if processes is None:
+                gone = not self._book.is_alive(host)
+            else:
+                gone = all(process.spawn.name != name for process in processes.processes)
+            if gone:
+                return EndedBy.ITSELF
+            raise CreatorSilent(
+                f"{name}: {error}; whether it still runs on {host} is unknown", name=name, outcome="unknown"
+            ) from error
+
+    async def fate_of_spawn(self, record: PlacementRecord) -> tuple[Fate, int]:
+        """Ask the creator for the outcome of an unanswered order, and for the pid if the component is ready.
+
+        If only the answer was lost, the component still becomes ready, and this method waits for it.
+        """
+        until_s = self._clock.now_s() + SPAWN_WITHIN_S * self._clock.rate
+        while True:
+            answered = await self.processes_on(record.host)
+            if answered is None:
+                return (Fate.UNKNOWN if self._book.is_alive(record.host) else Fate.HOST_LOST), 0
+            mine = [one for one in answered.processes if one.spawn.name == record.spawn.name]
+            if not mine:
+                return Fate.NOT_DONE, 0
+            if mine[0].pid and await self._is_ready(record.spawn.name):
+                return Fate.DONE, mine[0].pid
+            if self._clock.now_s() >= until_s:
+                return Fate.UNKNOWN, 0
+            await self._news.or_at(min(until_s, self._clock.now_s() + ANSWER_EACH_S * self._clock.rate))
+
+    async def _is_ready(self, name: str) -> bool:
+        try:
+            resolved = await ask_until_answered(
+                self._bus,
+                self._clock,
+                NAMESERVER,
+                Resolve(name),
+                Resolved,
+                each_s=ANSWER_EACH_S,
+                within_s=ANSWER_WITHIN_S,
+            )
+        except (UnknownName, LinkError):
+            return False
+        return resolved.component.state is LifeState.READY
+
+
+def creator_of(host: str) -> str:
+    """Return the address of a host's creator."""
+    return f"{Subsystem.BACKBONE}/{creator_name(host)}"

@@ -1,0 +1,112 @@
+"""Hooks of a behavior: everything that a behavior of one's own may override.
+
+Each hook documents when it is called, its purpose, and what it must not do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from mission_control.behavior_tree import ArcNeed, Decision
+from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import Frame
+
+
+class BehaviorHooks:
+    """What happens to a behavior, and its own decisions."""
+
+    async def start(self) -> None:
+        """Prepare.
+
+        When: once, after readiness, before the claim of the ARC and the start of children.
+        What: subscribe to events of other components, set up state. Not: wait for the ARC or for children.
+        """
+
+    def need(self) -> ArcNeed | None:
+        """Return the ARC to claim.
+
+        When: once, after ``start``. What: by default the ARC of the tree; a behavior that computes better run times
+        returns the same need with these. Not: ask for another kind of ARC.
+        """
+        return None
+
+    async def resumed(self, rcs: Mapping[str, str]) -> None:
+        """Continue with the granted RCs.
+
+        When: at the begin of each grant; commands pass and pictures arrive from now on.
+        What: inform algorithms of the elapsed time. Not: drive in a loop; that is ``act``.
+
+        Args:
+            rcs: Kind → name of the granted RCs.
+        """
+
+    async def act(self) -> None:
+        """Command the robot.
+
+        When: runs as a task from each ``resumed`` on; it is cancelled before ``suspending`` and ``suspended``.
+        What: await ``self.arc`` commands and the clock, keep progress on ``self``. If a command is too late for the
+        grant, the task ends without an error. After a ``LinkError`` it begins again; after an operator's stop it begins
+        again when that stop is lifted.
+        Not: catch the cancellation and continue.
+        """
+
+    async def suspending(self, deadline_s: float) -> None:
+        """Stop cleanly.
+
+        When: shortly before the end of a slice, except before an override by a human. A behavior that overrides neither
+        this hook nor ``act`` is not called. Commands still pass.
+        What: stop the robot, then return. Not: exceed the deadline.
+
+        Args:
+            deadline_s: Seconds left.
+        """
+
+    def not_now(self) -> float:
+        """Return the time that is needed beyond the end of the slice.
+
+        When: shortly before the end of the minimum run time and of each extension, if the maximum run time is longer
+        and the behavior overrides this hook.
+        What: return an estimate of the needed time, from known data. Not: wait; ask for spare time, because other ARCs
+        wait for it; rely on it, because a higher behavior or a person still preempts.
+
+        Returns:
+            Seconds still needed beyond the end of the slice; 0: it may end.
+        """
+        return 0.0
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Handle the end of a grant.
+
+        When: after every loss of the RCs, also without an announcement. What: keep the state, report it.
+        Not: send commands; no picture arrives until ``resumed``.
+
+        Args:
+            reason: ``slice``, ``higher``, ``rc``, ``lost`` …
+            by: The ARC or RC that caused it.
+        """
+
+    def see(self, frame: Frame) -> None:
+        """Process a picture.
+
+        When: for the newest picture of the present grant; older pictures are skipped.
+        What: detect, publish, ``report``. Not: take longer than a picture's period, because it blocks the event loop.
+        """
+
+    async def child_finished(
+        self,
+        child: str,  # noqa: ARG002  for those who override
+        status: BehaviorStatus,
+        payload: Mapping[str, object],  # noqa: ARG002
+    ) -> Decision:
+        """Decide what follows the end of a child.
+
+        When: a child reported success or failure, was refused at its start, or fell too often.
+        What: return the decision; by default a failure aborts, a success continues. Not: start or stop children here.
+        """
+        return Decision.NEXT if status is BehaviorStatus.SUCCESS else Decision.ABORT
+
+    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
+        """Conclude after the end of all children.
+
+        When: the last child finished, or one aborted the others. What: by default, finish with the same status.
+        """

@@ -1,0 +1,191 @@
+"""ChildKeeper: keeps the children of a behavior running through the placer, and adopts those of an earlier life."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+
+from backbone.addresses import PLACER
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.asking import ask_until_answered
+from backbone.component.messages import Absence, LogLevel
+from backbone.creator.messages import ProcessFell, creator_name
+from backbone.errors import LinkError, Refusal, code_of
+from backbone.keys import Conversation
+from backbone.mission.behavior_orders import PathStep
+from backbone.naming import Subsystem, address, component_of
+from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, StopComponent
+from backbone.placer.wishes import Wish, keep_placed
+from backbone.wire import Envelope
+from mission_control.behavior_tree import BehaviorNode
+from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus
+
+log = logging.getLogger(__name__)
+
+REPLY_TIME_S = 1.0  # chosen: parents and placer answer in milliseconds
+START_TIME_S = 30.0  # chosen: as for ARCs, a child's host may be busy
+ADOPT_WITHIN_S = 10.0  # chosen: a child that is being restarted answers within this
+START_PATIENCE_S = 60.0  # chosen: a link cut of 30 s, and the tries that began in it; health names it meanwhile
+AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
+
+
+class ChildKeeper:
+    """Starts, adopts and stops the children of one behavior."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        nodes: Mapping[str, BehaviorNode],
+        path: Callable[[], Sequence[PathStep]],
+        *,
+        reported: Callable[[str, BehaviorStatus, Mapping[str, object]], None],
+        left: Callable[[str], None],
+        begin: Callable[[Coroutine[object, None, None], str], asyncio.Task[None] | None],
+        note: Callable[[str, str], object],
+        publish_event: Callable[..., None],
+        changed: Callable[[], None],
+    ) -> None:
+        """Keep no child yet.
+
+        Args:
+            bus: Bus of the behavior.
+            clock: The mission's clock.
+            nodes: Name of a child → its node.
+            path: Names and priorities from the mission's root to the behavior, as they are now.
+            reported: A child finished, or cannot run.
+            left: An order stopped a child.
+            begin: Runs work as a task, unless the behavior is ending.
+            note: Subject, event → the story.
+            publish_event: The same, for people.
+            changed: Called when ``absences`` may have changed.
+        """
+        self._bus, self._clock, self._nodes, self._path, self._owner = bus, clock, nodes, path, bus.source
+        self._reported, self._left, self._begin = reported, left, begin
+        self._note, self._publish_event, self._changed = note, publish_event, changed
+        self._kept: dict[str, asyncio.Task[None]] = {}
+        self._wishes: dict[str, Wish] = {}
+        self._heard_creators: dict[str, Subscription] = {}
+
+    def absences(self) -> list[Absence]:
+        """Return the wanted children that do not run."""
+        return [absence for wish in self._wishes.values() if (absence := wish.absence()) is not None]
+
+    async def start(self, name: str) -> None:
+        """Start the child and keep it running."""
+        keeping = self._begin(self._keep_child(name), f"child {name}")
+        if keeping is not None:
+            self._kept[name] = keeping
+
+    async def _keep_child(self, name: str) -> None:
+        """Keep the child running until an order stops it; adopt a child of an earlier life of this behavior."""
+        wish = self._wishes[name] = Wish(name)
+        order, at = self._nodes[name].order(self._path()), address(Subsystem.MISSION_CONTROL, name)
+        try:
+            stopped = await keep_placed(
+                self._bus,
+                self._clock,
+                wish,
+                order,
+                at,
+                on_placed=self._child_placed,
+                on_changed=self._changed,
+                patience_s=START_PATIENCE_S,
+            )
+        except Refusal as refusal:
+            self._publish_event(name, f"could not be started: {refusal}", LogLevel.WARNING)
+            self._reported(name, BehaviorStatus.FAILURE, why(refusal))
+            return
+        self._publish_event(name, f"is not wanted any more: {stopped}")
+        del self._kept[name], self._wishes[name]
+        self._left(name)
+
+    def _child_placed(self, placement: Placement, was_there: bool) -> None:
+        self._hear_creator(placement.host)
+        if was_there:
+            self._note(placement.name, "was running and is adopted")
+            self._begin(self._adopt(placement.name), f"adopt {placement.name}")
+
+    async def _adopt(self, name: str) -> None:
+        """Ask an adopted child for its progress."""
+        child = address(Subsystem.MISSION_CONTROL, name)
+        try:
+            state = await ask_until_answered(
+                self._bus,
+                self._clock,
+                child,
+                AskBehavior(),
+                BehaviorState,
+                each_s=REPLY_TIME_S,
+                within_s=ADOPT_WITHIN_S,
+            )
+        except (LinkError, Refusal) as error:  # it is restarting and then runs from its beginning
+            log.info("child %s does not report its progress: %s", name, error)
+            return
+        self._reported(name, state.status, state.payload)
+
+    async def stop_those_of_an_earlier_life(self, started: Callable[[str], bool]) -> None:
+        """Stop running children of an earlier life of the owner that this life does not start.
+
+        Args:
+            started: Name of a child → whether this life has started it.
+        """
+        try:
+            placed = await ask_until_answered(
+                self._bus,
+                self._clock,
+                PLACER,
+                ListPlacements(),
+                Placements,
+                each_s=REPLY_TIME_S,
+                within_s=ADOPT_WITHIN_S,
+            )
+        except LinkError as error:
+            log.warning("%s does not know which children it left running: %s", component_of(self._owner), error)
+            return
+        mine = [each.name for each in placed.placements if each.requester == self._owner and each.name in self._nodes]
+        await asyncio.gather(*(self.stop(name) for name in mine if not started(name)))
+
+    async def stop(self, name: str) -> None:
+        """Return when the placer has ended the child, or does not have it."""
+        await end_task(self._kept.pop(name, None))
+        self._wishes.pop(name, None)
+        while True:
+            try:
+                await self._bus.ask(
+                    PLACER, StopComponent(name, f"{component_of(self._owner)} ends it"), Ended, within_s=START_TIME_S
+                )
+            except (LinkError, CreatorSilent) as error:
+                log.info("child %s is not stopped yet: %s", name, error)
+            except Refusal as refusal:
+                log.info("child %s: %s", name, refusal)
+                return
+            else:
+                return
+            await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+
+    def _hear_creator(self, host: str) -> None:
+        if host not in self._heard_creators:
+            creator = address(Subsystem.BACKBONE, creator_name(host))
+            self._heard_creators[host] = self._bus.subscribe(
+                creator, Conversation.EVENTS, ProcessFell, self._heard_fall
+            )
+
+    def _heard_fall(self, envelope: Envelope[ProcessFell]) -> None:
+        fell = envelope.body
+        if fell.name in self._nodes and fell.failing:
+            fell_too_often = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
+            self._reported(fell.name, BehaviorStatus.FAILURE, fell_too_often)
+
+
+async def end_task(task: asyncio.Task[None] | None) -> None:
+    """Cancel a task and return when it has ended; its task group handles a bug in it."""
+    if task is not None and task is not asyncio.current_task():
+        task.cancel()
+        await asyncio.wait({task})
+
+
+def why(refusal: Refusal) -> dict[str, object]:
+    """Return a refusal as the payload of a report."""
+    return {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}

@@ -1,0 +1,82 @@
+"""Audit: the events of a simulated mission, in order; the laws examine only these.
+
+Rule of this file: events contain no addresses of objects, no process ids and no time of a machine, so that two runs of
+one seed give the same bytes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """One event.
+
+    Attributes:
+        who: Name of its component.
+        what: One word; see the laws for the meaning of each.
+        values: The names and numbers of this case.
+    """
+
+    at_s: float
+    who: str
+    what: str
+    values: dict[str, Any] = field(default_factory=dict)
+
+    def to_line(self) -> str:
+        """Return the event as one line of JSON, the same for the same content."""
+        return json.dumps([round(self.at_s, 9), self.who, self.what, self.values], sort_keys=True)
+
+    def concerns(self, names: Iterable[str]) -> bool:
+        """Return whether the event is about one of these names."""
+        mentioned = {self.who, *(str(value) for value in _flat(self.values))}
+        return not mentioned.isdisjoint(names)
+
+    def __str__(self) -> str:
+        values = ", ".join(f"{name} {_short(value)}" for name, value in self.values.items())
+        return f"{self.at_s:10.4f} s  {self.who}: {self.what}{f' ({values})' if values else ''}"
+
+
+class Audit:
+    """Records the events of one run."""
+
+    def __init__(self) -> None:
+        self.happenings: list[Happening] = []
+
+    def note(self, who: str, what: str, **values: object) -> None:
+        """Record an event now."""
+        self.happenings.append(Happening(asyncio.get_running_loop().time(), who, what, values))
+
+    def digest(self) -> str:
+        """Return a fingerprint of all events."""
+        digest = hashlib.sha256()
+        for happening in self.happenings:
+            digest.update(happening.to_line().encode() + b"\n")
+        return digest.hexdigest()
+
+
+current_audit: ContextVar[Audit] = ContextVar("current_audit")
+"""The audit of the present task's run; drivers, which a mission names by class path, find it here."""
+
+
+def _flat(value: object) -> Iterator[object]:
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield name
+            yield from _flat(inner)
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from _flat(inner)
+    else:
+        yield value
+
+
+def _short(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,234 @@
+"""Fault campaign: many simulated missions on all processors, and the story of the first that breaks a law."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+
+import msgspec
+
+from mission_control.laboratory.simulation.faults import Fault, Hang, KillFault, MessageFault
+from mission_control.laboratory.simulation.laws import Broken, story_of
+from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
+from mission_control.laboratory.simulation.shrink import smallest
+from mission_control.laboratory.simulation.supervised_mission import run_supervised
+from mission_control.laboratory.simulation.supervision_faults import SupervisionFault
+
+BATCH = 10  # chosen: two seconds of work, so that progress is visible and a broken law ends the campaign soon
+ALONE = 2 * BATCH  # chosen: fewer missions are finished before other processes have started
+
+
+AnyFault = Fault | SupervisionFault
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignCount:
+    """Counts of some runs.
+
+    Attributes:
+        runs: Number of seeds; each stands for a pool mission and a supervised one.
+    """
+
+    runs: int = 0
+    happenings: int = 0
+    grants: int = 0
+    packets: int = 0
+    faults: int = 0
+
+    def __add__(self, other: CampaignCount) -> CampaignCount:
+        """Return the sum of both counts."""
+        return CampaignCount(
+            self.runs + other.runs,
+            self.happenings + other.happenings,
+            self.grants + other.grants,
+            self.packets + other.packets,
+            self.faults + other.faults,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A mission that breaks a law.
+
+    Attributes:
+        supervised: True: the supervised mission of this seed; False: its pool mission.
+        chaos: True if faults were injected.
+        broken: The law, in the run with the fewest faults.
+        faults: The smallest found set of faults that breaks the law.
+        faults_before: Number of faults in the first run that broke it.
+        story: Events of the concerned components up to the breach.
+    """
+
+    seed: int
+    supervised: bool
+    chaos: bool
+    broken: Broken
+    faults: tuple[AnyFault, ...]
+    faults_before: int
+    story: tuple[str, ...]
+
+    def lines(self) -> Iterator[str]:
+        """Yield the report for people."""
+        mission = "supervised" if self.supervised else "pool"
+        yield f"seed {self.seed}{' --chaos' if self.chaos else ''}, {mission} mission, breaks the law {self.broken}"
+        if self.chaos:
+            yield f"{len(self.faults)} of {self.faults_before} faults are enough for it:"
+            yield from (f"  {fault}" for fault in self.faults)
+        yield f"what happened to {', '.join(self.broken.names)}:"
+        yield from (f"  {line}" for line in self.story)
+        yield f"again: scout-backbone simulate --first {self.seed} --seeds 1{' --chaos' if self.chaos else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignOutcome:
+    """The result of all runs.
+
+    Attributes:
+        count: Counts of all runs.
+        finding: The broken law of the smallest failing seed; None if all laws hold.
+        took_s: Duration, machine seconds.
+    """
+
+    count: CampaignCount
+    finding: Finding | None
+    took_s: float
+
+    def summary(self) -> str:
+        """Return one line for people."""
+        count = self.count
+        verdict = "all laws hold" if self.finding is None else f"broken: {self.finding.broken.law}"
+        return (
+            f"{count.runs} missions, {count.grants} grants, {count.packets} packets, {count.faults} faults on purpose "
+            f"in {self.took_s:.1f} s: {verdict}"
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """Return the result as plain data, for ``--json``."""
+        finding = self.finding
+        plain: dict[str, object] = {**msgspec.to_builtins(self.count), "took_s": round(self.took_s, 3), "broken": None}
+        if finding is not None:
+            plain["broken"] = {
+                "law": finding.broken.law,
+                "seed": finding.seed,
+                "supervised": finding.supervised,
+                "chaos": finding.chaos,
+                "at_s": finding.broken.at_s,
+                "what": finding.broken.what,
+                "names": list(finding.broken.names),
+                "faults": [str(fault) for fault in finding.faults],
+                "faults_before": finding.faults_before,
+                "story": list(finding.story),
+            }
+        return plain
+
+
+def simulate(
+    first: int, seeds: int, *, chaos: bool, tell: Callable[[str], None], processes: int | None = None
+) -> CampaignOutcome:
+    """Run the missions of these seeds until one breaks a law; reproduce and shrink that one.
+
+    Args:
+        first: First seed.
+        seeds: Number of seeds, 1 or more.
+        tell: Called with lines of progress.
+        processes: Number of processes; None: one for each processor, or only this one for few seeds.
+    """
+    began_s = time.monotonic()
+    batches = [range(at, min(at + BATCH, first + seeds)) for at in range(first, first + seeds, BATCH)]
+    workers = processes or (1 if seeds <= ALONE else min(os.cpu_count() or 1, len(batches)))
+    counted, failed = CampaignCount(), list[int]()
+    for count, seed in _in_turn(batches, chaos) if workers == 1 else _spread(batches, chaos, workers):
+        counted += count
+        if seed is not None:
+            failed.append(seed)
+        tell(f"{counted.runs} of {seeds} missions")
+    finding = None
+    if failed:
+        tell(f"seed {min(failed)} breaks a law; looking for the fewest faults that do")
+        finding = find(min(failed), chaos=chaos)
+    return CampaignOutcome(counted, finding, time.monotonic() - began_s)
+
+
+def find(seed: int, *, chaos: bool) -> Finding | None:
+    """Return the law that the mission of this seed breaks, with as few faults as possible; None if all laws hold."""
+    runs = ((supervised, _run_quietly(seed, supervised, chaos)) for supervised in (False, True))
+    supervised, run = next(((supervised, run) for supervised, run in runs if run.broken is not None), (False, None))
+    if run is None or run.broken is None:
+        return None
+    law, least, faults_before = run.broken.law, run, len(run.faults)
+
+    def breaks(faults: Sequence[AnyFault]) -> bool:
+        nonlocal least
+        tried = _run_quietly(seed, supervised, chaos, faults)
+        if tried.broken is None or tried.broken.law != law:
+            return False
+        least = tried
+        return True
+
+    smallest(run.faults, breaks)
+    broken = least.broken or run.broken
+    story = tuple(str(happening) for happening in story_of(broken, least.happenings))
+    return Finding(seed, supervised, chaos, broken, least.faults, faults_before, story)
+
+
+def _in_turn(batches: Sequence[range], chaos: bool) -> Iterator[tuple[CampaignCount, int | None]]:
+    for batch in batches:
+        count, failed = _run_batch(batch, chaos)
+        yield count, failed
+        if failed is not None:
+            return
+
+
+def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tuple[CampaignCount, int | None]]:
+    """Run the batches in fresh processes, one for each worker; begin none after a broken law."""
+    waiting = iter(batches)
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        running = {pool.submit(_run_batch, batch, chaos) for batch in itertools.islice(waiting, workers)}
+        while running:
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                count, failed = future.result()
+                yield count, failed
+                if failed is not None:
+                    waiting = iter(())
+            running |= {pool.submit(_run_batch, batch, chaos) for batch in itertools.islice(waiting, len(done))}
+
+
+def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[CampaignCount, int | None]:
+    """Run missions until one breaks a law; return the counts, and the seed of that mission."""
+    counted = CampaignCount()
+    for seed in batch:
+        counted += CampaignCount(1)
+        for supervised in (False, True):
+            run = _run_quietly(seed, supervised, chaos)
+            counted += _count(run)
+            if run.broken is not None:
+                return counted, seed
+    return counted, None
+
+
+def _run_quietly(seed: int, supervised: bool, chaos: bool, faults: Sequence[AnyFault] | None = None) -> MissionRun:
+    """Run the mission without logging: components log every fault, and the audit holds all that matters."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        if supervised:
+            struck = None if faults is None else [each for each in faults if isinstance(each, SupervisionFault)]
+            return run_supervised(seed, chaos=chaos, faults=struck)
+        said = (
+            None if faults is None else [each for each in faults if isinstance(each, MessageFault | KillFault | Hang)]
+        )
+        return run_mission(seed, chaos=chaos, faults=said)
+    finally:
+        logging.disable(before)
+
+
+def _count(run: MissionRun) -> CampaignCount:
+    words = [happening.what for happening in run.happenings]
+    return CampaignCount(0, len(words), words.count("grant"), words.count("packet"), len(run.faults))

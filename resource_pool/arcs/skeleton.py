@@ -1,0 +1,19 @@
+"""A complete ARC, to be copied: a robot that drives with its lamp on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from resource_pool.arcs.drive import DriveArc
+from resource_pool.rcs.skeleton import Shine
+
+
+class LitDriveArc(DriveArc):
+    """The set of ``DriveArc`` and a lamp, which shines during a grant."""
+
+    roles: ClassVar[Sequence[str]] = (*DriveArc.roles, "lamp")
+
+    async def prepare(self, epochs: Mapping[str, int]) -> None:
+        """Switch the lamp on; the lamp's RC switches it off when the set is given back."""
+        await self.tell_rc("lamp", Shine(self.name, epochs[self.rc("lamp")], 1.0))

@@ -1,0 +1,114 @@
+"""Messages between the simulated world and the drivers of simulated hardware, and what the world publishes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from backbone.ranges import (
+    MANY,
+    Count,
+    Document,
+    Duration,
+    Epoch,
+    Instant,
+    Mention,
+    Meters,
+    Number,
+    Payload,
+    Radians,
+    Rate,
+    Share,
+    StateVector,
+)
+from backbone.wire import Message
+from scout_model.description import AirDescription
+
+
+class RadioPacket(Message, frozen=True):
+    """A packet on the air: published under the world's address as a command, without an acknowledgment.
+
+    Attributes:
+        radio: Its sender.
+        network_id: Network id of its receiver.
+        payload: Bytes of the robot's protocol.
+        arc: For the audit: the ARC that held robot and radio.
+        epoch: For the audit: epoch of the robot when the payload was made.
+        number: Its number among the packets of its radio since the radio was opened.
+        air_time_s: Duration of its bits.
+        robot_stop: For the audit: number of the robot's last stop when the payload was made.
+    """
+
+    radio: Mention
+    network_id: Count
+    payload: Payload
+    arc: Mention = ""
+    epoch: Epoch = 0
+    number: Count = 0
+    air_time_s: Duration = 0.0
+    robot_stop: Count = 0
+
+
+class AskWorld(Message, frozen=True):
+    """Ask for the model of the world."""
+
+
+class WorldModel(Message, frozen=True):
+    """Answer to ``AskWorld``: all that another process needs to draw and receive the same pictures.
+
+    Attributes:
+        mjcf: The compiled world's XML.
+        robots: Robot name → network id.
+        seed: Seed of all random processes of the world.
+        air: The air between robots and base.
+        antenna_m: Position of the base's antenna: x, y, z.
+    """
+
+    mjcf: Document
+    robots: Annotated[dict[Mention, Count], MANY]
+    seed: Number = 0
+    air: AirDescription = AirDescription()
+    antenna_m: tuple[Meters, Meters, Meters] = (0.0, 0.0, 1.0)
+
+
+class AskPose(Message, frozen=True):
+    """Ask for the pose of a body. The simulated world or a camera above the room knows it; a robot does not."""
+
+    body: Mention
+
+
+class Pose(Message, frozen=True):
+    """Answer to ``AskPose``: metres and radians in the room's frame, origin in a corner of the floor."""
+
+    body: Mention
+    at_s: Instant
+    x_m: Meters
+    y_m: Meters
+    heading_rad: Radians
+
+
+class WorldState(Message, frozen=True):
+    """State of the world, published once a frame as telemetry.
+
+    Attributes:
+        frame: Number of the frame.
+        at_s: Mission time of the state.
+        state: float64 vector, little endian; only the model knows its meaning.
+        transmitting: Robot → video frequency of its transmitter, if it is on.
+        on_since: Robot that transmits → first frame on this frequency.
+        motors: Robot that transmits → speed of its wheels, 0 to 1 of their limit; a missing robot stands still.
+    """
+
+    frame: Count
+    at_s: Instant
+    state: StateVector
+    transmitting: Annotated[dict[Mention, Mention], MANY]
+    on_since: Annotated[dict[Mention, Count], MANY] = {}
+    motors: Annotated[dict[Mention, Share], MANY] = {}
+
+
+class ClockTick(Message, frozen=True):
+    """The mission's time, published by the world once a frame, for hosts without a shared monotonic clock."""
+
+    frame: Count
+    at_s: Instant
+    rate: Rate

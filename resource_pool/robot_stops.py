@@ -1,0 +1,60 @@
+"""Emergency stops by operators: stop a robot, ask and watch whether it is stopped, lift the stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from backbone.bus.interface import Bus, Subscription
+from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
+from backbone.wire import Message
+from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop, StopState
+
+REPLY_TIME_S = 1.0  # chosen: a command that takes longer justifies a stop
+
+
+async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopState:
+    """Stop a robot, also one that an ARC holds; nothing moves it until ``lift_stop``, and the holder keeps its grant.
+
+    A stop needs neither grant nor ARC nor RC manager; a second stop keeps the first one's author. For operators only.
+
+    Raises:
+        NotFromYou: The component of ``bus`` is no operator.
+        LinkError: The robot's RC did not answer; the outcome is unknown.
+    """
+    return await _ask_robot(bus, robot, EmergencyStop(reason, user))
+
+
+async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:
+    """Lift the stop of a robot.
+
+    Args:
+        bus: Bus of an operator.
+        stop: The stop that the operator saw.
+        user: Name of the operator, for people.
+
+    Raises:
+        OtherStop: A newer stop is in force.
+        NotFromYou: The component of ``bus`` is no operator.
+        LinkError: The robot's RC did not answer.
+    """
+    return await _ask_robot(bus, stop.rc, LiftStop(stop.number, user))
+
+
+async def ask_stop(bus: Bus, robot: str) -> StopState:
+    """Return whether an operator's stop is in force on the robot.
+
+    Raises:
+        LinkError: The robot's RC did not answer.
+    """
+    return await _ask_robot(bus, robot, AskStop())
+
+
+def watch_stops(bus: Bus, listener: Callable[[StopState], None], robot: str = "*") -> Subscription:
+    """Call the listener whenever this robot, or any, is stopped or freed."""
+    at = f"{Subsystem.RESOURCE_POOL}/{robot}"
+    return bus.subscribe(at, Conversation.EVENTS, StopState, lambda heard: listener(heard.body))
+
+
+async def _ask_robot(bus: Bus, robot: str, question: Message) -> StopState:
+    return await bus.ask(address(Subsystem.RESOURCE_POOL, robot), question, StopState, within_s=REPLY_TIME_S)

@@ -1,0 +1,56 @@
+"""Lease of an ARC's set: the gate may stay open as long as the RC manager renews all RCs of the set. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from backbone.rc_manager.messages import Leases
+from backbone.scheduling.requests import LEASE_S
+
+
+class SetLease:
+    """Leases of the set, as far as the ARC has heard.
+
+    Attributes:
+        until_s: Mission time at which the lease of the open set expires.
+    """
+
+    def __init__(self, arc: str, rate: float) -> None:
+        """Begin without a lease.
+
+        Args:
+            arc: Name of the ARC.
+            rate: Mission seconds per second of the machine.
+        """
+        self.until_s = 0.0
+        self._arc, self._rate = arc, rate
+        self._unfounded: dict[str, int] = {}
+        self._unfounded_since_s = 0.0
+
+    def begin(self, now_s: float) -> None:
+        """Begin a lease with a connection."""
+        self.until_s = now_s + LEASE_S * self._rate
+
+    def heard(self, leases: Leases, at_s: float, epochs: Mapping[str, int]) -> bool:
+        """Extend the lease if all RCs of the set were renewed; return whether the ARC must ask anew.
+
+        It must if the RC manager renews a hold for a whole lease that this ARC does not have. The hold may belong to an
+        earlier ARC of this name. For a shorter time it may be one that is about to open.
+
+        Args:
+            leases: What the RC manager renews.
+            at_s: Mission time of the renewal.
+            epochs: RC → epoch of the ARC's connections; empty: none.
+        """
+        renewed = {lease.rc: lease.epoch for lease in leases.leases if lease.arc == self._arc}
+        if epochs and epochs.items() <= renewed.items():
+            self.until_s = max(self.until_s, at_s + leases.lease_s)
+        return self._is_doubtful(renewed if not epochs else {}, at_s)
+
+    def _is_doubtful(self, unfounded: dict[str, int], now_s: float) -> bool:
+        if unfounded != self._unfounded:
+            self._unfounded, self._unfounded_since_s = unfounded, now_s
+        elif unfounded and now_s - self._unfounded_since_s >= LEASE_S * self._rate:
+            self._unfounded = {}
+            return True
+        return False

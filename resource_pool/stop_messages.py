@@ -1,0 +1,113 @@
+"""Messages of emergency stops: operator → robot RC, past ARC and RC manager; robot RC → subscribers: ``StopState``.
+
+A stop needs no grant.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from backbone.errors import Refusal
+from backbone.ranges import (
+    FEW,
+    Count,
+    Instant,
+    Line,
+    Mention,
+    Text,
+)
+from backbone.wire import Message
+
+
+class EmergencyStop(Message, frozen=True):
+    """Stop this robot; nothing moves it until the stop is lifted. Every operator may stop it at any time.
+
+    Attributes:
+        reason: Reason, for the holder and the log.
+        user: Name of the operator, for people; empty: the console.
+    """
+
+    reason: Line = ""
+    user: Mention = ""
+
+
+class LiftStop(Message, frozen=True):
+    """Let the robot move again.
+
+    Attributes:
+        number: Number of the stop that the operator saw; a newer stop is not lifted.
+        user: Name of the operator, for people; empty: the console.
+    """
+
+    number: Count
+    user: Mention = ""
+
+
+class AskStop(Message, frozen=True):
+    """Ask whether this robot is stopped."""
+
+
+class Stopper(Message, frozen=True):
+    """An operator who stopped a robot.
+
+    Attributes:
+        by: Name of the operator, for people; without a name the address of the console.
+        console: Address of the operator's console, which is asked before the stop is lifted. Empty: unknown.
+    """
+
+    by: Mention
+    console: Mention = ""
+
+
+class StopState(Message, frozen=True):
+    """Answer to the three questions before; also published as an event on every change.
+
+    Attributes:
+        rc: The robot.
+        is_stopped: True: drives and jumps are refused.
+        number: Number of the last order to stop; grows with each, also if the robot was stopped already.
+        by: The operator who stopped it first, or who lifted the last stop.
+        reason: The operator's reason.
+        at_s: Mission time of the stop, or of its end.
+        is_confirmed: False if the radio did not accept the packet that stops the wheels. Then no new packet moves the
+            robot, and its present motion ends by itself within ``COMMAND_TIMEOUT_S``.
+        console: Address of the console of the operator ``by``.
+        also: Other operators who stopped it since it last moved.
+    """
+
+    rc: Mention
+    is_stopped: bool
+    number: Count
+    by: Mention
+    reason: Text
+    at_s: Instant
+    is_confirmed: bool = True
+    console: Mention = ""
+    also: Annotated[list[Stopper], FEW] = []
+
+
+EmergencyQuestion = EmergencyStop | LiftStop | AskStop
+
+
+class EmergencyStopped(Refusal):
+    """An operator has stopped the robot; it did not move.
+
+    Facts: ``rc``, ``number``, ``is_stopped``, ``by``, ``reason``, ``since_s``.
+    """
+
+    code = "scout.emergency_stop"
+    remedy = "See that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
+
+
+class GivenBeforeStop(EmergencyStopped):
+    """The sender did not know the robot's last stop, which was lifted since; facts as ``EmergencyStopped``."""
+
+    code = "scout.given_before_stop"
+    remedy = "Give the command again, now that you know of the stop: let go of the control and press it again."
+
+
+class OtherStop(Refusal):
+    """Another stop than the one to lift is in force; facts: ``number``, ``by``. Nothing is changed."""
+
+    code = "scout.other_stop"
+    remedy = "See which operator stopped the robot since, and lift that stop if the robot may move."

@@ -1,0 +1,106 @@
+"""What the command line says: help whole, wrong words refused early, names completed from the mission that is up."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from backbone.command_line.cli import app
+from backbone.command_line.completion import names_of, people_of, resources_of
+from backbone.command_line.options import hub_endpoint
+from backbone.component.messages import ComponentState, LifeState
+from backbone.errors import HubUnreachable
+from backbone.launcher.endings import ExitCode, complaint_of
+from backbone.moments import NoMoment
+from backbone.picture.mission import MissionPicture
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
+from ui_console.cli import app as console_app
+
+
+@pytest.fixture(autouse=True)
+def _no_mission_is_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+
+@pytest.mark.parametrize("command_line", [app, console_app], ids=["scout-backbone", "scout-console"])
+def test_help_tells_every_command_whole(command_line: Any) -> None:
+    told = CliRunner().invoke(command_line, ["--help"]).output
+    words = " ".join(told.partition("Commands:")[2].split())
+    assert "..." not in words
+    for command in (one for one in command_line.registered_commands if not one.hidden):
+        summary = " ".join((command.callback.__doc__ or "").partition("\n\n")[0].split())
+        assert summary in words
+
+
+@pytest.mark.parametrize("command_line", [app, console_app], ids=["scout-backbone", "scout-console"])
+@pytest.mark.parametrize("wrong", ["garbage", "tcp/", "tcp/host", "tcp/host:port", "192.0.2.7:7447", "ftp/host:1", ""])
+def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(command_line: Any, wrong: str) -> None:
+    command = "status" if command_line is app else "monitor"
+    done = CliRunner().invoke(command_line, [command, "--mission", "m", "--connect", wrong])
+    assert done.exit_code == 2
+    assert "tcp/HOST:PORT" in " ".join(done.output.split())
+    assert "Traceback" not in done.output
+
+
+@pytest.mark.parametrize("right", ["tcp/192.0.2.7:7447", "tcp/[::1]:7447", "tls/lab:1", "unixsock-stream//run/m/hub"])
+def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
+    assert hub_endpoint(right) == right
+
+
+def test_a_hub_that_is_not_there_is_one_sentence_without_anything_inner() -> None:
+    words = ["status", "--mission", "m", "--connect", "unixsock-stream//nowhere/hub"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 4
+    assert re.fullmatch(r"no hub answers at unixsock-stream//nowhere/hub \(.*\)\n", done.stderr)
+    line, _ = complaint_of(HubUnreachable("no hub answers at tcp/x:1"))
+    assert line.startswith("no hub answers at tcp/x:1 (is the mission up there")
+
+
+def test_a_moment_that_is_none_is_wrong_usage() -> None:
+    line, code = complaint_of(NoMoment("'soon' is no moment"))
+    assert code == ExitCode.USAGE
+    assert "14:05" in line
+
+
+# ---------------------------------------------------------------------- completion
+def component(address: str, kind: str, user: str = "") -> ComponentState:
+    return ComponentState(address, kind, "base", 1, LifeState.READY, 0.0, user=user)
+
+
+def picture() -> MissionPicture:
+    found = [
+        component("backbone/creator-base", "creator"),
+        component("mission_control/watch1", "watch_for_motion"),
+        component("ui_console/console-7", "console", "anna"),
+        component("ui_console/console-8", "console", "Ben B."),
+    ]
+    rc = RcView("scout1", "scout", "up", False, 1.0, [], 0, [])
+    request = RequestView(
+        "console-7-drive", found[2].address, RequestState.RUNNING, ["scout1"], 0.0, -1.0, -1.0, "", [], 5.0, "", 1
+    )
+    return MissionPicture("m", 1.0, {one.address: one for one in found}, schedule=Schedule(1.0, [rc], [request], []))
+
+
+def test_what_can_be_asked_about_is_completed_and_nothing_a_shell_takes_apart() -> None:
+    assert names_of(picture()) == [
+        "anna", "base", "console-7", "console-7-drive", "console-8", "creator-base", "scout1", "watch1",
+    ]  # fmt: skip
+    assert resources_of(picture()) == ["scout1"]
+    assert people_of(picture()) == ["anna"]
+
+
+@pytest.mark.parametrize("words", [["why", ""], ["stop", ""], ["story", "sc"], ["log", "--robot", ""]])
+def test_without_a_mission_nothing_is_completed_and_nothing_complained_of(words: list[str]) -> None:
+    typed = ["scout-backbone", *words]
+    environment = {
+        "_SCOUT_BACKBONE_COMPLETE": "complete_bash",
+        "COMP_WORDS": " ".join(typed),
+        "COMP_CWORD": str(len(typed) - 1),
+    }
+    done = CliRunner().invoke(app, [], env=environment, prog_name="scout-backbone")
+    assert (done.output.strip(), done.exit_code) == ("", 0)

@@ -1,0 +1,185 @@
+"""The life of an offer: what ends what runs on a machine that is offered to a mission elsewhere."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus, Clock, LinkListener, Subscription
+from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.component.launch import Launch
+from backbone.component.messages import Absence, AskState, ComponentState, Stop, Stopping
+from backbone.creator.messages import (
+    ListProcesses,
+    Processes,
+    ProcessFell,
+    ProcessState,
+    RestartPolicy,
+    Spawn,
+    creator_name,
+    offer_name,
+)
+from backbone.launcher import offer as offers
+from backbone.launcher.offer import Ending, MachineOffer
+from backbone.naming import Subsystem
+
+CUT_OFF_S = 0.1
+WITHIN_S = 5.0
+
+
+class BusOnACable(LocalBus):
+    """A bus whose link the test cuts and heals."""
+
+    def __init__(self, network: LocalNetwork, source: str, clock: Clock) -> None:
+        super().__init__(network, source, clock)
+        self.link_changed: LinkListener = lambda _up: None
+
+    def watch_link(self, listener: LinkListener) -> Subscription:
+        self.link_changed = listener
+        listener(True)
+        return super().watch_link(lambda _up: None)
+
+
+@dataclass
+class FakeCreator:
+    """Keeps nothing, and notes its calls."""
+
+    on_fell: Callable[[ProcessFell], None] = lambda _fell: None
+    runs: bool = False
+    never_ready: bool = False
+    log: list[str] = field(default_factory=list)
+    missing: list[Absence] = field(default_factory=list)
+    on_changed: Callable[[], None] = lambda: None
+    began: asyncio.Event = field(default_factory=asyncio.Event)
+
+    async def start(self, bus: Bus, clock: Clock) -> None:
+        self.began.set()
+        if self.never_ready:
+            await asyncio.get_running_loop().create_future()
+        self.runs = True
+        self.log.append("started")
+
+    def processes(self) -> list[ProcessState]:
+        order = Spawn(Subsystem.BACKBONE, creator_name("far"), "creator", "x:Y", policy=RestartPolicy())
+        return [ProcessState(order, 1, 0, "")]
+
+    def absences(self) -> list[Absence]:
+        return self.missing
+
+    async def close(self) -> None:
+        self.runs = False
+        self.log.append("closed")
+
+
+@dataclass
+class Scene:
+    """An offer that lives, its creator, and the link to cut."""
+
+    offer: MachineOffer
+    creator: FakeCreator
+    bus: BusOnACable
+    tester: Bus
+    life: asyncio.Task[None]
+
+    async def ends(self) -> Ending:
+        await asyncio.wait_for(self.life, WITHIN_S)
+        return self.offer.ending
+
+
+@pytest.fixture
+def on_a_cable(local_mission: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    monkeypatch.setattr(offers, "CUT_OFF_S", CUT_OFF_S)
+
+    @asynccontextmanager
+    async def scene(creator: FakeCreator | None = None, *, behind_s: float = 0.0) -> AsyncIterator[Scene]:
+        clock = MissionClock.started_now()
+        async with local_mission(clock=clock) as network:
+            own = MissionClock(clock.origin_monotonic_s + behind_s)
+            launch = Launch(
+                "local", Subsystem.BACKBONE, offer_name("far"), "offer", "", "far", "", own.origin_monotonic_s, 1.0
+            )
+            ready = asyncio.Event()
+            bus, kept = BusOnACable(network, launch.address, own), creator or FakeCreator()
+            tester = network.join("ui_console/tester", clock)
+            it = MachineOffer(launch, bus, own, kept, ready.set)
+            life = asyncio.create_task(it.run())
+            if not kept.never_ready:
+                await asyncio.wait_for(ready.wait(), WITHIN_S)
+            yield Scene(it, kept, bus, tester, life)
+            it.end("the test is over")
+            await life
+            await tester.close()
+
+    return scene
+
+
+async def test_a_link_that_stays_down_ends_what_runs_here(on_a_cable: Callable[..., Any]) -> None:
+    async with on_a_cable() as scene:
+        scene.bus.link_changed(False)
+        assert await scene.ends() is Ending.CUT_OFF
+        assert scene.creator.log == ["started", "closed"]
+
+
+async def test_a_link_that_is_soon_back_ends_nothing(on_a_cable: Callable[..., Any]) -> None:
+    async with on_a_cable() as scene:
+        for _ in range(5):
+            scene.bus.link_changed(False)
+            await asyncio.sleep(CUT_OFF_S / 5)
+            scene.bus.link_changed(True)
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(asyncio.shield(scene.life), 2 * CUT_OFF_S)
+        assert scene.creator.runs
+
+
+@pytest.mark.parametrize("pause_s", [0.0, CUT_OFF_S / 5])
+async def test_a_link_that_is_back_after_a_sleep_of_the_machine_ends_what_runs_here(
+    on_a_cable: Callable[..., Any], pause_s: float
+) -> None:
+    async with on_a_cable(behind_s=60.0) as scene:
+        scene.bus.link_changed(False)
+        if pause_s:
+            await asyncio.sleep(pause_s)
+        scene.bus.link_changed(True)
+        assert await scene.ends() is Ending.OTHER_TIME
+        assert not scene.creator.runs
+
+
+async def test_a_link_that_is_lost_before_the_creator_is_ready_ends_the_wait(on_a_cable: Callable[..., Any]) -> None:
+    async with on_a_cable(FakeCreator(never_ready=True)) as scene:
+        await asyncio.wait_for(scene.creator.began.wait(), WITHIN_S)
+        scene.bus.link_changed(False)
+        assert await scene.ends() is Ending.CUT_OFF
+
+
+async def test_the_launcher_ends_it_and_its_token_falls_when_nothing_runs_here(on_a_cable: Callable[..., Any]) -> None:
+    async with on_a_cable() as scene:
+        ran_at_the_fall: list[bool] = []
+        fallen = asyncio.Event()
+
+        def changed(_address: str, stands: bool) -> None:
+            if not stands:
+                ran_at_the_fall.append(scene.creator.runs)
+                fallen.set()
+
+        scene.tester.watch_alive("backbone/offer-far", changed)
+        listed = await scene.tester.ask("backbone/offer-far", ListProcesses(), Processes, within_s=WITHIN_S)
+        assert [process.spawn.name for process in listed.processes] == ["creator-far"]
+        await scene.tester.ask("backbone/offer-far", Stop("the mission ends"), Stopping, within_s=WITHIN_S)
+        assert await scene.ends() is Ending.ORDERED
+        await asyncio.wait_for(fallen.wait(), WITHIN_S)
+        assert ran_at_the_fall == [False]
+
+
+async def test_a_creator_that_falls_is_absent_until_it_is_back_and_ends_nothing(on_a_cable: Callable[..., Any]) -> None:
+    async with on_a_cable() as scene:
+        scene.creator.missing = [Absence("creator-far", 1.0, "killed by SIGKILL", "restarts in 0.1 s")]
+        scene.creator.on_fell(ProcessFell("creator-far", "killed by SIGKILL", 0.1, []))
+        state = await scene.tester.ask("backbone/offer-far", AskState(), ComponentState, within_s=WITHIN_S)
+        assert [absence.name for absence in state.absent] == ["creator-far"]
+        assert not scene.life.done()

@@ -1,0 +1,69 @@
+"""The missing machines of a mission, and the commands to type there."""
+
+from __future__ import annotations
+
+import pytest
+from typer.testing import CliRunner
+
+from backbone.command_line.cli import app
+from backbone.launcher.other_hosts import OtherHosts, command_on, endpoint_for_others
+from backbone.mission.model import Host, MissionDescription
+from backbone.picture.health import HealthWord, health
+
+BASE, FAR, ATTIC = (
+    Host(name="base", address="192.0.2.1"),
+    Host(name="far", address="192.0.2.7", tags=("gl", "serial")),
+    Host(name="attic", address="attic.example.org"),
+)
+
+
+def mission(*hosts: Host) -> MissionDescription:
+    return MissionDescription(
+        name="m", priority=1, hosts=hosts, core=(), types=(), resources=(), components=(), behaviors=(), source="m.xml"
+    )
+
+
+def test_hosts_with_loopback_addresses_are_this_machine() -> None:
+    described = mission(BASE, Host(name="a", address="127.0.0.2"), Host(name="b", address="localhost"), FAR)
+    assert [host.name for host in described.other_hosts] == ["far"]
+    assert endpoint_for_others(mission(BASE)) == ""
+    assert endpoint_for_others(described) == "tcp/192.0.2.1:7447"
+
+
+def test_each_is_missed_until_its_creators_token_stands_and_again_when_it_falls() -> None:
+    others = OtherHosts(mission(BASE, FAR, ATTIC), 1.0)
+    assert others.missing == others.names == ["far", "attic"]
+    assert others.token_changed("backbone/creator-far", True, 2.0)
+    assert not others.token_changed("backbone/creator-far", True, 2.5)
+    assert not others.token_changed("backbone/creator-base", True, 2.5)
+    assert others.missing == ["attic"]
+    assert others.token_changed("backbone/creator-far", False, 3.0)
+    far, attic = others.absences()
+    assert (far.name, far.since_s, attic.since_s) == ("far", 3.0, 1.0)
+    assert "link" in far.cause
+    assert far.remedy == f"type there: {command_on(FAR, mission(BASE, FAR, ATTIC))}"
+
+
+def test_a_missing_machine_degrades_the_mission() -> None:
+    others = OtherHosts(mission(BASE, FAR), 0.0)
+    assert health({}, others.absences(), 100.0).word is HealthWord.DEGRADED
+
+
+def test_the_commands_that_offer_machines_are_known_while_they_are_there() -> None:
+    others = OtherHosts(mission(BASE, FAR), 0.0)
+    assert not others.token_changed("backbone/offer-far", True, 1.0)
+    others.token_changed("backbone/offer-elsewhere", True, 1.0)
+    assert others.offering == ["backbone/offer-far"]
+    others.token_changed("backbone/offer-far", False, 2.0)
+    assert others.offering == []
+
+
+@pytest.mark.parametrize("host", [FAR, ATTIC], ids=lambda host: host.name)
+def test_the_command_line_understands_the_printed_command(host: Host, monkeypatch: pytest.MonkeyPatch) -> None:
+    command = command_on(host, mission(BASE, FAR, ATTIC))
+    words = command.split()
+    assert words[:2] == ["scout-backbone", "creator"]
+    assert [words[i + 1] for i, word in enumerate(words) if word == "--tag"] == list(host.tags)
+    monkeypatch.chdir("/")
+    done = CliRunner().invoke(app, words[1:])  # there is no file 'secret' in /
+    assert (done.exit_code, "run.secret" in done.output) == (4, True)

@@ -1,0 +1,90 @@
+"""What ``up`` refuses before it starts anything: nothing of the mission is left then."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from backbone.authentication import SocketPathTooLong
+from backbone.bus.interface import Bus, Clock
+from backbone.command_line.cli import app
+from backbone.errors import Refusal
+from backbone.launcher.bring_up import run_mission
+from backbone.launcher.core_launches import UpOptions
+from backbone.launcher.preconditions import PortTaken
+from backbone.mission.model import Host, MissionDescription
+from backbone.mission.reader import read_mission
+from backbone.run_files import TraceUnwritable
+
+MISSION_XML = Path(__file__).parents[3] / "mission.xml"
+FAR = Host(name="far", address="192.0.2.7")
+
+
+class Nobody:
+    """Watches a mission that must not begin."""
+
+    def began(self, step: str) -> None:
+        raise AssertionError(f"{step} began")
+
+    def done(self, step: str, took_s: float) -> None: ...
+
+    def announce(self, line: str) -> None: ...
+
+    def connected(self, bus: Bus) -> None: ...
+
+    async def up(self, bus: Bus, clock: Clock) -> None: ...
+
+
+@pytest.fixture(autouse=True)
+def runtime_directory(short_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_path))
+    return short_path
+
+
+@pytest.fixture(scope="module")
+def shipped() -> MissionDescription:
+    return read_mission(MISSION_XML)
+
+
+def refused(kind: type[Refusal], description: MissionDescription, options: UpOptions, folder: Path) -> str:
+    with pytest.raises(kind) as caught:
+        asyncio.run(run_mission(description, options, Nobody()))
+    missions = folder / "scout-backbone"
+    assert not missions.exists() or os.listdir(missions) == []
+    return str(caught.value)
+
+
+def test_a_trace_that_cannot_be_written(shipped: MissionDescription, tmp_path: Path, short_path: Path) -> None:
+    for bad in (tmp_path / "no folder" / "trace.jsonl", tmp_path):
+        assert str(bad) in refused(TraceUnwritable, shipped, UpOptions(trace=bad), short_path)
+
+
+def test_the_command_ends_with_4_and_names_the_trace(tmp_path: Path) -> None:
+    bad = tmp_path / "no folder" / "trace.jsonl"
+    done = CliRunner().invoke(app, ["up", str(MISSION_XML), "--headless", "--trace", str(bad)])
+    assert done.exit_code == 4
+    assert "run.trace" in done.output
+    assert str(bad) in done.output
+
+
+def test_a_port_that_is_taken_or_an_address_that_is_anothers(shipped: MissionDescription, short_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        base = Host(name="base", address="127.0.0.1", port=taken.getsockname()[1])
+        description = shipped.model_copy(update={"hosts": (base, FAR)})
+        assert f"port {base.port}" in refused(PortTaken, description, UpOptions(), short_path)
+    elsewhere = shipped.model_copy(update={"hosts": (Host(name="base", address="192.0.2.1"), FAR)})
+    assert "192.0.2.1" in refused(PortTaken, elsewhere, UpOptions(), short_path)
+
+
+def test_a_folder_too_deep_for_a_socket(
+    shipped: MissionDescription, short_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deep = short_path / ("d" * 80)
+    deep.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(deep))
+    assert "XDG_RUNTIME_DIR" in refused(SocketPathTooLong, shipped, UpOptions(), deep)

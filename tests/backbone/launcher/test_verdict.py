@@ -1,0 +1,35 @@
+"""Talk and verdict on the pipe between a launcher in the background and the command that started it."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from backbone.launcher.verdict import VerdictPipe, await_verdict
+
+
+def test_the_verdict_is_the_last_that_is_read() -> None:
+    reading, writing = os.pipe()
+    pipe = VerdictPipe(os.fdopen(writing, "w", encoding="utf-8"))
+    pipe.talk("mission m comes up")
+    pipe.decide(6)
+    pipe.talk("too late")
+    pipe.decide(0)
+    said: list[str] = []
+    with os.fdopen(reading, encoding="utf-8") as lines:
+        assert await_verdict(lines, said.append) == 6
+    assert said == ["mission m comes up"]
+
+
+@pytest.mark.parametrize("lines", [[], ['{"type":"talk","line":"comes up"}']])
+def test_a_pipe_that_ends_without_a_verdict_has_none(lines: list[str]) -> None:
+    assert await_verdict(lines, lambda _line: None) is None
+
+
+def test_nobody_who_reads_any_more_is_no_bug_of_the_launcher() -> None:
+    reading, writing = os.pipe()
+    pipe = VerdictPipe(os.fdopen(writing, "w", encoding="utf-8"))
+    os.close(reading)
+    pipe.talk("mission m comes up")
+    pipe.decide(0)

@@ -1,0 +1,54 @@
+"""Aging: an ARC that waits rises one level each time ``aging_s`` have passed, until it is served or wants no time."""
+
+from __future__ import annotations
+
+from simulated_switches import Bench, ask, manager, unit
+
+from backbone.scheduling.events import Departed, Idled
+
+
+def test_with_aging_a_lower_one_that_waited_long_gets_one_whole_slice():
+    """After 10 s it is as high as the other, whose slice is over."""
+    bench = Bench(manager(aging_s=10.0), unit("v"))
+    bench.tell(ask("high", "v", priority=2))
+    bench.tell(ask("low", "v", priority=1))
+    bench.run(50.0)
+    assert bench.runs("low") == [(10.0, 15.0), (25.0, 30.0), (40.0, 45.0)]
+    assert bench.runs("high")[1] == (15.0, 25.0)
+
+
+def test_aging_outwaits_no_console():
+    bench = Bench(manager(aging_s=1.0), unit("v"))
+    bench.tell(ask("human", "v", priority=9, console=True))
+    bench.tell(ask("low", "v"))
+    bench.run(100.0)
+    assert bench.runs("low") == []
+
+
+def test_an_arc_that_rose_and_was_served_comes_down_although_it_runs_on():
+    """``low`` rises to ``high``; once it was served it is lower than ``middle``."""
+    bench = Bench(manager(aging_s=10.0), unit("v"))
+    bench.tell(ask("high", "v", priority=3))
+    bench.tell(ask("low", "v", priority=1))
+    bench.at(22.0, Departed("high"))
+    bench.at(30.0, ask("middle", "v", priority=2))
+    bench.run(40.0)
+    assert bench.runs("low")[0] == (20.0, 30.0)
+    assert bench.runs("middle") == [(30.0, 40.0)]
+    assert bench.verdict() == []
+
+
+def test_a_branch_comes_down_when_its_arc_that_rose_wants_no_time_any_more():
+    """A node rises with all above it, so a sibling that asks later would be as high as the one that waited."""
+    bench = Bench(manager(aging_s=10.0), unit("v"))
+    bench.tell(ask("high", "v", priority=3))
+    bench.tell(ask("low", "v", path=[("watch", 0), ("branch", 1), ("low", 1)]))
+    bench.at(22.0, Departed("high"))
+    bench.at(23.0, Idled("low"))
+    bench.at(30.0, ask("sibling", "v", path=[("watch", 0), ("branch", 1), ("sibling", 1)]))
+    bench.at(31.0, ask("middle", "v", priority=2))
+    bench.run(40.0)
+    assert bench.runs("low") == [(20.0, 23.0)]
+    assert bench.runs("sibling") == [(30.0, 31.0)]
+    assert bench.runs("middle") == [(31.0, None)]
+    assert bench.verdict() == []

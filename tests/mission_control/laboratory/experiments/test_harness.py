@@ -1,0 +1,42 @@
+"""Many trials on all cores."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from mission_control.laboratory.experiments.harness import run_all
+
+
+def squared(number: int) -> tuple[int, int]:
+    return number * number, os.getpid()
+
+
+def picky(number: int) -> int:
+    if number == 7:
+        raise ArithmeticError("seven")
+    return number
+
+
+@pytest.mark.processes
+def test_results_come_in_the_order_of_the_orders_from_other_processes() -> None:
+    found = run_all(squared, range(20), jobs=2)
+    assert [value for value, _ in found] == [number * number for number in range(20)]
+    assert os.getpid() not in {process for _, process in found}
+
+
+def test_one_job_is_this_process() -> None:
+    assert {process for _, process in run_all(squared, range(3), jobs=1)} == {os.getpid()}
+
+
+def test_progress_is_told_after_each_result() -> None:
+    told: list[tuple[int, int]] = []
+    run_all(squared, range(3), jobs=1, progress=lambda done, of: told.append((done, of)))
+    assert told == [(1, 3), (2, 3), (3, 3)]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_the_first_failure_is_raised(jobs: int) -> None:
+    with pytest.raises(ArithmeticError, match="seven"):
+        run_all(picky, range(12), jobs=jobs)

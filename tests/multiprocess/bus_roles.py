@@ -1,0 +1,90 @@
+"""A hub, a crowd of components, and one that asks the hub, each a process for one machine of a test.
+
+``bus_roles.py hub|crowd|asker ENDPOINT NUMBER``
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from typing import Any
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.errors import LinkError
+from backbone.keys import Conversation
+from backbone.rc_manager.messages import Beat, Done, SetIdle
+from backbone.wire import Envelope, Message
+
+MISSION, HUB, BEAT_EVERY_S, ASKED_EVERY_S = "cable", "backbone/hub", 0.05, 0.05
+ANSWERED_WITHIN_S = 1.0  # as long as an answer may take on a busy machine
+
+
+def member(number: int) -> str:
+    """Return the address of one of the crowd."""
+    return f"resource_pool/member-{number}"
+
+
+async def answer(_asked: Envelope[Any]) -> Message:
+    return Done()
+
+
+async def is_answered(bus: ZenohBus, address: str) -> bool:
+    try:
+        await bus.ask(address, SetIdle("arc", True), Done, within_s=ANSWERED_WITHIN_S)
+    except LinkError:
+        return False
+    return True
+
+
+async def hub(endpoint: str, _number: int) -> None:
+    """Answer until killed."""
+    bus = ZenohBus.open(MISSION, HUB, MissionClock.started_now(), hub_config([endpoint]))
+    bus.serve(HUB, SetIdle, answer)
+    say("ready")
+    await asyncio.Event().wait()
+
+
+async def crowd(endpoint: str, number: int) -> None:
+    """Be so many components that publish and answer, each on a link of its own, until killed."""
+    clock = MissionClock.started_now()
+    buses = [ZenohBus.open(MISSION, member(n), clock, client_config(endpoint)) for n in range(number)]
+    for bus in buses:
+        bus.serve(bus.source, SetIdle, answer)
+        bus.declare_alive(bus.source)
+    say("ready")
+    while True:
+        for bus in buses:
+            bus.publish(bus.source, Conversation.BEAT, Beat("arc"))
+        await asyncio.sleep(BEAT_EVERY_S)
+
+
+async def asker(endpoint: str, number: int) -> None:
+    """Ask the hub until a line comes; then say how many questions were not answered, and who of the crowd is deaf."""
+    clock = MissionClock.started_now()
+    bus = await ZenohBus.open_when_up(MISSION, "ui_console/asker", clock, client_config(endpoint))
+    bus.subscribe("resource_pool/*", Conversation.BEAT, Beat, lambda _beat: None)
+    line = asyncio.get_running_loop().run_in_executor(None, sys.stdin.readline)
+    asked = unanswered = 0
+    say("ready")
+    while not line.done():
+        asked += 1
+        unanswered += not await is_answered(bus, HUB)
+        await asyncio.sleep(ASKED_EVERY_S)
+    say(json.dumps({"asked": asked, "unanswered": unanswered}))
+    within_s = float(await line)
+    deaf, until_s = set(range(number)), clock.now_s() + within_s
+    while deaf and clock.now_s() < until_s:
+        deaf -= {n for n in sorted(deaf) if await is_answered(bus, member(n))}
+    say(json.dumps({"deaf": sorted(deaf)}))
+    await bus.close()
+
+
+def say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    asyncio.run({"hub": hub, "crowd": crowd, "asker": asker}[sys.argv[1]](sys.argv[2], int(sys.argv[3])))

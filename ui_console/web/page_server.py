@@ -1,0 +1,323 @@
+"""Server of a page: files over HTTP, messages over WebSockets; the application behind it gives them meaning."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Sized
+from contextlib import asynccontextmanager
+from functools import partial
+from ssl import SSLContext
+from typing import Any, Generic, Protocol, TypeVar, cast
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.frames import CloseCode
+from websockets.http11 import Request, Response
+
+from backbone.errors import Refusal
+from backbone.spoken import counted
+from ui_console.web.login import (
+    MAX_MESSAGE_BYTES,
+    Authenticator,
+    BeatRequest,
+    ClientSession,
+    Hello,
+    IntentT,
+    ProtocolViolation,
+    ViolationKind,
+    Welcome,
+)
+from ui_console.web.outbox import Outbox
+from ui_console.web.page_files import SOCKET_PATH, Answer, PageFiles, is_own_page
+from ui_console.web.pending_connections import CLOSE_WITHIN_S, OPEN_WITHIN_S, PendingConnections
+
+PING_EVERY_S = 2.0  # chosen: a tablet that went out of reach gives its robot back within 6 s
+READ_WITHIN_S = 4.0  # chosen: a page held up for longer is of no use to drive by
+MOST_OPERATORS = 32  # chosen: more browsers than a team has people
+MOST_UNREAD = 8  # messages read ahead of the one carried out
+SEND_AHEAD_BYTES = 32768  # a picture and a half on top of what the system keeps
+FATAL_CODES = {
+    ViolationKind.OVERSIZED: CloseCode.MESSAGE_TOO_BIG,
+    ViolationKind.MALFORMED: CloseCode.INVALID_DATA,
+    ViolationKind.SLOW: CloseCode.TRY_AGAIN_LATER,
+    ViolationKind.CROWD: CloseCode.TRY_AGAIN_LATER,
+}
+MOST_REASON = 120  # of the 123 bytes for it in a close frame
+KEEPALIVE_REASON = "keepalive ping timeout"
+
+
+class CannotListen(Refusal):
+    """The address is not free, or not one of this machine."""
+
+    code = "web.address"
+    remedy = "Choose another address with --host, or another port with --port."
+
+
+class Client(Protocol):
+    """A person at a page, from the right token to the end of the connection."""
+
+    welcome: Welcome
+    outbox: Outbox
+    news: asyncio.Event
+    """Set when there is something to send."""
+
+
+ClientT = TypeVar("ClientT", bound=Client)
+HeardT_contra = TypeVar("HeardT_contra", contravariant=True)
+
+
+class Application(Protocol[ClientT, HeardT_contra]):
+    """The application behind a page: the consoles, or the designer."""
+
+    @property
+    def clients(self) -> Sized:
+        """The connected clients."""
+
+    def enter(self, welcome: Welcome) -> ClientT:
+        """Return a new client."""
+
+    async def obey(self, client: ClientT, intent: HeardT_contra) -> None:
+        """Carry out a client's intent; the server reads no further message of that client until this returns."""
+
+    def refused(self, client: ClientT) -> None:
+        """Stop the actions of a client whose violation ends its connection."""
+
+    async def leave(self, client: ClientT, reason: str) -> None:
+        """Remove a client."""
+
+    def report_violation(self, who: str, violation: ProtocolViolation) -> None:
+        """Show the clients a violation."""
+
+
+class PageServer(Generic[ClientT, IntentT]):
+    """Serves a page and its socket.
+
+    Args:
+        application: The application.
+        authenticator: Knows the tokens.
+        files: The page.
+        understand: Decodes the page's messages.
+    """
+
+    def __init__(
+        self,
+        application: Application[ClientT, IntentT],
+        authenticator: Authenticator,
+        files: PageFiles,
+        understand: Callable[[bytes | str], Hello | BeatRequest | IntentT],
+    ) -> None:
+        self._application, self._authenticator, self._files, self._understand = (
+            application,
+            authenticator,
+            files,
+            understand,
+        )
+        self._pages: dict[tuple[str, str], ServerConnection] = {}
+
+    @asynccontextmanager
+    async def open(self, host: str, port: int, encryption: SSLContext | None = None) -> AsyncIterator[Server]:
+        """Accept browsers, until left or the server is closed.
+
+        Args:
+            host: Address to listen at.
+            port: Port; 0: any that is free.
+            encryption: See ``encryption_with``; None: plain HTTP.
+
+        Raises:
+            CannotListen: The address is not free, or not one of this machine.
+        """
+        pending = PendingConnections(encryption, self._application.report_violation)
+        async with await self._listen(host, port, pending) as server:
+            try:
+                yield server
+            finally:
+                server.close()
+                pending.close()
+
+    async def _listen(self, host: str, port: int, pending: PendingConnections) -> Server:
+        try:
+            return await serve(
+                partial(self._meet, pending),
+                host,
+                port,
+                process_request=partial(self._answer, pending),
+                create_connection=cast(Any, pending.new_protocol),
+                compression=None,
+                server_header=None,
+                open_timeout=OPEN_WITHIN_S,
+                ping_interval=PING_EVERY_S,
+                ping_timeout=READ_WITHIN_S,
+                close_timeout=CLOSE_WITHIN_S,
+                max_size=MAX_MESSAGE_BYTES,
+                max_queue=MOST_UNREAD,
+                write_limit=SEND_AHEAD_BYTES,
+            )
+        except OSError as error:
+            raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error
+
+    def _answer(self, pending: PendingConnections, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the file asked for; None: it is the page's socket."""
+        pending.asked(connection)
+        if request.path.partition("?")[0] != SOCKET_PATH:
+            return _response(self._files.answer(request.path, request.headers.get("If-None-Match", "")))
+        if not is_own_page(request.headers.get("Origin", ""), request.headers.get("Host", "")):
+            remedy = "Close that page; only this server's own may connect."
+            self._application.report_violation(
+                _who(connection), ProtocolViolation(ViolationKind.ORIGIN, "shows a page of another site", remedy)
+            )
+            return connection.respond(403, "A page of another site may not connect.\n")
+        return None
+
+    async def _meet(self, pending: PendingConnections, connection: ServerConnection) -> None:
+        """Serve one connection to its end."""
+        session = ClientSession(self._authenticator, self._understand, _now_s())
+        welcome = await self._wait_welcome(connection, session)
+        if welcome is None:
+            return
+        if len(self._application.clients) >= MOST_OPERATORS:
+            line = f"found {counted(len(self._application.clients), 'client')} there, which is the most"
+            await self._refuse(
+                connection, welcome.user, ProtocolViolation(ViolationKind.CROWD, line, "Close some pages.")
+            )
+            return
+        pending.admit(connection)
+        await self._serve(connection, session, welcome)
+
+    async def _wait_welcome(self, connection: ServerConnection, session: ClientSession[IntentT]) -> Welcome | None:
+        try:
+            async with asyncio.timeout_at(session.must_log_in_by_s):
+                said = session.heard(await connection.recv(), _now_s())
+        except TimeoutError:
+            said = session.late()
+        except ConnectionClosed as closed:
+            if _was_oversized(closed):
+                self._application.report_violation(_who(connection), session.oversized())
+            return None
+        if isinstance(said, Welcome):
+            return said
+        if isinstance(said, ProtocolViolation):
+            await self._refuse(connection, _who(connection), said)
+        return None
+
+    async def _serve(self, connection: ServerConnection, session: ClientSession[IntentT], welcome: Welcome) -> None:
+        self._end_earlier(connection, welcome)
+        client = self._application.enter(welcome)
+        who = f"{welcome.user} at {_who(connection)}"
+        writing = asyncio.create_task(self._write(connection, session, client, who), name=f"web: to {who}")
+        reason = "the browser has gone away"
+        try:
+            reason = await self._read(connection, session, client, who)
+        finally:
+            writing.cancel()
+            await self._application.leave(client, reason)
+            await asyncio.wait({writing})
+            if self._pages.get((welcome.user, welcome.page)) is connection:
+                del self._pages[welcome.user, welcome.page]
+        if not writing.cancelled():
+            writing.result()
+
+    def _end_earlier(self, connection: ServerConnection, welcome: Welcome) -> None:
+        """Cut off an earlier connection of the same page, whose link broke: it may still hold a robot."""
+        if not welcome.page:
+            return
+        earlier = self._pages.get((welcome.user, welcome.page))
+        self._pages[welcome.user, welcome.page] = connection
+        if earlier is not None:
+            earlier.transport.abort()
+
+    async def _read(
+        self, connection: ServerConnection, session: ClientSession[IntentT], client: ClientT, who: str
+    ) -> str:
+        """Carry out the browser's messages until the connection ends; return the reason of its end."""
+        while True:
+            try:
+                data = await connection.recv()
+            except ConnectionClosed as closed:
+                return self._farewell(session, closed, who)
+            said = session.heard(data, _now_s())
+            match said:
+                case ProtocolViolation():
+                    if said.is_fatal:
+                        self._application.refused(client)
+                    await self._refuse(connection, who, said)
+                    if said.is_fatal:
+                        return said.line
+                case BeatRequest(number):
+                    client.outbox.put_section("beat", str(number).encode())
+                    client.news.set()
+                case Welcome() | None:
+                    continue
+                case _:
+                    await self._application.obey(client, said)
+
+    def _farewell(self, session: ClientSession[IntentT], closed: ConnectionClosed, who: str) -> str:
+        if _was_oversized(closed):
+            violation = session.oversized()
+        elif closed.sent is not None and closed.sent.reason == KEEPALIVE_REASON:
+            violation = session.slow(READ_WITHIN_S)
+        else:
+            return "the browser has gone away"
+        self._application.report_violation(who, violation)
+        return violation.line
+
+    async def _write(
+        self, connection: ServerConnection, session: ClientSession[IntentT], client: ClientT, who: str
+    ) -> None:
+        """Send the newest content whenever the browser reads; cut off a browser that reads nothing."""
+        outbox, news = client.outbox, client.news
+        try:
+            while True:
+                news.clear()
+                message = outbox.next(_now_s())
+                if message is None:
+                    await _wait_news(news, outbox.next_s())
+                    continue
+                async with asyncio.timeout(READ_WITHIN_S):
+                    await connection.send(message)
+        except TimeoutError:
+            self._application.report_violation(who, session.slow(READ_WITHIN_S))
+            connection.transport.abort()
+        except ConnectionClosed:
+            return
+
+    async def _refuse(self, connection: ServerConnection, who: str, violation: ProtocolViolation) -> None:
+        self._application.report_violation(who, violation)
+        if violation.is_fatal:
+            code = FATAL_CODES.get(violation.kind, CloseCode.POLICY_VIOLATION)
+            await connection.close(code, f"This page {violation.line}. {violation.remedy}"[:MOST_REASON])
+
+
+def port_of(server: Server) -> int:
+    """Return the port that the server listens at."""
+    port: int = next(iter(server.sockets)).getsockname()[1]
+    return port
+
+
+async def _wait_news(news: asyncio.Event, until_s: float | None) -> None:
+    """Return when there is news, or at this time of the machine."""
+    try:
+        async with asyncio.timeout_at(until_s):
+            await news.wait()
+    except TimeoutError:
+        return
+
+
+def _was_oversized(closed: ConnectionClosed) -> bool:
+    return closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG
+
+
+def _who(connection: ServerConnection) -> str:
+    peer = connection.remote_address
+    return str(peer[0]) if peer else "an unknown address"
+
+
+def _now_s() -> float:
+    return asyncio.get_running_loop().time()
+
+
+def _response(answer: Answer) -> Response:
+    headers = Headers({**answer.headers, "Content-Length": str(len(answer.body)), "Connection": "close"})
+    return Response(
+        answer.status, {200: "OK", 304: "Not Modified", 404: "Not Found"}[answer.status], headers, answer.body
+    )
