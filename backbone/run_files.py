@@ -6,7 +6,6 @@ stale: readers skip it, and the next mission of that name overwrites it.
 
 from __future__ import annotations
 
-import getpass
 import os
 import shutil
 import tempfile
@@ -221,7 +220,7 @@ def _remove_what_dead_zygotes_left(directory: Path) -> None:
 def _directory() -> Path:
     """Create and check the folder of this user's run files, and return it."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
-    base = Path(runtime) if runtime else Path(tempfile.gettempdir()) / f"scout-backbone-{_user()}"
+    base = Path(runtime) if runtime else Path(tempfile.gettempdir()) / f"scout-backbone-{os.getuid()}"
     directory = base / "scout-backbone"
     try:
         if not runtime:
@@ -241,12 +240,8 @@ def _unusable(directory: Path, error: OSError) -> RunFolderUnusable:
 def _check_private(directory: Path) -> None:
     # All users can write into the folder for temporary files, so another user may have created this folder first.
     found = directory.lstat()
-    if hasattr(os, "getuid") and (found.st_uid != os.getuid() or found.st_mode & 0o022 or directory.is_symlink()):
+    if found.st_uid != os.getuid() or found.st_mode & 0o022 or directory.is_symlink():
         raise UnsafeDirectory(f"{directory} is not this user's alone", directory=str(directory))
-
-
-def _user() -> str:
-    return str(os.getuid()) if hasattr(os, "getuid") else getpass.getuser()
 
 
 def _read(path: Path) -> RunFile | None:

@@ -18,10 +18,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 
-from measuring import report
+from measuring import BIN, report
 
 MISSION = Path(__file__).parents[1] / "docs" / "examples" / "smallest.xml"
-PROGRAMS = Path(sys.executable).parent
 FLOOR = (sys.executable, "-c", "pass")
 HELP_S = COMPLETION_S = 0.12  # chosen: a person takes a tenth of a second for at once
 STATUS_S = 0.3  # chosen: with the time that the mission takes to answer
@@ -63,7 +62,7 @@ def measure(name: str, command: Sequence[str], aim_s: float, rounds: int, enviro
 @contextmanager
 def mission(environment: Mapping[str, str]) -> Iterator[None]:
     """Have the smallest mission up until the block ends."""
-    program = str(PROGRAMS / "scout-backbone")
+    program = str(BIN / "scout-backbone")
     subprocess.run([program, "up", str(MISSION), "--detach"], env=environment, check=True, capture_output=True)
     try:
         yield
@@ -77,7 +76,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=20)
     parser.add_argument("--aim", action="store_true")
     given = parser.parse_args()
-    backbone, console = str(PROGRAMS / "scout-backbone"), str(PROGRAMS / "scout-console")
+    backbone, console = str(BIN / "scout-backbone"), str(BIN / "scout-console")
     with tempfile.TemporaryDirectory() as folder:
         plain = {**os.environ, "XDG_RUNTIME_DIR": folder}
         names = {**plain, **completion("scout-backbone", "why", "")}

@@ -7,7 +7,6 @@ Prints one JSON line. ``own`` is the memory that would be freed if the process e
 from __future__ import annotations
 
 import argparse
-import json
 import subprocess
 import sys
 import tempfile
@@ -16,6 +15,7 @@ from statistics import median
 import psutil
 import uvloop
 from component_start import creator_up, end_light, start_light
+from measuring import report
 
 COMPONENTS = 20
 IMPORTS = "import backbone.component.process"
@@ -56,21 +56,17 @@ def main() -> None:
     bare, fresh = interpreter_memory("pass"), interpreter_memory(IMPORTS)
     found = uvloop.run(component_memories(count))
     own, share = [one[0] for one in found], [one[1] for one in found]
-    print(
-        json.dumps(
-            {
-                "bench": "component_memory",
-                "components": count,
-                "own_mb": round(median(own), 2),
-                "own_most_mb": round(max(own), 2),
-                "share_mb": round(median(share), 2),
-                "floor": "a bare interpreter / a fresh one with the same imports",
-                "floor_own_mb": round(bare[0], 2),
-                "floor_share_mb": round(bare[1], 2),
-                "fresh_own_mb": round(fresh[0], 2),
-                "ratio": round(median(own) / bare[0], 2),
-            }
-        )
+    report(
+        "component_memory",
+        components=count,
+        own_mb=round(median(own), 2),
+        own_most_mb=round(max(own), 2),
+        share_mb=round(median(share), 2),
+        floor="a bare interpreter / a fresh one with the same imports",
+        floor_own_mb=round(bare[0], 2),
+        floor_share_mb=round(bare[1], 2),
+        fresh_own_mb=round(fresh[0], 2),
+        ratio=round(median(own) / bare[0], 2),
     )
 
 

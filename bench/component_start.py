@@ -9,14 +9,9 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import json
 import os
-import socket
-import subprocess
-import sys
 import tempfile
 from collections.abc import AsyncIterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from pathlib import Path
 from statistics import median
@@ -24,6 +19,7 @@ from time import perf_counter
 
 import msgspec
 import uvloop
+from measuring import bare_interpreters_s, free_endpoint, report
 
 from backbone.addresses import PLACER
 from backbone.bus.clock import MissionClock
@@ -44,9 +40,6 @@ LIGHT = ComponentType("light", "light_component:Light", Subsystem.RESOURCE_POOL)
 async def creator_up(folder: str) -> AsyncIterator[ZenohBus]:
     """Give the placer's bus to a host with nameserver and creator."""
     clock = MissionClock.started_now()
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
     hub = Launch(
         "bench",
         Subsystem.BACKBONE,
@@ -54,7 +47,7 @@ async def creator_up(folder: str) -> AsyncIterator[ZenohBus]:
         "nameserver",
         "backbone.nameserver.service:Nameserver",
         "bench",
-        f"tcp/127.0.0.1:{port}",
+        free_endpoint(),
         clock.origin_monotonic_s,
         1.0,
         run_directory=str(Path(folder) / "run"),
@@ -129,14 +122,6 @@ def bare_forks() -> float:
     return took_s
 
 
-def bare_interpreters() -> float:
-    """Return the seconds for 20 bare interpreters, two at a time."""
-    began_s = perf_counter()
-    with ThreadPoolExecutor(2) as two:
-        list(two.map(lambda _: subprocess.run([sys.executable, "-c", "pass"], check=True), range(COMPONENTS)))
-    return perf_counter() - began_s
-
-
 async def measure(rounds: int) -> tuple[list[float], list[float]]:
     """Return the seconds for 20 components and for one, of each round."""
     with tempfile.TemporaryDirectory() as folder:
@@ -153,23 +138,19 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     rounds = parser.parse_args().rounds
     forks = [bare_forks() for _ in range(rounds)]  # first: later this process has threads
-    interpreters = [bare_interpreters() for _ in range(rounds)]
+    interpreters = [bare_interpreters_s(COMPONENTS) for _ in range(rounds)]
     many, one = uvloop.run(measure(rounds))
-    print(
-        json.dumps(
-            {
-                "bench": "component_start",
-                "rounds": rounds,
-                "components": COMPONENTS,
-                "all_ready_s": round(median(many), 3),
-                "slowest_s": round(max(many), 3),
-                "one_ready_s": round(median(one), 4),
-                "floor": f"{COMPONENTS} bare forks / {COMPONENTS} bare interpreters, two at a time",
-                "floor_forks_s": round(median(forks), 3),
-                "floor_interpreters_s": round(median(interpreters), 3),
-                "ratio_to_interpreters": round(median(many) / median(interpreters), 2),
-            }
-        )
+    report(
+        "component_start",
+        rounds=rounds,
+        components=COMPONENTS,
+        all_ready_s=round(median(many), 3),
+        slowest_s=round(max(many), 3),
+        one_ready_s=round(median(one), 4),
+        floor=f"{COMPONENTS} bare forks / {COMPONENTS} bare interpreters, two at a time",
+        floor_forks_s=round(median(forks), 3),
+        floor_interpreters_s=round(median(interpreters), 3),
+        ratio_to_interpreters=round(median(many) / median(interpreters), 2),
     )
 
 

@@ -24,10 +24,8 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from measuring import report
+from measuring import BIN, MISSION_XML, report
 
-MISSION_XML = Path(__file__).parents[1] / "mission.xml"
-BIN = Path(sys.executable).parent
 COLUMNS, LINES = 120, 40
 SETTLE_S = 6.0  # chosen: imports and the first pictures are over
 CONSOLES = {

@@ -7,12 +7,18 @@ import os
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import psutil
 
+MISSION_XML = Path(__file__).parents[1] / "mission.xml"
+BIN = Path(sys.executable).parent
+"""The folder of the project's commands."""
 END_WITHIN_S = 5.0  # chosen: a helper whose input is closed ends in milliseconds
 _STOLEN_BEFORE_S: float = psutil.cpu_times().steal if psutil.LINUX else 0.0
 
@@ -53,6 +59,14 @@ def free_endpoint() -> str:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def bare_interpreters_s(count: int) -> float:
+    """Return the seconds for so many bare interpreters, two at a time."""
+    began_s = time.perf_counter()
+    with ThreadPoolExecutor(2) as two:
+        list(two.map(lambda _: subprocess.run([sys.executable, "-c", "pass"], check=True), range(count)))
+    return time.perf_counter() - began_s
 
 
 @contextmanager

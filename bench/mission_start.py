@@ -7,18 +7,15 @@ as floor the seconds a machine needs to start as many bare interpreters, two at 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import subprocess
-import sys
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from statistics import median
 
-MISSION = Path(__file__).parents[1] / "mission.xml"
+from measuring import BIN, MISSION_XML, bare_interpreters_s, report
+
 PROCESSES = 20  # components of that mission, core services included
 
 
@@ -26,7 +23,7 @@ def mission_start() -> tuple[float, float]:
     """Bring the mission up and down once; return seconds by the launcher's clock and by the shell's."""
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "XDG_RUNTIME_DIR": folder}
-        command = [str(Path(sys.executable).parent / "scout-backbone"), "up", str(MISSION), "--headless", "--for", "0"]
+        command = [str(BIN / "scout-backbone"), "up", str(MISSION_XML), "--headless", "--for", "0"]
         began_s = time.monotonic()
         with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as launcher:
             assert launcher.stderr is not None
@@ -41,14 +38,6 @@ def mission_start() -> tuple[float, float]:
         return float(found.group(1)), ready_s
 
 
-def bare_starts() -> float:
-    """Start as many bare interpreters, two at a time, and return the seconds."""
-    began_s = time.monotonic()
-    with ThreadPoolExecutor(2) as two:
-        list(two.map(lambda _: subprocess.run([sys.executable, "-c", "pass"], check=True), range(PROCESSES)))
-    return time.monotonic() - began_s
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -56,22 +45,18 @@ def main() -> None:
     rounds = parser.parse_args().rounds
     starts, floors = [], []
     for _ in range(rounds):
-        floors.append(bare_starts())
+        floors.append(bare_interpreters_s(PROCESSES))
         starts.append(mission_start())
     ready_s, floor_s = median(shell for _, shell in starts), median(floors)
-    print(
-        json.dumps(
-            {
-                "bench": "mission_start",
-                "rounds": rounds,
-                "ready_s": round(ready_s, 3),
-                "ready_by_launcher_s": round(median(own for own, _ in starts), 3),
-                "slowest_s": round(max(shell for _, shell in starts), 3),
-                "floor": f"{PROCESSES} bare interpreters, two at a time",
-                "floor_s": round(floor_s, 3),
-                "ratio": round(ready_s / floor_s, 2),
-            }
-        )
+    report(
+        "mission_start",
+        rounds=rounds,
+        ready_s=round(ready_s, 3),
+        ready_by_launcher_s=round(median(own for own, _ in starts), 3),
+        slowest_s=round(max(shell for _, shell in starts), 3),
+        floor=f"{PROCESSES} bare interpreters, two at a time",
+        floor_s=round(floor_s, 3),
+        ratio=round(ready_s / floor_s, 2),
     )
 
 

@@ -22,9 +22,8 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from measuring import BIN, MISSION_XML
 
-MISSION_XML = Path(__file__).parents[1] / "mission.xml"
-BIN = Path(sys.executable).parent
 MARK = "SCOUT_BENCH_MARK"
 CONSOLE_ROBOT = "scout3"
 COMMAND_WITHIN_S = 60.0

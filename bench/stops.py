@@ -24,19 +24,19 @@ from contextlib import AsyncExitStack, asynccontextmanager, contextmanager, supp
 from pathlib import Path
 from typing import Any
 
-from measuring import report
+from measuring import BIN, MISSION_XML, report
 from playwright.async_api import Error as PageError
 from stops_link import relay_to_mission
 from stops_page import page_present
 from stops_places import KINDS, OTHERS, ROBOT, Cell, Gesture, Link, cells
 from stops_table import markdown
-from stops_terminal import BIN, CANNOT, Script, Terminal, TriedConsole
+from stops_terminal import CANNOT, Script, Terminal, TriedConsole
 from stops_world import ROBOTS, NotSeen, World, until, world_of
 
 from backbone import run_files
 from backbone.errors import LinkError, Refusal
 
-MISSION, MISSION_XML = "stops", Path(__file__).parents[1] / "mission.xml"
+MISSION = "stops"
 STANDS_WITHIN_S = 0.5  # the bound of an emergency stop
 SETTLED_S = 0.25  # chosen: a robot that stood so long stands
 WATCHED_S = 2.0  # chosen: a stop that takes longer is a fault at any length

@@ -12,10 +12,11 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
+from measuring import BIN
 from playwright.async_api import async_playwright
 from stops_link import Relay, relay_to_port
 from stops_places import ROBOT, Gesture, Place
-from stops_terminal import BIN, TriedConsole
+from stops_terminal import TriedConsole
 
 SIZES = {"desktop": (1440, 900), "tablet": (820, 1180), "phone": (390, 844)}
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")

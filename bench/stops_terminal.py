@@ -15,6 +15,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import psutil
+from measuring import BIN
 from stops_link import Relay
 from stops_places import KINDS, ROBOT, Gesture, Place
 from stops_world import TURN, NotSeen, until
@@ -22,7 +23,6 @@ from stops_world import TURN, NotSeen, until
 from ui_console.model.driving import KEYS_LET_GO_S
 from ui_console.session.gamepad import ABS_X, BTN_EAST, BTN_NORTH, BTN_TR, EV_ABS, EV_KEY
 
-BIN = Path(sys.executable).parent
 HERE = Path(__file__).parent
 REPEAT_EVERY_S = 0.05  # chosen: about as fast as keyboards repeat
 LET_GO_S = KEYS_LET_GO_S + 0.1  # a little more, for the terminal takes a moment to hand keys on

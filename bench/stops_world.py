@@ -19,6 +19,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.errors import LinkError
 from backbone.keys import Conversation
+from backbone.launcher.mission_connection import connected
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import AskSchedule
@@ -253,17 +254,14 @@ class World:
 async def world_of(mission: str) -> AsyncIterator[World]:
     """Watch the mission's robots, and have other operators there, until the block ends."""
     found = run_files.find(mission)
-    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
-    name = address(Subsystem.UI_CONSOLE, "table")
-    bus = await ZenohBus.open_when_up(mission, name, clock, client_config(found.endpoint))
     wishes = [*((f"driver-{robot}", robot, HIGH) for robot in OTHERS), ("holder", ROBOT, HIGH), ("asker", ROBOT, LOW)]
-    operators = [Operator(*wish, found, clock) for wish in wishes]
-    world = World(bus, clock, operators)
-    watching = asyncio.create_task(world.poses.watch(), name="poses")
-    try:
-        async with operators[0].present(), operators[1].present(), operators[2].present(), operators[3].present():
-            yield world
-    finally:
-        watching.cancel()
-        await asyncio.wait({watching})
-        await bus.close()
+    async with connected(mission, None, address(Subsystem.UI_CONSOLE, "table")) as (bus, clock):
+        operators = [Operator(*wish, found, clock) for wish in wishes]
+        world = World(bus, clock, operators)
+        watching = asyncio.create_task(world.poses.watch(), name="poses")
+        try:
+            async with operators[0].present(), operators[1].present(), operators[2].present(), operators[3].present():
+                yield world
+        finally:
+            watching.cancel()
+            await asyncio.wait({watching})

@@ -19,21 +19,17 @@ import asyncio
 import os
 import re
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from statistics import quantiles
 from time import perf_counter
 
-from measuring import report
+from measuring import BIN, MISSION_XML, report
 
-from backbone import run_files
 from backbone.addresses import RC_MANAGER
-from backbone.bus.clock import MissionClock
-from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskState, AskStatistics, ComponentState, Statistics
+from backbone.launcher.mission_connection import connected
 
-MISSION = Path(__file__).parents[1] / "mission.xml"
 HALTING_WATCHER = '<type name="watch_for_motion" class="halting_watcher:HaltingWatcher" subsystem="mission_control"/>'
 SLICE_S = 0.3
 
@@ -46,7 +42,7 @@ def fast_mission(folder: Path, *, settling: bool, clean_stop: bool) -> Path:
         settling: The picture of a new transmitter needs the time that the mission file says; else none.
         clean_stop: The watchers have something to bring to rest at the end of a slice.
     """
-    text = MISSION.read_text()
+    text = MISSION_XML.read_text()
     text = re.sub(r'minimum-runtime-s="[^"]*"', f'minimum-runtime-s="{SLICE_S}"', text)
     text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', r"\g<1>switching", text, count=1)
     if not settling:
@@ -60,11 +56,8 @@ def fast_mission(folder: Path, *, settling: bool, clean_stop: bool) -> Path:
 
 async def measure(seconds: float) -> tuple[dict[str, float], list[float]]:
     """Return the RC manager's statistics after some seconds, and the times of bare questions meanwhile."""
-    found = run_files.find("switching")
-    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
-    bus = await ZenohBus.open_when_up(found.mission, "ui_console/bench", clock, client_config(found.endpoint))
     questions = []
-    try:
+    async with connected("switching", None, "ui_console/bench") as (bus, clock):
         ends_s = clock.now_s() + seconds
         while clock.now_s() < ends_s:
             began = perf_counter()
@@ -72,8 +65,6 @@ async def measure(seconds: float) -> tuple[dict[str, float], list[float]]:
             questions.append(perf_counter() - began)
             await clock.sleep_s(0.05)
         values = (await bus.ask(RC_MANAGER, AskStatistics(), Statistics, within_s=2)).values
-    finally:
-        await bus.close()
     return values, questions
 
 
@@ -89,12 +80,7 @@ def main() -> None:
         os.environ["XDG_RUNTIME_DIR"] = folder
         mission = fast_mission(Path(folder), settling=not given.no_settling, clean_stop=given.clean_stop)
         own = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
-        command = [
-            str(Path(sys.executable).parent / "scout-backbone"),
-            "up",
-            str(mission),
-            "--headless",
-        ]
+        command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
         with subprocess.Popen(
             command, env={**os.environ, "PYTHONPATH": own}, stderr=subprocess.PIPE, text=True
         ) as launcher:

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from console import BIN, MISSION_XML, busy_s, launcher_pid, mission_processes, percent
-from measuring import percentile, report
+from console import busy_s, launcher_pid, mission_processes, percent
+from measuring import BIN, MISSION_XML, percentile, report
 from websockets.asyncio.client import ClientConnection, connect
 
 from backbone import run_files

@@ -142,9 +142,7 @@ class Camera:
         Raises:
             UnknownBody: No robot with a camera has this name.
         """
-        camera = self._cameras.get(robot)
-        if camera is None:
-            raise UnknownBody(f"no robot named {robot!r} has a camera")
+        camera = self._camera_of(robot)
         seen = self._movers.seen(self._data, camera, self._shade.is_dark)
         picture = self._memo.get(seen)
         if picture is not None:
@@ -164,11 +162,13 @@ class Camera:
         Raises:
             UnknownBody: No robot with a camera has this name.
         """
-        camera = self._cameras.get(robot)
-        if camera is None:
-            raise UnknownBody(f"no robot named {robot!r} has a camera")
-        x_m, y_m, z_m = self._data.cam_xpos[camera]
+        x_m, y_m, z_m = self._data.cam_xpos[self._camera_of(robot)]
         return float(x_m), float(y_m), float(z_m)
+
+    def _camera_of(self, robot: str) -> int:
+        if robot not in self._cameras:
+            raise UnknownBody(f"no robot named {robot!r} has a camera")
+        return self._cameras[robot]
 
     def close(self) -> None:
         """Free the graphics context; may be called again."""

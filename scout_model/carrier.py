@@ -72,11 +72,8 @@ class CarrierTrip:
             ((_nearest(target, place)[1], place) for place in places), key=lambda stop: (stop[0], stop[1].name)
         )
         self._stops = {place.name: _Stop(at_m, place, slot) for slot, (at_m, place) in enumerate(served)}
-
-    @property
-    def passengers(self) -> list[str]:
+        self.passengers = list(self._stops)
         """Names of those it carries, in the order in which it sets them down."""
-        return list(self._stops)
 
     def set_down_s(self, passenger: str) -> float:
         """Return the world time at which this passenger stands on the floor and is free."""

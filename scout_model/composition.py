@@ -44,6 +44,7 @@ _SHADE_THICKNESS_M = 0.004  # chosen: as much above a mark as that is above its 
 _FLOOR_LEVEL = 0.45  # as in room.xml
 _AT_A_WALL_M = 0.05  # chosen: what ends so close to a wall darkens it
 _MARKS, _THINGS = 1, 2  # geom groups, see room.xml
+_BOX, _CYLINDER, _SPHERE = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_SPHERE
 
 
 def compose(description: WorldDescription) -> str:
@@ -87,37 +88,43 @@ def _grey(level: float) -> list[float]:
     return [level, level, level, 1.0]
 
 
+def _part(
+    parent: mujoco.MjsBody,
+    name: str,
+    shape: mujoco.mjtGeom,
+    centre_m: list[float],
+    size_m: list[float],
+    level: float,
+    group: int = _THINGS,
+    **more: list[float],
+) -> None:
+    """Add a part that is seen and, unless it is a mark, touched; its size is as MuJoCo has it."""
+    solid = int(group != _MARKS)
+    parent.add_geom(
+        name=name,
+        type=shape,
+        pos=centre_m,
+        size=size_m,
+        rgba=_grey(level),
+        group=group,
+        contype=solid,
+        conaffinity=solid,
+        **more,
+    )
+
+
 def _box(
     parent: mujoco.MjsBody, name: str, centre_m: list[float], size_m: list[float], level: float, group: int
 ) -> None:
-    """Add a box that is seen and, unless it is a mark, touched; ``size_m`` is its full extent."""
-    is_solid = group != _MARKS
-    parent.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=centre_m,
-        size=[extent_m / 2 for extent_m in size_m],
-        rgba=_grey(level),
-        group=group,
-        contype=int(is_solid),
-        conaffinity=int(is_solid),
-    )
+    """Add a box; ``size_m`` is its full extent."""
+    _part(parent, name, _BOX, centre_m, [extent_m / 2 for extent_m in size_m], level, group)
 
 
 def _cylinder(
     parent: mujoco.MjsBody, name: str, radius_m: float, bottom_m: float, top_m: float, level: float, group: int
 ) -> None:
-    is_solid = group != _MARKS
-    parent.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        pos=[0.0, 0.0, (bottom_m + top_m) / 2],
-        size=[radius_m, (top_m - bottom_m) / 2, 0.0],
-        rgba=_grey(level),
-        group=group,
-        contype=int(is_solid),
-        conaffinity=int(is_solid),
-    )
+    centre_m, half_m = [0.0, 0.0, (bottom_m + top_m) / 2], (top_m - bottom_m) / 2
+    _part(parent, name, _CYLINDER, centre_m, [radius_m, half_m, 0.0], level, group)
 
 
 def _add_walls(spec: mujoco.MjSpec, description: WorldDescription) -> None:
@@ -260,17 +267,9 @@ def _add_landmark(spec: mujoco.MjSpec, landmark: Landmark) -> None:
     size_m = [BOARD_THICKNESS_M, BOARD_WIDTH_M, BOARD_HEIGHT_M]
     _box(body, f"{landmark.name}/board", [-BOARD_THICKNESS_M / 2, 0.0, BOARD_HEIGHT_M / 2], size_m, 0.97, _THINGS)
     for number, (right_m, up_m) in enumerate(BLOBS_M):
-        body.add_geom(
-            name=f"{landmark.name}/blob_{number}",
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            pos=[0.0, right_m, up_m],
-            quat=[math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0],
-            size=[BLOB_DIAMETER_M / 2, _MARK_THICKNESS_M / 2, 0.0],
-            rgba=_grey(0.05),
-            group=_MARKS,
-            contype=0,
-            conaffinity=0,
-        )
+        name, size_m = f"{landmark.name}/blob_{number}", [BLOB_DIAMETER_M / 2, _MARK_THICKNESS_M / 2, 0.0]
+        facing = [math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0]
+        _part(body, name, _CYLINDER, [0.0, right_m, up_m], size_m, 0.05, _MARKS, quat=facing)
 
 
 def _add_robot(spec: mujoco.MjSpec, place: ScoutPlace) -> None:
@@ -305,49 +304,15 @@ def _shape_carrier(body: mujoco.MjsBody, name: str) -> None:
     _box(body, f"{name}/hull", [0.0, 0.0, 0.05 + hull_m[2] / 2], hull_m, 0.35, _THINGS)
     _box(body, f"{name}/deck", [0.0, 0.0, CARRIER_DECK_M - deck_m[2] / 2], deck_m, 0.70, _THINGS)
     for number, (along, across) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
-        body.add_geom(
-            name=f"{name}/wheel_{number}",
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            pos=[along * 0.19, across * (width_m / 2 - 0.025), 0.09],
-            quat=[math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0],
-            size=[0.09, 0.025, 0.0],
-            rgba=_grey(0.08),
-            group=_THINGS,
-        )
+        centre_m = [along * 0.19, across * (width_m / 2 - 0.025), 0.09]
+        upright = [math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0]
+        _part(body, f"{name}/wheel_{number}", _CYLINDER, centre_m, [0.09, 0.025, 0.0], 0.08, quat=upright)
 
 
 def _shape_person(body: mujoco.MjsBody, legs: list[mujoco.MjsBody], name: str) -> None:
     head_m, shoulder_m = 0.11, PERSON_HEIGHT_M - 0.28
-    body.add_geom(
-        name=f"{name}/torso",
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        pos=[0.0, 0.0, (PERSON_HIP_M + shoulder_m) / 2],
-        size=[0.16, (shoulder_m - PERSON_HIP_M) / 2, 0.0],
-        rgba=_grey(0.35),
-        group=_THINGS,
-    )
-    body.add_geom(
-        name=f"{name}/head",
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        pos=[0.0, 0.0, PERSON_HEIGHT_M - head_m],
-        size=[head_m, 0.0, 0.0],
-        rgba=_grey(0.80),
-        group=_THINGS,
-    )
+    _cylinder(body, f"{name}/torso", 0.16, PERSON_HIP_M, shoulder_m, 0.35, _THINGS)
+    _part(body, f"{name}/head", _SPHERE, [0.0, 0.0, PERSON_HEIGHT_M - head_m], [head_m, 0.0, 0.0], 0.80)
     for limb in legs:
-        limb.add_geom(
-            name=limb.name,
-            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            pos=[0.0, 0.0, -0.45 * PERSON_HIP_M],
-            size=[0.075, 0.45 * PERSON_HIP_M, 0.0],
-            rgba=_grey(0.10),
-            group=_THINGS,
-        )
-        limb.add_geom(
-            name=f"{limb.name}/shoe",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=[0.06, 0.0, -0.95 * PERSON_HIP_M],
-            size=[0.14, 0.05, 0.03],
-            rgba=_grey(0.9),
-            group=_THINGS,
-        )
+        _part(limb, limb.name, _CYLINDER, [0.0, 0.0, -0.45 * PERSON_HIP_M], [0.075, 0.45 * PERSON_HIP_M, 0.0], 0.10)
+        _part(limb, f"{limb.name}/shoe", _BOX, [0.06, 0.0, -0.95 * PERSON_HIP_M], [0.14, 0.05, 0.03], 0.9)

@@ -15,8 +15,8 @@ Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Offset = Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
 
 
-class Furniture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Something that stands on the floor: a cupboard, a step, a table with a dark place beneath.
+class Block(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What takes a box of the room, from the floor on.
 
     Attributes:
         name: Unique in the world.
@@ -25,7 +25,6 @@ class Furniture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         width_m: Along x.
         depth_m: Along y.
         height_m: Above the floor.
-        shape: ``box``, or ``table``: a top on four legs, with a dark place beneath it.
     """
 
     name: str
@@ -34,6 +33,15 @@ class Furniture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     width_m: float
     depth_m: float
     height_m: float
+
+
+class Furniture(Block, frozen=True, forbid_unknown_fields=True):
+    """Something that stands on the floor: a cupboard, a step, a table with a dark place beneath.
+
+    Attributes:
+        shape: ``box``, or ``table``: a top on four legs, with a dark place beneath it.
+    """
+
     shape: str = "box"
 
 
@@ -75,26 +83,11 @@ class Landmark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     heading_rad: float = 0.0
 
 
-class DarkPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class DarkPlace(Block, frozen=True, forbid_unknown_fields=True):
     """A box-shaped part of the room with little light.
 
     Floor and walls at its bounds, furniture in it, and robots while they are in it look dark.
-
-    Attributes:
-        name: Unique in the world.
-        x_m: Centre.
-        y_m: Centre.
-        width_m: Along x.
-        depth_m: Along y.
-        height_m: Above the floor.
     """
-
-    name: str
-    x_m: float
-    y_m: float
-    width_m: float
-    depth_m: float
-    height_m: float
 
 
 SCOUT = "scout_model.scout:Scout"

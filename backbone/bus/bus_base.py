@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from backbone.bus.interface import Answer, BusStatistics, Clock, Listener, current_cause
 from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
+from backbone.waiting import settle
 from backbone.wire import WIRE_VERSION, Envelope, Message, Refused
 
 T = TypeVar("T")
@@ -22,13 +23,16 @@ class BusBase(ABC):
     """
 
     def __init__(self, mission: str, source: str, clock: Clock) -> None:
-        self._mission, self._source, self._clock = mission, source, clock
+        self._mission, self._clock = mission, clock
+        self.source = source
+        """Address of the component that uses this bus."""
         self._sequence = 0
         # A dict, not a set: it keeps the order of starts, so tasks that end together end in one order in every run.
         self._tasks: dict[asyncio.Task[object], None] = {}
         self._open_questions: dict[asyncio.Future[Any], None] = {}
         self._closing: asyncio.Task[None] | None = None
-        self._on_bug: Callable[[BaseException], None] = _report_to_loop
+        self.on_bug: Callable[[BaseException], None] = _report_to_loop
+        """Callback for an exception that is no refusal."""
         self.closed = False
         self.asked = self.answered = self.published = self.heard = self.refused = self.unreadable = 0
 
@@ -37,20 +41,6 @@ class BusBase(ABC):
         """Name of the mission."""
         return self._mission
 
-    @property
-    def source(self) -> str:
-        """Address of the component that uses this bus."""
-        return self._source
-
-    @property
-    def on_bug(self) -> Callable[[BaseException], None]:
-        """Callback for an exception that is no refusal."""
-        return self._on_bug
-
-    @on_bug.setter
-    def on_bug(self, report: Callable[[BaseException], None]) -> None:
-        self._on_bug = report
-
     def statistics(self) -> BusStatistics:
         """Return the counts of messages since the bus was opened."""
         return BusStatistics(self.asked, self.answered, self.published, self.heard, self.refused, self.unreadable)
@@ -58,7 +48,7 @@ class BusBase(ABC):
     def envelope(self, body: Message) -> Envelope[Message]:
         """Return the body in an envelope with the next sequence number, now, and the current cause."""
         self._sequence += 1
-        return Envelope(WIRE_VERSION, self._source, self._sequence, self._clock.now_s(), current_cause.get(), body)
+        return Envelope(WIRE_VERSION, self.source, self._sequence, self._clock.now_s(), current_cause.get(), body)
 
     def hear(self, listener: Listener, envelope: Envelope[Message]) -> None:
         """Call a listener with the envelope as the current cause; its bugs go to ``on_bug``."""
@@ -71,7 +61,7 @@ class BusBase(ABC):
         try:
             act(*arguments)
         except Exception as bug:
-            self._on_bug(bug)
+            self.on_bug(bug)
         finally:
             current_cause.reset(token)
 
@@ -90,12 +80,12 @@ class BusBase(ABC):
             body = await answer(question)
         except LinkError as error:
             self.refused += 1
-            body = Refused.of(OutcomeUnknown(f"{self._source} got no answer to a question of its own: {error}"))
+            body = Refused.of(OutcomeUnknown(f"{self.source} got no answer to a question of its own: {error}"))
         except Refusal as refusal:
             self.refused += 1
             body = Refused.of(refusal)
         except Exception as bug:
-            self._on_bug(bug)
+            self.on_bug(bug)
             return None
         return self.envelope(body)
 
@@ -106,7 +96,7 @@ class BusBase(ABC):
             NoResponder: The bus is closed already.
         """
         if self.closed:
-            raise NoResponder(f"the bus of {self._source} is closed")
+            raise NoResponder(f"the bus of {self.source} is closed")
         answered: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         self._open_questions[answered] = None
         return answered
@@ -118,7 +108,7 @@ class BusBase(ABC):
     def require_open(self) -> None:
         """Raise RuntimeError if the bus is closed, because a declaration on a closed bus is a bug."""
         if self.closed:
-            raise RuntimeError(f"the bus of {self._source} is closed")
+            raise RuntimeError(f"the bus of {self.source} is closed")
 
     async def close(self) -> None:
         """Withdraw all declarations and leave the network. Idempotent.
@@ -154,12 +144,6 @@ class BusBase(ABC):
     async def _finish(self, answering: list[asyncio.Task[object]]) -> None:
         await asyncio.gather(*answering, return_exceptions=True)
         await self.leave()
-
-
-def settle(answered: asyncio.Future[T], answer: T) -> None:
-    """Set the result of the future unless the future is done."""
-    if not answered.done():
-        answered.set_result(answer)
 
 
 def _report_to_loop(bug: BaseException) -> None:

@@ -60,7 +60,12 @@ class Bus(Protocol):
 
     Addresses and missions that cannot be part of a key are refused with ``IllegalName``. On a closed bus a question
     ends with ``NoResponder``, a publication does nothing, and a declaration is a bug.
+
+    Attributes:
+        on_bug: Callback for an exception that is no refusal; settable.
     """
+
+    on_bug: Callable[[BaseException], None]
 
     @property
     def mission(self) -> str:
@@ -138,13 +143,6 @@ class Bus(Protocol):
 
     def watch_link(self, listener: LinkListener) -> Subscription:
         """Call ``listener(up)`` when this process loses or regains its own link to the hub."""
-
-    @property
-    def on_bug(self) -> Callable[[BaseException], None]:
-        """Callback for an exception that is no refusal; settable."""
-
-    @on_bug.setter
-    def on_bug(self, tell: Callable[[BaseException], None]) -> None: ...
 
     def statistics(self) -> BusStatistics:
         """Return the counts of messages since the bus was opened."""

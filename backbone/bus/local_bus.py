@@ -14,10 +14,11 @@ import functools
 from collections import defaultdict
 from collections.abc import Callable
 
-from backbone.bus.bus_base import BusBase, settle
+from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
+from backbone.waiting import settle
 from backbone.wire import Accepts, Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
 
 Answered = Callable[[Envelope[Message] | None], None]

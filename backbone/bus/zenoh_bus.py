@@ -20,12 +20,13 @@ from typing import Any, TypeVar, cast
 
 import zenoh
 
-from backbone.bus.bus_base import BusBase, settle
+from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
 from backbone.bus.sockets import close_without_waiting
 from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
+from backbone.waiting import settle
 from backbone.wire import (
     Accepts,
     Envelope,

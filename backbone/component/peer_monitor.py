@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 
 from backbone.bus.interface import Bus
+from backbone.waiting import set_within
 
 GONE_AFTER_S = 1.0  # chosen: a restarted hub or component is back within half of it; machine seconds
 
@@ -52,11 +53,7 @@ class PeerMonitor:
             changed = self._changed
             if self.is_there or not self._link:
                 await changed.wait()
-                continue
-            try:
-                async with asyncio.timeout(self._gone_after_s):
-                    await changed.wait()
-            except TimeoutError:
+            elif not await set_within(changed, self._gone_after_s):
                 return
 
     def close(self) -> None:

@@ -19,6 +19,7 @@ from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
 from backbone.errors import BackboneError, Refusal, code_of, revive
+from backbone.waiting import end_tasks
 
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
 _REFUSED = "%s ended, refused [%s]: %s (remedy: %s)"
@@ -138,6 +139,5 @@ async def run_with_heartbeat(
     try:
         await life
     finally:
-        beating.cancel()
-        await asyncio.gather(beating, return_exceptions=True)
+        await end_tasks(beating)
         heartbeat.close()

@@ -38,6 +38,7 @@ from backbone.component.membership import (
     process_address,
 )
 from backbone.component.process import exit_code_of, load_class, run_to_end, run_with_heartbeat
+from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message, UnknownMessage
 
 
@@ -110,10 +111,7 @@ class SharedProcess:
                 self._members[life].end("its process ends")
             await asyncio.gather(*self._lives.values())
         finally:
-            lives = list(self._lives.values())
-            for task in lives:
-                task.cancel()
-            await asyncio.gather(*lives, return_exceptions=True)
+            await end_tasks(*self._lives.values())
             await bus.close()
         if self._bug is not None:
             raise self._bug

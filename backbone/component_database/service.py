@@ -21,7 +21,7 @@ from backbone.component_database.messages import (
 )
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import RECONNECT_S, Components, ListComponents
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Envelope, Message
 
 LIST_EACH_S, LIST_WITHIN_S = 1.0, 3.0  # chosen: a killed nameserver is back within one second
 
@@ -58,8 +58,7 @@ class ComponentDatabase(Component[ComponentDatabaseParameters]):
                 return Admitted(await self._admit(type_name, name))
             case ListTypes():
                 return Types(self._catalogue.counts((await self._list()).components))
-            case other:
-                raise UnknownMessage(f"{type(other).__name__} is not answered here")
+        return await super().answer(asked)
 
     def statistics(self) -> dict[str, float]:
         """Return counts of types and of admissions."""

@@ -54,6 +54,7 @@ from backbone.creator.supervision import Phase, Supervision
 from backbone.creator.zygote import Forks, NoProcess
 from backbone.errors import BackboneError
 from backbone.naming import IllegalName, component_of
+from backbone.waiting import settle
 
 log = logging.getLogger(__name__)
 
@@ -441,12 +442,7 @@ def _as_spawn(launch: Launch, policy: RestartPolicy, ready_within_s: float) -> S
 
 def _settle(waiting: list[asyncio.Future[Any]], outcome: object) -> None:
     for future in waiting:
-        if future.done():  # the waiting task was cancelled
-            continue
-        if isinstance(outcome, BaseException):
-            future.set_exception(outcome)
-        else:
-            future.set_result(outcome)
+        settle(future, outcome)
 
 
 def _ignore(_fell: ProcessFell) -> None:

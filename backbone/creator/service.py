@@ -39,7 +39,7 @@ from backbone.creator.signs_of_life import ReadVitals
 from backbone.creator.zygote import Forks, Zygote
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, legal
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Envelope, Message
 
 LONGEST_CLASS_PATH = 200  # chosen: as much of a refused class path as a person reads
 LOAD_EACH_S = 1.0  # HostLoad: "once a second", of the machine
@@ -130,8 +130,7 @@ class Creator(Component[CreatorParameters]):
                 return ended
             case ListProcesses():
                 return Processes(self.launch.host, self.parameters.tags, self._keeper.processes())
-            case other:
-                raise UnknownMessage(f"{type(other).__name__} is not answered here")
+        return await super().answer(asked)
 
     async def drain(self) -> None:
         """End all components, the last started first, then the zygote."""

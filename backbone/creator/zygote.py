@@ -38,6 +38,7 @@ from backbone.creator.zygote_process import (
     serve,
 )
 from backbone.errors import BackboneError
+from backbone.waiting import settle
 
 log = logging.getLogger(__name__)
 
@@ -183,9 +184,9 @@ class Zygote:
             match answer:
                 case Forked(pid=pid):
                     self._live.add(pid)
-                    _settle(body.pending.popleft(), pid)
+                    settle(body.pending.popleft(), pid)
                 case ForkFailed(why=why):
-                    _settle(body.pending.popleft(), NoProcess(why))
+                    settle(body.pending.popleft(), NoProcess(why))
                 case Exited(pid=pid, returncode=returncode):
                     self._live.discard(pid)
                     self._tell_exit(pid, returncode)
@@ -195,7 +196,7 @@ class Zygote:
         await self._end_rest()
         await body.wait_gone()
         while body.pending:
-            _settle(body.pending.popleft(), _Lost())
+            settle(body.pending.popleft(), _Lost())
 
     async def _end_rest(self) -> None:
         """Kill the remains of a dead zygote and report the ends of its components.
@@ -301,12 +302,3 @@ def _spawn(settings: ZygoteSettings) -> _ZygoteChannel:
 def _fresh(settings: ZygoteSettings) -> ZygoteSettings:
     """Return the settings for a fresh interpreter that replaces a zygote of either kind."""
     return msgspec.structs.replace(settings, import_path=tuple(sys.path))
-
-
-def _settle(answered: asyncio.Future[int], outcome: int | Exception) -> None:
-    if answered.done():  # the ordering task was cancelled
-        return
-    if isinstance(outcome, Exception):
-        answered.set_exception(outcome)
-    else:
-        answered.set_result(outcome)

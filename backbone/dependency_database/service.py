@@ -18,7 +18,7 @@ from backbone.dependency_database.messages import (
     Resources,
 )
 from backbone.spoken import counted
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Envelope, Message
 
 
 class DependencyDatabaseParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -53,8 +53,7 @@ class DependencyDatabase(Component[DependencyDatabaseParameters]):
                 return Resources(self._inventory.resources)
             case FindRcs() as wanted:
                 return RcSets(self._find(wanted, asked.source))
-            case other:
-                raise UnknownMessage(f"{type(other).__name__} is not answered here")
+        return await super().answer(asked)
 
     def statistics(self) -> dict[str, float]:
         """Return counts of resources and of searches."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -24,9 +24,10 @@ from backbone.mission.model import ArcWish, BehaviorDescription, MissionDescript
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import NoHost
 from backbone.placer.placement import CandidateHost, place
+from backbone.rc_manager.recovery import rc_known
 from backbone.rc_manager.service import TOLERANCE_S
 from backbone.scheduling.claims import scheduling_request
-from backbone.scheduling.events import RcKnown, Requested
+from backbone.scheduling.events import Requested
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.rehearsal import Rehearsal, Timetable
@@ -136,13 +137,13 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
         planner=load_planner(rules.planner),
     )
     rehearsal = Rehearsal(manager, opening_lines=manager.opening_lines())
-    for rc in _rcs(description, hosts):
-        rehearsal.tell(rc)
+    for resource in description.resources:
+        rehearsal.tell(replace(rc_known(resource, None), up=bool(hosts[resource.name])))
     answers = Answers(manager)
-    asked = [_ask(manager, rehearsal, claim, hosts) for claim in _claims(description)]
+    asked = [(claim, *_ask(manager, rehearsal, claim, hosts)) for claim in _claims(description)]
     rehearsal.run(for_s)
     timetable = Timetable(rehearsal.trace, rehearsal.now_s)
-    claimed = [_claimed(answers, timetable, one) for one in asked]
+    claimed = [_claimed(answers, timetable, *one) for one in asked]
     return DryRun(description.name, placed, claimed, timetable, rehearsal.trace)
 
 
@@ -201,15 +202,6 @@ class _BehaviorClaim:
     obstacle: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """A claim and the schedule manager's answer."""
-
-    claim: _BehaviorClaim
-    rcs: tuple[str, ...] = ()
-    refused: str = ""
-
-
 def requests(description: MissionDescription) -> list[SchedulingRequest]:
     """Return the requests of the ARCs of the mission's behaviors, parents before children."""
     return [claim.request for claim in _claims(description) if claim.request is not None]
@@ -250,49 +242,39 @@ def _walk(
         yield from _walk(behavior.children, path)
 
 
-def _rcs(description: MissionDescription, hosts: dict[str, str]) -> Iterator[RcKnown]:
-    for resource in description.resources:
-        yield RcKnown(
-            rc=resource.name,
-            kind=resource.type,
-            sharable=resource.sharable,
-            capacity=resource.capacity,
-            connect_s=resource.connect_s,
-            disconnect_s=resource.disconnect_s,
-            up=bool(hosts[resource.name]),
-            last_epoch=0,
-        )
-
-
-def _ask(manager: ScheduleManager, rehearsal: Rehearsal, claim: _BehaviorClaim, hosts: dict[str, str]) -> _Asked:
-    """Send the ARC's request, if the ARC and its behavior have hosts."""
+def _ask(
+    manager: ScheduleManager, rehearsal: Rehearsal, claim: _BehaviorClaim, hosts: dict[str, str]
+) -> tuple[tuple[str, ...], str]:
+    """Send the ARC's request, if the ARC and its behavior have hosts; return its RCs, or why it is refused."""
     if claim.request is None:
-        return _Asked(claim, refused=claim.obstacle)
+        return (), claim.obstacle
     nowhere = [name for name, _ in claim.path[1:] if not hosts.get(name)]
     if not hosts.get(claim.arc):
-        return _Asked(claim, refused=f"{[*nowhere, claim.arc][0]} has no host, so no ARC is asked for")
+        return (), f"{[*nowhere, claim.arc][0]} has no host, so no ARC is asked for"
     try:
         rcs = manager.choose(claim.request)
     except Refusal as refusal:
-        return _Asked(claim, refused=_refusal_text(refusal))
+        return (), _refusal_text(refusal)
     rehearsal.tell(Requested(claim.request, rcs))
-    return _Asked(claim, rcs)
+    return rcs, ""
 
 
-def _claimed(answers: Answers, timetable: Timetable, asked: _Asked) -> Claimed:
-    claim, wish = asked.claim, asked.claim.behavior.arc
+def _claimed(
+    answers: Answers, timetable: Timetable, claim: _BehaviorClaim, rcs: tuple[str, ...], refused: str
+) -> Claimed:
+    wish = claim.behavior.arc
     grants = [run.grant_s for run in timetable.of_arc(claim.arc) if run.grant_s is not None]
     return Claimed(
         arc=claim.arc,
         behavior=claim.behavior.name,
         priority="/".join(f"{name}:{number}" for name, number in claim.path),
-        rcs=asked.rcs,
+        rcs=rcs,
         minimum_s=wish.minimum_runtime_s if wish is not None else 0.0,
-        refused=asked.refused,
+        refused=refused,
         turns=len(grants),
         first_grant_s=min(grants, default=None),
         worst_wait_s=timetable.worst_wait_s(claim.arc),
-        why=None if asked.refused else answers.why(claim.arc, timetable.end_s),
+        why=None if refused else answers.why(claim.arc, timetable.end_s),
     )
 
 

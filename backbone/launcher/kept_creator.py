@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import msgspec
 
@@ -41,25 +40,6 @@ class Offered:
     host: str
     tags: tuple[str, ...] = ()
     secret: str = ""
-
-
-class KeepsCreator(Protocol):
-    """What an offer needs of ``KeptCreator``."""
-
-    on_fell: Callable[[ProcessFell], None]
-    on_changed: Callable[[], None]
-
-    async def start(self, bus: Bus, clock: Clock) -> None:
-        """Start the creator and return when it is ready, or raise a ``BackboneError``."""
-
-    def processes(self) -> list[ProcessState]:
-        """Return the creator's process."""
-
-    def absences(self) -> list[Absence]:
-        """Return the creator as absent while it does not run or respond."""
-
-    async def close(self) -> None:
-        """End the creator and all its components. Idempotent."""
 
 
 class KeptCreator:

@@ -35,6 +35,7 @@ from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
+from backbone.waiting import end_tasks
 from backbone.wire import Accepts, Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -104,8 +105,7 @@ class Launcher(Component[NoParameters]):
                 await self.clock.sleep_s(self._options.for_s)
                 self.end(f"ran for {self._options.for_s:g} s")
         finally:
-            watching.cancel()
-            await asyncio.gather(watching, return_exceptions=True)
+            await end_tasks(watching)
 
     def interrupted(self) -> None:
         """End because the operator pressed Ctrl-C."""

@@ -31,9 +31,10 @@ from backbone.creator.messages import (
     offer_name,
 )
 from backbone.errors import HubUnreachable, LinkError, Refusal
-from backbone.launcher.kept_creator import KeepsCreator, KeptCreator, Offered
+from backbone.launcher.kept_creator import KeptCreator, Offered
 from backbone.launcher.mission_connection import clock_elsewhere, mission_clock
 from backbone.naming import Subsystem, legal
+from backbone.waiting import set_within
 from backbone.wire import Accepts, Envelope, Message
 
 OFFER_TYPE = "offer"
@@ -62,7 +63,7 @@ class MachineOffer(Component[NoParameters]):
     accepts: ClassVar[Accepts | None] = ListProcesses
 
     def __init__(
-        self, launch: Launch, bus: Bus, clock: Clock, creator: KeepsCreator, on_ready: Callable[[], None]
+        self, launch: Launch, bus: Bus, clock: Clock, creator: KeptCreator, on_ready: Callable[[], None]
     ) -> None:
         super().__init__(launch, bus, clock)
         self._creator, self._on_ready = creator, on_ready
@@ -103,10 +104,7 @@ class MachineOffer(Component[NoParameters]):
         while True:
             await self._link_fell.wait()
             self._link_fell.clear()
-            try:
-                async with asyncio.timeout(CUT_OFF_S):
-                    await self._link_up.wait()
-            except TimeoutError:
+            if not await set_within(self._link_up, CUT_OFF_S):
                 self._end_as(Ending.CUT_OFF)
                 return
             if await self._is_other_time():

@@ -44,15 +44,12 @@ class OtherHosts:
 
     def __init__(self, description: MissionDescription, now_s: float) -> None:
         self._commands = {host.name: command_on(host, description) for host in description.other_hosts}
+        self.names = list(self._commands)
+        """Names of all other machines, in the order of the mission file."""
         self._creators = {address(Subsystem.BACKBONE, creator_name(host)): host for host in self._commands}
         self._offers = {address(Subsystem.BACKBONE, offer_name(host)) for host in self._commands}
         self._absent = {host: _Absent(now_s, "it was not offered to the mission yet") for host in self._commands}
         self._offering: set[str] = set()
-
-    @property
-    def names(self) -> list[str]:
-        """Names of all other machines, in the order of the mission file."""
-        return list(self._commands)
 
     @property
     def missing(self) -> list[str]:

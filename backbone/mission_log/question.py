@@ -6,13 +6,15 @@ the limits of ``AskLog``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated
+
+import msgspec
 
 from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
 from backbone.mission_log.log import FOR_EVER_S, MOST_EVENTS, AskLog
 from backbone.moments import Now, moment
-from backbone.ranges import LONGEST_MENTION
+from backbone.ranges import LONGEST_MENTION, Mention
 
 LONGEST_WORDS = 200  # chosen: longer than any search of a person, and it fits a page's message
 
@@ -24,8 +26,7 @@ class WrongSearch(Refusal):
     remedy = f"Levels are {', '.join(LogLevel)}; names and texts are short; since comes before until."
 
 
-@dataclass(frozen=True, slots=True)
-class LogQuestion:
+class LogQuestion(msgspec.Struct, frozen=True):
     """A person's question to the log. Empty fields match all; an event must match all fields.
 
     Attributes:
@@ -37,12 +38,12 @@ class LogQuestion:
         until: Latest moment.
     """
 
-    text: str = ""
-    robot: str = ""
-    person: str = ""
-    level: str = ""
-    since: str = ""
-    until: str = ""
+    text: Annotated[str, msgspec.Meta(max_length=LONGEST_WORDS)] = ""
+    robot: Mention = ""
+    person: Mention = ""
+    level: Mention = ""
+    since: Mention = ""
+    until: Mention = ""
 
     def asked(self, now: Now, most: int = MOST_EVENTS) -> AskLog:
         """Return the question for the launcher.

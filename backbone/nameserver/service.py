@@ -36,7 +36,7 @@ from backbone.nameserver.messages import (
 )
 from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Instruction, Introduce, Registry
 from backbone.naming import IllegalName, component_of, is_component, read_claim
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
@@ -122,8 +122,7 @@ class Nameserver(Component[NameserverParameters]):
                 return Resolved(self._registry.resolve(name, self.clock.now_s()))
             case ListComponents(subsystem=subsystem, type=component_type):
                 return self._registry.components(subsystem, component_type, self.clock.now_s())
-            case other:
-                raise UnknownMessage(f"{type(other).__name__} is not answered here")
+        return await super().answer(asked)
 
     def statistics(self) -> dict[str, float]:
         """Return counts of registered components, and of events since the hub's start."""

@@ -158,9 +158,7 @@ def _request_lines(schedule: Schedule, now_s: float) -> list[Text]:
         line.append(_when(request, now_s))
         reason = Text("  ", style="dim")
         reason.append(f"for {', '.join(request.blockers)}, " if request.blockers else "")
-        reason.append(
-            f"{request.turns} turn{'' if request.turns == 1 else 's'} so far, {request.priority}{_risen(request)}"
-        )
+        reason.append(f"{counted(request.turns, 'turn')} so far, {request.priority}{_risen(request)}")
         lines += [line, reason]
     return lines or [Text("no ARC has a request", style="dim")]
 

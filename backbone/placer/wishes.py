@@ -10,9 +10,8 @@ Prior art: level-triggered controllers of Kubernetes; permanent children of Erla
 
 from __future__ import annotations
 
-import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from backbone.addresses import PLACER
@@ -22,6 +21,7 @@ from backbone.component.peer_monitor import PeerMonitor
 from backbone.creator.messages import START_MOST_S
 from backbone.errors import LinkError, Refusal
 from backbone.placer.messages import AskPlacement, CreatorSilent, NotPlaced, Placement, Start, Started, StoppedMeanwhile
+from backbone.waiting import first_of
 
 log = logging.getLogger(__name__)
 
@@ -180,7 +180,7 @@ async def _wait_missing(
         if component.is_there and wish.absence() is not None:
             wish.placed()
             on_changed()
-        await _first_of(
+        await first_of(
             component.wait_gone(),
             *([] if component.is_there else [component.wait_there()]),
             placer.wait_risen(max(compared_with, 1) + 1),
@@ -200,14 +200,4 @@ async def _wait_missing(
             await clock.sleep_s(PAUSE_FIRST_S * clock.rate)
             continue
         if not component.is_there:  # its creator or the placer restarts it: compare again after a pause
-            await _first_of(component.wait_there(), clock.sleep_s(PAUSE_MOST_S * clock.rate))
-
-
-async def _first_of(*waits: Awaitable[None]) -> None:
-    tasks = [asyncio.ensure_future(wait) for wait in waits]
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+            await first_of(component.wait_there(), clock.sleep_s(PAUSE_MOST_S * clock.rate))

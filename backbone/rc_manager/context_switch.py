@@ -137,7 +137,7 @@ class ContextSwitch:
 
         async def connect(rc: str, epoch: int) -> None:
             question = Connect(order.arc, epoch, lease_s, uses.get(rc, RcUse()), epochs, order.ranks.get(rc, 0))
-            await self._bus.ask(_in_pool(rc), question, Connected, within_s=RC_REPLY_S)
+            await self._bus.ask(in_pool(rc), question, Connected, within_s=RC_REPLY_S)
 
         outcomes = await asyncio.gather(*(connect(rc, epoch) for rc, epoch in epochs.items()), return_exceptions=True)
         for rc, outcome in zip(epochs, outcomes, strict=True):
@@ -152,7 +152,7 @@ class ContextSwitch:
     async def _open_gate(self, order: ConnectArc, settled_s: float) -> bool:
         question = OpenGate(dict(order.epochs), settled_s, order.until_s)
         try:
-            await self._bus.ask(_in_pool(order.arc), question, GateOpens, within_s=ARC_REPLY_S)
+            await self._bus.ask(in_pool(order.arc), question, GateOpens, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
             log.warning("%s did not open: %s", order.arc, error)
             self._note(order.arc, f"did not open its gate: {error}")
@@ -163,7 +163,7 @@ class ContextSwitch:
     async def _close_gate(self, arc: str, question: CloseGate) -> None:
         within_s = question.deadline_s / self._clock.rate or CLOSE_S
         try:
-            await self._bus.ask(_in_pool(arc), question, GateClosed, within_s=within_s)
+            await self._bus.ask(in_pool(arc), question, GateClosed, within_s=within_s)
         except (Refusal, LinkError) as error:
             self._note(arc, f"did not close its gate: {error}")
 
@@ -184,7 +184,7 @@ class ContextSwitch:
         while (left_s := self._real_s(lease_until_s)) > 0:
             within_s = min(RC_REPLY_S, left_s, max(CONFIRM_S, self._real_s(free_by_s)))
             try:
-                await self._bus.ask(_in_pool(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=within_s)
+                await self._bus.ask(in_pool(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=within_s)
                 return True
             except (Refusal, LinkError) as error:
                 complain(rc, f"did not confirm its disconnection from {arc}: {error}")
@@ -210,5 +210,6 @@ def _holds(arc: str, epochs: Mapping[str, int]) -> list[Hold]:
     return [(rc, arc, epoch) for rc, epoch in epochs.items()]
 
 
-def _in_pool(name: str) -> str:
+def in_pool(name: str) -> str:
+    """Return the address of an RC or ARC."""
     return f"{Subsystem.RESOURCE_POOL}/{name}"

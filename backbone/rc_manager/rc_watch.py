@@ -17,9 +17,8 @@ from backbone.component.messages import LogLevel, NameTaken
 from backbone.component.story import StoryBook
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
-from backbone.naming import Subsystem
 from backbone.placer.messages import Start, Started
-from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch
+from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch, in_pool
 from backbone.rc_manager.credibility import contradiction
 from backbone.rc_manager.messages import AskRc, RcState
 from backbone.rc_manager.recovery import Found, Recovery
@@ -201,7 +200,7 @@ class RcWatch:
         """Return the RC's own report of its state; None if it does not answer, or is not credible and put aside."""
         bus, clock = self._service.bus, self._service.clock
         try:
-            state = await bus.ask(f"{Subsystem.RESOURCE_POOL}/{rc}", AskRc(), RcState, within_s=RC_REPLY_S)
+            state = await bus.ask(in_pool(rc), AskRc(), RcState, within_s=RC_REPLY_S)
         except MalformedMessage as nonsense:
             self._put_aside(rc, f"its answer cannot be read: {nonsense.detail}")
             return None

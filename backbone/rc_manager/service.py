@@ -29,7 +29,7 @@ from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.beats import Beats
-from backbone.rc_manager.context_switch import ContextSwitch
+from backbone.rc_manager.context_switch import ContextSwitch, in_pool
 from backbone.rc_manager.messages import (
     RENEW_EVERY_S,
     AskAttributes,
@@ -84,6 +84,7 @@ from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -159,7 +160,7 @@ class RcManager(Component[RcManagerParameters]):
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_from_nameserver)
         self.bus.subscribe(f"{Subsystem.RESOURCE_POOL}/*", Conversation.BEAT, Beat, self._heard_beat)
         for rc in self._resources:
-            self.bus.subscribe(_rc(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
+            self.bus.subscribe(in_pool(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
         self.bus.watch_link(self._link_changed)
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
@@ -175,10 +176,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def drain(self) -> None:
         """End all switches; what is held ends by lease, or is taken over by the next RC manager."""
-        tasks = [*self._switches.values(), *self._rcs.starts]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await end_tasks(*self._switches.values(), *self._rcs.starts)
         self._trace.write({"ev": "end", "t": round(self.clock.now_s(), 6)})
         self._trace.close()
 
@@ -243,7 +241,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _tell_path(self, arc: str, path: list[PathNode]) -> None:
         try:
-            await self.bus.ask(_arc(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
+            await self.bus.ask(in_pool(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
             self.story.note(arc, f"did not take its new path; the next RC manager would not know it: {error}")
 
@@ -287,8 +285,7 @@ class RcManager(Component[RcManagerParameters]):
 
         async def in_turn() -> None:
             if before is not None and not before.done():
-                before.cancel()
-                await asyncio.gather(before, return_exceptions=True)
+                await end_tasks(before)
             await work()
             if self._switches.get(arc) is asyncio.current_task():
                 del self._switches[arc]
@@ -412,13 +409,8 @@ class RcManager(Component[RcManagerParameters]):
         while True:
             self._wake.clear()
             at_s = self._wake_at_s
-            if at_s is None:
-                await self._wake.wait()
-                continue
-            try:
-                async with asyncio.timeout(max(0.0, at_s - self.clock.now_s()) / self.clock.rate):
-                    await self._wake.wait()
-            except TimeoutError:
+            wait_s = None if at_s is None else max(0.0, at_s - self.clock.now_s()) / self.clock.rate
+            if not await set_within(self._wake, wait_s):
                 self._wake_at_s = None
                 self.happened(Woken())
 
@@ -459,7 +451,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _meet_arc(self, arc: str) -> None:
         """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
-        current = (await self._recovery.ask_all([_arc(arc)], AskRequest(), CurrentRequest)).get(arc)
+        current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
         if current is None or arc in self._uses or self._requesting[arc]:
             return
         if current.rcs:
@@ -473,11 +465,3 @@ class RcManager(Component[RcManagerParameters]):
 
 def _has_lines(trace: Path) -> bool:
     return trace.is_file() and trace.stat().st_size > 0
-
-
-def _rc(rc: str) -> str:
-    return f"{Subsystem.RESOURCE_POOL}/{rc}"
-
-
-def _arc(arc: str) -> str:
-    return f"{Subsystem.RESOURCE_POOL}/{arc}"

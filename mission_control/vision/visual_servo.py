@@ -12,7 +12,7 @@ from mission_control.vision.landmark import Picture
 from mission_control.vision.pose_filter import PoseFilter
 from mission_control.vision.servo_law import STOP_M, Approach, Command, Stage
 from mission_control.vision.skeleton_tracking import TargetTracker, Track
-from mission_control.vision.target_pose import SCOUT_CAMERA, CameraModel, TargetPose
+from mission_control.vision.target_pose import TargetPose
 
 LATENCY_S = 0.1  # chosen: from a frame's capture until its command turns the wheels, on one machine
 NEAREST_STOP_M, FARTHEST_STOP_M = 0.40, 1.2  # measured: nearer the T leaves the picture, further the line is unsure
@@ -47,16 +47,14 @@ class VisualServo:
         ValueError: From ``stop_m`` away the landmark does not fit into the picture, or is too small.
     """
 
-    def __init__(
-        self, camera: CameraModel = SCOUT_CAMERA, stop_m: float = STOP_M, latency_s: float = LATENCY_S
-    ) -> None:
+    def __init__(self, stop_m: float = STOP_M, latency_s: float = LATENCY_S) -> None:
         if not NEAREST_STOP_M <= stop_m <= FARTHEST_STOP_M:
             raise ValueError(f"stop {NEAREST_STOP_M} to {FARTHEST_STOP_M} m before the board, not {stop_m} m")
         if not 0 <= latency_s < LONGEST_GAP_S:
             raise ValueError(f"a latency of {latency_s} s is not within 0 to {LONGEST_GAP_S} s")
         self.tracker = TargetTracker()
         """For a look at its models."""
-        self._filter = PoseFilter(camera)
+        self._filter = PoseFilter()
         self._approach = Approach(stop_m)
         self._latency_s = latency_s
         self._sent: deque[tuple[float, Command]] = deque()

@@ -23,6 +23,7 @@ import numpy as np
 from backbone.bus.clock import VirtualLoop
 from backbone.bus.interface import Subscription
 from backbone.keys import Conversation
+from backbone.waiting import end_tasks
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import meet_world, world_of
@@ -94,9 +95,7 @@ class SimulatedFramegrabber:
         self.stop()
         if self._world is not None:
             self._world.close()
-        for taking in self._taking:
-            taking.cancel()
-        await asyncio.gather(*self._taking, return_exceptions=True)
+        await end_tasks(*self._taking)
         if self._studio is not None:
             await asyncio.get_running_loop().run_in_executor(self._thread, self._studio.close)
         self._thread.shutdown()

@@ -24,6 +24,7 @@ from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.naming import Subsystem, address, component_of
 from backbone.rc_manager.messages import StaleEpoch
+from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import HardwareFault, RadioDriver
 from resource_pool.holds import Hold
@@ -214,21 +215,11 @@ class CommandRadio(ResourceController[RcParameters]):
     async def _send_when_due(self) -> None:
         while True:
             self._loaded.clear()
-            due_s = self._schedule.next_due_s()
-            if due_s is None:
-                await self._loaded.wait()
-            elif due_s > self.clock.now_s():
-                await self._wait_loaded_or(due_s)
+            due_s, now_s = self._schedule.next_due_s(), self.clock.now_s()
+            if due_s is None or due_s > now_s:
+                await set_within(self._loaded, None if due_s is None else (due_s - now_s) / self.clock.rate)
             else:
                 await self._send_next()
-
-    async def _wait_loaded_or(self, due_s: float) -> None:
-        """Return at this time, or earlier if a new packet was loaded."""
-        try:
-            async with asyncio.timeout((due_s - self.clock.now_s()) / self.clock.rate):
-                await self._loaded.wait()
-        except TimeoutError:
-            return
 
     async def _send_next(self) -> None:
         async with self._air:

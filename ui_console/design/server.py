@@ -57,14 +57,11 @@ class DesignServer:
         end: asyncio.Event,
         encryption: SSLContext | None = None,
     ) -> None:
-        """Serve until the event is set; unsaved changes are kept beside the file.
+        """Serve until the event is set; unsaved changes are kept beside the file; see ``Reception.open``.
 
         Args:
-            host: Address to listen at.
-            port: Port; 0: any that is free.
             ready: Called with the port once the server listens.
             end: Ends it.
-            encryption: See ``encryption_with``; None: plain HTTP.
 
         Raises:
             CannotListen: The address is not free, or not one of this machine.

@@ -170,9 +170,9 @@ class TeamModel:
         rows = [self._request_row(request) for request in (self.schedule.requests if self.schedule else [])]
         return sorted(rows, key=_request_order)
 
-    def timeline(self, now_s: float, past_s: float = PAST_S, next_s: float = NEXT_S) -> TimelineView:
-        """Return the holders of each resource: in the past seconds, now, and as predicted."""
-        return self._timeline.view(now_s, past_s, next_s)
+    def timeline(self, now_s: float) -> TimelineView:
+        """Return who had which resource in the past seconds, who has it, and who gets it in the next."""
+        return self._timeline.view(now_s, PAST_S, NEXT_S)
 
     def health(self, now_s: float) -> HealthView | None:
         """Return the mission's health; None: not known yet."""

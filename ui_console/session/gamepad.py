@@ -16,6 +16,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from backbone.errors import Refusal
+from backbone.waiting import end_tasks, set_within
 from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
 
 try:
@@ -167,25 +168,16 @@ async def play_gamepad(
             elif was_held:
                 stop()
             was_held = drive is not None
-            await _wait(changed, SAY_EVERY_S if was_held else None)
+            if await set_within(changed, SAY_EVERY_S if was_held else None):
+                changed.clear()
         if (error := feeling.exception()) is not None:
             if not isinstance(error, OSError):
                 raise error
             log.warning("the gamepad is gone: %s", error)
     finally:
-        feeling.cancel()
-        await asyncio.gather(feeling, return_exceptions=True)
+        await end_tasks(feeling)
         if was_held:
             stop()
-
-
-async def _wait(changed: asyncio.Event, within_s: float | None) -> None:
-    try:
-        async with asyncio.timeout(within_s):
-            await changed.wait()
-    except TimeoutError:
-        return
-    changed.clear()
 
 
 def buttons_help() -> list[str]:

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
+from backbone.waiting import set_within
 from ui_console.model.events import Attention
 
 if TYPE_CHECKING:
@@ -37,10 +38,7 @@ class Presence:
         """Call ``away`` after each so many machine seconds without a touch; until cancelled."""
         while True:
             self._touched.clear()
-            try:
-                async with asyncio.timeout(away_after_s):
-                    await self._touched.wait()
-            except TimeoutError:
+            if not await set_within(self._touched, away_after_s):
                 await away()
                 await self._touched.wait()
 

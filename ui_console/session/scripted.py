@@ -11,6 +11,7 @@ from backbone.errors import Refusal
 from backbone.launcher.endings import ExitCode
 from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
+from backbone.waiting import set_within
 from resource_pool.arc_client import StopState, Suspended, SwappedOut
 from ui_console.model import events
 from ui_console.model.driving import DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot
@@ -159,11 +160,7 @@ class ScriptDriver:
         wait_s = None
         if next_s is not None:
             wait_s = max(0.0, granted_s + next_s - console.clock.now_s()) / console.clock.rate
-        try:
-            async with asyncio.timeout(wait_s):
-                await self._news.wait()
-        except TimeoutError:
-            return
+        await set_within(self._news, wait_s)
 
     def _show_wrong_line(self, now_s: float) -> None:
         if self._wrong is not None:

@@ -5,7 +5,7 @@ Pure: a line in, a question out. Words that belong together need no quotes: all 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from backbone.component.messages import LogLevel
 from backbone.mission_log.log import AskLog, Log
@@ -14,7 +14,7 @@ from backbone.spoken import counted
 
 SEARCH_HELP = f"words, and robot:NAME person:NAME level:{'|'.join(LogLevel)} since:5m until:14:05; nothing: all"
 FOUND_SHOWN = 300  # chosen: more than a person pages through; a narrower search shows the rest
-_FIELDS = {field.name for field in fields(LogQuestion)} - {"text"}
+_FIELDS = {*LogQuestion.__struct_fields__} - {"text"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,6 @@ import msgspec
 
 from backbone.bus.interface import Clock
 from backbone.errors import LinkError, Refusal, code_of
-from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
@@ -264,9 +263,8 @@ class Operator:
         """Search the mission's log; the page fetches the rest of the result part by part."""
         clock = self._services.clock
         now = Now(clock.now_s(), datetime.now(), clock.rate)
-        question = LogQuestion(wanted.text, wanted.robot, wanted.person, wanted.level, wanted.since, wanted.until)
         try:
-            found = await self._services.observer.feed.search_log(question.asked(now))
+            found = await self._services.observer.feed.search_log(wanted.asked(now))
         except Refusal as refusal:
             refused = {"code": code_of(refusal), "refused": refusal.detail, "remedy": refusal.remedy}
             self._answer({"log": {"number": wanted.number, **refused}})

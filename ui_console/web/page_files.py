@@ -1,17 +1,20 @@
 """The page: files of this package, each with the headers that make a browser trust nothing else.
 
-Rules of this file: no socket; a path goes in, an answer comes out. Files are read once and by name, so no path leads to
-another file.
+Rules of this file: no socket; a path goes in, an answer comes out. Files are read once, and only those that the page
+names, so no path leads to another file.
 """
 
 from __future__ import annotations
 
 import hashlib
+import itertools
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from urllib.parse import urlsplit
 
+PAGE = resources.files("ui_console.web") / "page"
 KINDS = {
     "html": "text/html; charset=utf-8",
     "css": "text/css; charset=utf-8",
@@ -20,68 +23,21 @@ KINDS = {
 }
 
 
-def _page(html: str, *names: str) -> dict[str, tuple[str, str]]:
-    """Return the files of a page by their paths, each with its type; the page itself is at the root."""
-    paths = {"/": html, **{f"/{name}": name for name in names}}
-    return {path: (name, KINDS[name.rpartition(".")[2]]) for path, name in paths.items()}
+_NAMED = re.compile(r'(?:src|href)="(\w+\.\w+)"|^[^*\n]*from "\./([^"]+)"', re.MULTILINE)
 
 
-FILES = _page(
-    "index.html",
-    "theme.css",
-    "console.css",
-    "main.js",
-    "blind.js",
-    "cards.js",
-    "dom.js",
-    "driving.js",
-    "freshness.js",
-    "hand.js",
-    "holding.js",
-    "keys.js",
-    "link.js",
-    "log.js",
-    "login.js",
-    "notices.js",
-    "pictures.js",
-    "stopping.js",
-    "svg.js",
-    "table.js",
-    "tables.js",
-    "text.js",
-    "theme.js",
-    "timeline.js",
-    "icon.svg",
-)
-DESIGN_FILES = _page(
-    "design.html",
-    "theme.css",
-    "console.css",
-    "design.css",
-    "design.js",
-    "design_acts.js",
-    "design_adding.js",
-    "design_carrying.js",
-    "design_changes.js",
-    "design_choice.js",
-    "design_details.js",
-    "design_dialogs.js",
-    "design_drag.js",
-    "design_minute.js",
-    "design_palette.js",
-    "design_panes.js",
-    "design_places.js",
-    "design_status.js",
-    "design_tree.js",
-    "dom.js",
-    "freshness.js",
-    "link.js",
-    "login.js",
-    "svg.js",
-    "text.js",
-    "theme.js",
-    "icon.svg",
-)
+def _page(html: str) -> dict[str, tuple[str, str]]:
+    """Return the files of a page by their paths, each with its type: what it names, and what its modules import."""
+    names, found = [html], dict[str, str]()
+    while names:
+        name = names.pop()
+        if name not in found:
+            found[name] = KINDS[name.rpartition(".")[2]]
+            names += filter(None, itertools.chain(*_NAMED.findall((PAGE / name).read_text("utf-8"))))
+    return {"/" if name == html else f"/{name}": (name, kind) for name, kind in found.items()}
+
+
+FILES, DESIGN_FILES = _page("index.html"), _page("design.html")
 SOCKET_PATH = "/socket"
 
 SAFETY = {
@@ -115,10 +71,9 @@ class PageFiles:
     """
 
     def __init__(self, files: Mapping[str, tuple[str, str]] = FILES) -> None:
-        folder = resources.files("ui_console.web").joinpath("page")
         self._answers: dict[str, Answer] = {}
         for path, (name, kind) in files.items():
-            body = folder.joinpath(name).read_bytes()
+            body = (PAGE / name).read_bytes()
             tag = f'"{hashlib.sha256(body).hexdigest()[:16]}"'
             self._answers[path] = Answer(200, {**SAFETY, "Content-Type": kind, "ETag": tag}, body)
 

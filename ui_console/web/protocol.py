@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from backbone.mission_log.question import LONGEST_WORDS
+from backbone.mission_log.question import LogQuestion
 from backbone.ranges import EXACT
 from ui_console.model.consent import MAX_WHY
 from ui_console.web.login import BeatRequest, Hello, ShortText
@@ -110,26 +110,14 @@ class WhyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fi
     name: ShortText
 
 
-class SearchLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="search_log"):
-    """Search the mission's log; empty fields match all.
+class SearchLog(LogQuestion, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="search_log", kw_only=True):
+    """Search the mission's log.
 
     Attributes:
         number: Comes back with the result.
-        text: Words of the event.
-        robot: Only events about this name.
-        person: Only events of this person, or with this name.
-        level: Only events of at least this level.
-        since: Not before this moment, as people type it.
-        until: Not after it.
     """
 
     number: Numbered
-    text: Annotated[str, msgspec.Meta(max_length=LONGEST_WORDS)] = ""
-    robot: ShortText = ""
-    person: ShortText = ""
-    level: ShortText = ""
-    since: ShortText = ""
-    until: ShortText = ""
 
 
 class MoreLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="more_log"):

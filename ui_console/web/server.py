@@ -29,13 +29,10 @@ class WebServer:
     async def run(
         self, host: str, port: int, ready: Callable[[int], None], encryption: SSLContext | None = None
     ) -> None:
-        """Serve until the hub's component has ended; all robots are given back then.
+        """Serve until the hub's component has ended; all robots are given back then; see ``Reception.open``.
 
         Args:
-            host: Address to listen at.
-            port: Port; 0: any that is free.
             ready: Called with the port once the server listens.
-            encryption: See ``encryption_with``; None: plain HTTP.
 
         Raises:
             CannotListen: The address is not free, or not one of this machine.

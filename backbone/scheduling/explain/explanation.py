@@ -20,6 +20,7 @@ from backbone.scheduling.priority import higher
 from backbone.scheduling.requests import LEASE_S, Holder, RequestState, Scheduled, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.views import RcView, RequestView, Schedule, Why
+from backbone.spoken import counted
 
 UNKNOWN_S = -1.0
 MOST_REHEARSED = 32  # measured: a rehearsal of so many takes at most 80 ms
@@ -215,7 +216,9 @@ class Explanation:
         if arc.swapped_out and arc.state is RequestState.WAITING:
             lines.append(f"it lost its RCs last because {_reason(arc)}")
         if arc.raised:
-            lines.append(f"it rose by {_levels(arc.raised)} because it waits long; it comes down again once served")
+            lines.append(
+                f"it rose by {counted(arc.raised, 'level')} because it waits long; it comes down again once served"
+            )
         return Why(
             name=arc.name,
             state=arc.state,
@@ -361,10 +364,6 @@ def _names(arcs: Sequence[ArcEntry]) -> str:
 
 def _release(arcs: Sequence[ArcEntry]) -> str:
     return f"{_names(arcs)} {'releases or idles' if len(arcs) == 1 else 'release or idle'}"
-
-
-def _levels(count: int) -> str:
-    return f"{count} level" if count == 1 else f"{count} levels"
 
 
 def _at(time_s: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -12,6 +12,7 @@ import typer
 
 from backbone.command_line.options import CommandTable, finite
 from backbone.errors import Refusal, code_of
+from backbone.launcher.endings import ExitCode
 
 app = typer.Typer(
     cls=CommandTable,
@@ -25,11 +26,6 @@ MOST_TRIALS = 1_000_000  # chosen: days of work
 LARGEST_SEED = 2**32 - 1  # the limit of numpy
 MOST_JOBS = 1024  # chosen: more cores than any tested machine
 PIPE_WIDTH = 200  # chosen: no table is wider, so files and pipes get whole tables
-
-
-class _Exit(IntEnum):
-    USAGE = 2
-    FAILED = 6
 
 
 class Policy(StrEnum):
@@ -206,7 +202,7 @@ def _run(
         _refuse(refusal)
     except OSError as error:
         print(f"cannot be written: {error}", file=sys.stderr)
-        raise typer.Exit(int(_Exit.FAILED)) from None
+        raise typer.Exit(int(ExitCode.MISSION_FAILED)) from None
     if as_json:
         print(json.dumps(outcome.to_json()))
     else:
@@ -216,9 +212,9 @@ def _run(
         for row in outcome.rows:
             for said in row.disagreements[:3]:
                 print(f"{row.condition.title()}: {said}", file=sys.stderr)
-        raise typer.Exit(int(_Exit.FAILED))
+        raise typer.Exit(int(ExitCode.MISSION_FAILED))
 
 
 def _refuse(refusal: Refusal) -> NoReturn:
     print(f"refused [{code_of(refusal)}]: {refusal}", file=sys.stderr)
-    raise typer.Exit(int(_Exit.USAGE)) from None
+    raise typer.Exit(int(ExitCode.USAGE)) from None

@@ -7,15 +7,14 @@ import math
 Z95 = 1.959963984540054  # the normal distribution's 97.5 % point
 
 
-def wilson(detected: int, trials: int, z: float = Z95) -> tuple[float, float]:
-    """Return Wilson's score interval of the true rate.
+def wilson(detected: int, trials: int) -> tuple[float, float]:
+    """Return Wilson's score interval of the true rate, at 95 %.
 
     Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference", 1927.
 
     Args:
         detected: Successes, 0 to ``trials``.
         trials: Above 0.
-        z: Number of standard deviations; the default gives 95 %.
 
     Raises:
         ValueError: The numbers are no count of successes.
@@ -26,9 +25,9 @@ def wilson(detected: int, trials: int, z: float = Z95) -> tuple[float, float]:
     """
     if not 0 <= detected <= trials or not trials:
         raise ValueError(f"{detected} of {trials} is no rate")
-    rate, square = detected / trials, z * z
+    rate, square = detected / trials, Z95 * Z95
     middle = (rate + square / (2 * trials)) / (1 + square / trials)
-    half = z / (1 + square / trials) * math.sqrt(rate * (1 - rate) / trials + square / (4 * trials**2))
+    half = Z95 / (1 + square / trials) * math.sqrt(rate * (1 - rate) / trials + square / (4 * trials**2))
     return max(0.0, middle - half), min(1.0, middle + half)
 
 

@@ -17,6 +17,7 @@ from backbone.mission.behavior_orders import behavior_orders
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import Start
 from backbone.scheduling.trace import Line
+from backbone.waiting import first_of
 from backbone.wire import Envelope
 from mission_control.laboratory.experiments.audit import Transmitting, agreement
 from mission_control.laboratory.experiments.conditions import Condition
@@ -182,14 +183,7 @@ class _Trial:
 
     async def _until_passed_or_detected(self) -> None:
         passed = self._departs_s + self._condition.passage.lasts_s + AFTERWARDS_S
-        passing = asyncio.create_task(self._frame_number(round(passed * FRAMES_PER_S)), name="passing")
-        detecting = asyncio.create_task(self._detected.wait(), name="detecting")
-        try:
-            await asyncio.wait({passing, detecting}, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in (passing, detecting):
-                task.cancel()
-            await asyncio.wait({passing, detecting})
+        await first_of(self._frame_number(round(passed * FRAMES_PER_S)), self._detected.wait())
 
     async def _frame_number(self, number: int) -> None:
         """Return when the world has published this frame."""

@@ -18,6 +18,7 @@ from backbone.creator.messages import EndedBy
 from backbone.errors import BackboneError
 from backbone.naming import Subsystem
 from backbone.placer.messages import NotPlaced
+from backbone.waiting import end_tasks
 from mission_control.laboratory.simulation.audit import Audit
 
 HOST = "host"  # chosen: all components are on one host
@@ -134,10 +135,7 @@ class PlayedHosts:
 
     async def stop_all(self) -> None:
         """End all components at once as SIGKILL does; return when they have ended."""
-        watching = list(self._watching.values())
-        for task in watching:
-            task.cancel()
-        await asyncio.gather(*watching, return_exceptions=True)
+        await end_tasks(*self._watching.values())
 
     async def _watch(self, life: _Life) -> None:
         """Run the component; run it again after a pause whenever it falls, if its role says so."""

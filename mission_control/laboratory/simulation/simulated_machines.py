@@ -21,6 +21,7 @@ from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED, load
 from backbone.component.shared_process import SharedProcess
 from backbone.creator.service import Creator
 from backbone.errors import BackboneError, HubUnreachable, Refusal
+from backbone.waiting import set_within
 from mission_control.laboratory.simulation.audit import Audit
 from mission_control.laboratory.simulation.simulated_links import LinkedNetwork
 from mission_control.laboratory.simulation.simulated_processes import ProcessLoop, SimulatedProcess, current_process
@@ -143,11 +144,8 @@ class Machines:
         try:
             await clock.sleep_s(FORK_S)
             link = self.network.links[process]
-            try:
-                async with asyncio.timeout(HUB_WITHIN_S):
-                    await link.usable.wait()
-            except TimeoutError:
-                raise HubUnreachable(f"no hub listens for {launch.name}") from None
+            if not await set_within(link.usable, HUB_WITHIN_S):
+                raise HubUnreachable(f"no hub listens for {launch.name}")
             life = self.lives[process] = self._born(process, launch, clock)
             self._audit.note(process.name, "begins")
             await life.run()

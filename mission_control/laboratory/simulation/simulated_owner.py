@@ -19,6 +19,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Absence
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.scheduling.requests import PathNode
+from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.audit import current_audit
 from resource_pool.arc_client import (
@@ -130,9 +131,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         try:
             await self._have_moods(arc)
         finally:
-            for task in (keeping, driving):
-                task.cancel()
-            await asyncio.gather(keeping, driving, return_exceptions=True)
+            await end_tasks(keeping, driving)
         # From here on the grant is not used, even if notices about it still arrive.
         self._audit.note(self.name, "releases", arc=arc.arc)
         self._arc = None

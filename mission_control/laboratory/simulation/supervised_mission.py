@@ -21,6 +21,7 @@ from backbone.keys import Conversation
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions
 from backbone.launcher.launcher import Launcher
 from backbone.naming import Subsystem
+from backbone.waiting import end_tasks
 from backbone.wire import Envelope
 from mission_control.laboratory.simulation.audit import Audit, current_audit
 from mission_control.laboratory.simulation.hostile_numbers import hostile_message, say_hostile
@@ -129,10 +130,8 @@ class _SupervisedMission:
         watcher.judge_calm()
         self._audit.note("mission", "over")
         await asyncio.gather(*self._saying)
-        watching.cancel()
-        await asyncio.gather(watching, return_exceptions=True)
-        launcher.cancel()
-        await asyncio.gather(launcher, return_exceptions=True)
+        await end_tasks(watching)
+        await end_tasks(launcher)
         if watching.done() and not watching.cancelled() and (bug := watching.exception()) is not None:
             raise bug
 

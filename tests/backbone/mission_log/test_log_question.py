@@ -21,7 +21,7 @@ ODD = ["9" * 400, "99999d", "5m", "14:05", "alarm", "٣", "x" * 5000, "\0", "[a-
 typed = st.text(st.characters(codec="utf-8"), max_size=400) | st.sampled_from(ODD)
 
 
-@given(st.fixed_dictionaries({}, optional=dict.fromkeys(LogQuestion.__slots__, typed)))
+@given(st.fixed_dictionaries({}, optional=dict.fromkeys(LogQuestion.__struct_fields__, typed)))
 def test_whatever_is_typed_the_question_has_the_limits_of_the_bus_or_is_refused(fields: dict[str, str]) -> None:
     try:
         asked = LogQuestion(**fields).asked(NOW)

@@ -417,13 +417,13 @@ export interface ReleaseRequest {
 
 export interface SearchLog {
   do: "search_log";
-  number: number;
   text?: string;
   robot?: string;
   person?: string;
   level?: string;
   since?: string;
   until?: string;
+  number: number;
 }
 
 export interface SetRequest {
