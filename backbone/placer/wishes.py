@@ -10,6 +10,7 @@ Prior art: level-triggered controllers of Kubernetes; permanent children of Erla
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -91,7 +92,6 @@ async def ask_to_start(
         return await bus.ask(PLACER, order, Started, within_s=within_s)
     finally:
         slow.cancel()
-        await asyncio.gather(slow, return_exceptions=True)
 
 
 async def keep_placed(
