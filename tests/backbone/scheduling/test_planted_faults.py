@@ -15,6 +15,7 @@ TOP = Path(__file__).parents[3]
 LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "pictures", "test_planted_faults.py")
 FOUND = 1  # pytest's exit code when a test failed
 MOST_S = 120.0  # chosen: three times what the tests of the room need when none fails
+MOST_BUSY_S = 500.0  # chosen: what is right may take long on a busy machine
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
@@ -26,7 +27,7 @@ def test_a_planted_fault_has_its_place(fault: Planted) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_what_is_not_planted_is_not_caught(tmp_path: Path) -> None:
-    done = outcome_of(copied(tmp_path))
+    done = outcome_of(copied(tmp_path), MOST_BUSY_S)
     assert done.returncode == 0, done.stdout[-2000:]
 
 
@@ -38,7 +39,7 @@ def test_a_planted_fault_is_caught(fault: Planted, tmp_path: Path) -> None:
     copy = copied(tmp_path)
     planted = copy / ROOM / fault.file
     planted.write_text(planted.read_text().replace(fault.right, fault.wrong))
-    done = outcome_of(copy)
+    done = outcome_of(copy, MOST_S)
     assert done.returncode == FOUND, done.stdout[-2000:]
 
 
@@ -47,7 +48,7 @@ def copied(to: Path) -> Path:
     return shutil.copytree(TOP, to / "copy", ignore=LEFT_OUT)
 
 
-def outcome_of(folder: Path) -> subprocess.CompletedProcess[str]:
+def outcome_of(folder: Path, within_s: float) -> subprocess.CompletedProcess[str]:
     """Run the tests of the room in this copy, few examples of each law, until one fails."""
     return subprocess.run(
         [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "tests/backbone/scheduling"],
@@ -56,5 +57,5 @@ def outcome_of(folder: Path) -> subprocess.CompletedProcess[str]:
         text=True,
         check=False,
         env={**os.environ, "SCOUT_EXAMPLES": "quick"},
-        timeout=MOST_S,
+        timeout=within_s,
     )
