@@ -246,10 +246,17 @@ async def test_a_component_that_is_not_to_be_restarted_is_left_down(host: Creato
     await soon(host, "left down", is_left_down)
 
 
+def launcher_of_a_host(directory: Path) -> subprocess.Popen[str]:
+    """Start the host of these tests in a process of its own."""
+    script, tests = Path(__file__).with_name("creator_host.py"), Path(__file__).parents[1]
+    environment = {**os.environ, "PYTHONPATH": str(tests)}
+    command = [sys.executable, str(script), str(directory)]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+
 def test_killing_the_launcher_ends_all_and_removes_its_folder(mark: str, tmp_path: Path) -> None:
     directory = tmp_path / "run"
-    script = Path(__file__).with_name("creator_host.py")
-    with subprocess.Popen([sys.executable, str(script), str(directory)], stdout=subprocess.PIPE, text=True) as launcher:
+    with launcher_of_a_host(directory) as launcher:
         assert launcher.stdout is not None
         assert launcher.stdout.readline().startswith("all ready")
         assert len(marked(mark)) == 11
@@ -261,8 +268,7 @@ def test_killing_the_launcher_ends_all_and_removes_its_folder(mark: str, tmp_pat
 
 def test_a_launcher_told_to_end_ends_all(mark: str, tmp_path: Path) -> None:
     directory = tmp_path / "run"
-    script = Path(__file__).with_name("creator_host.py")
-    with subprocess.Popen([sys.executable, str(script), str(directory)], stdout=subprocess.PIPE, text=True) as launcher:
+    with launcher_of_a_host(directory) as launcher:
         assert launcher.stdout is not None
         assert launcher.stdout.readline().startswith("all ready")
         launcher.send_signal(signal.SIGINT)
