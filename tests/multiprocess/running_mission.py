@@ -68,6 +68,12 @@ class RunningMission:
         found: dict[str, Any] = json.loads(done.stdout)
         return found
 
+    def wait_for_watchers(self, within_s: float = 10.0) -> None:
+        """Return when the children of the tree run; they come a moment after all is ready."""
+        ends_s = time.monotonic() + within_s
+        while not {"watch-scout1", "watch-scout2"} <= {c["name"] for c in self.status()["components"]}:
+            assert time.monotonic() < ends_s, self.story()
+
     def component(self, name: str) -> dict[str, Any]:
         """Return one component of the status."""
         found = [c for c in self.status()["components"] if c["name"] == name]
