@@ -1,4 +1,4 @@
-"""Waiting for one thing or another, telling who waits, and ending tasks that are no longer wanted."""
+"""Waits for events and tasks, the end of tasks, and results of futures."""
 
 from __future__ import annotations
 
