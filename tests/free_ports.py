@@ -6,10 +6,7 @@ import itertools
 import os
 import socket
 
-FIRST, COUNT = (
-    10_000,
-    20_000,
-)  # chosen: below those that systems hand out by themselves, so that nobody gets one meanwhile
+FIRST, COUNT = 10_000, 20_000  # chosen: below the ports that a system assigns to connections by itself
 STRIDE = 61  # chosen: processes that were started together begin so far apart
 
 _numbers = itertools.count(os.getpid() * STRIDE)
