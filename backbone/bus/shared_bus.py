@@ -23,8 +23,6 @@ from backbone.wire import Accepts, Message
 
 AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
 
-AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
-
 
 class SharedSession:
     """One session to the hub and the members that use it. Open it inside a running event loop.
