@@ -102,7 +102,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         super().__init__(launch, bus, clock)
         self.status, self.payload = BehaviorStatus.RUNNING, dict[str, object]()
         self.rcs: Mapping[str, str] = {}
-        """Kind → name of the granted RCs; empty while suspended."""
+        """Role → name of the granted RCs; empty while suspended."""
+        self.robot = ""
+        """The granted RC that has a body; empty while suspended, and without one."""
         self.arc: ArcClient | None = None
         """The client of its ARC; None without an ARC."""
         self.times_resumed = self.times_suspended = self.frames_seen = 0
@@ -241,7 +243,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     # ------------------------------------------------------------------ the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
         """Call the hooks; see ``ArcListener``."""
-        self.rcs, self._suspended_because = notice.rcs, ""
+        self.rcs, self.robot, self._suspended_because = notice.rcs, notice.robot, ""
         self.times_resumed += 1
         held = ", ".join(f"{kind} {name}" for kind, name in notice.rcs.items())
         self.story.note(self.name, f"resumed with {held}")
@@ -258,7 +260,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     async def arc_suspended(self, notice: Suspended) -> None:
         """Call the hooks; see ``ArcListener``."""
-        self.rcs, self._suspended_because = {}, suspended_because(notice.reason, notice.by)
+        self.rcs, self.robot = {}, ""
+        self._suspended_because = suspended_because(notice.reason, notice.by)
         self.times_suspended += 1
         self.story.note(self.name, f"suspended: {self._suspended_because}")
         self.report(f"suspended: {self._suspended_because}")

@@ -47,6 +47,7 @@ from backbone.scheduling.claims import STREAMED_KINDS
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_request import ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
+from resource_pool.commands import Command
 from resource_pool.gate import Gate
 from resource_pool.messages import (
     Accepted,
@@ -55,10 +56,6 @@ from resource_pool.messages import (
     ArcState,
     AskArc,
     AskBeat,
-    CommandScout,
-    Drive,
-    Halt,
-    Jump,
     NeedsRestart,
     NoSuchAction,
     Noted,
@@ -87,14 +84,25 @@ ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; af
 
 
 class AggregateResourceController(Component[ArcParameters]):
-    """Base class of every ARC; derive, set ``roles``, override ``prepare``."""
+    """Base class of every ARC; derive, set ``roles``, ``commands`` and ``body``, override ``prepare``."""
 
     parameters_type = ArcParameters
     accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
     """Kinds of RC in its set, one of each."""
+    commands: ClassVar[Mapping[type[Command], str]] = {}
+    """Commands of its owner, each with the role of the RC that obeys it."""
+    body: ClassVar[str] = ""
+    """Role of the RC that has a body, which operators can stop; empty: none."""
     sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
     """Kinds of RC that it uses by streams instead of exclusively."""
+
+    def __init_subclass__(cls, **kwargs: object) -> None:
+        super().__init_subclass__(**kwargs)
+        accepts = cls.accepts
+        for command in cls.commands:
+            accepts = accepts | command if accepts is not None else command
+        cls.accepts = accepts
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -138,10 +146,10 @@ class AggregateResourceController(Component[ArcParameters]):
         """RC → epoch of the open connections; empty while the gate is shut."""
         return self._gate.epochs if self._gate.is_open else {}
 
-    async def tell_rc(self, role: str, command: Message) -> Applied:
-        """Send a command to the RC of this role and return what the RC applied."""
+    async def tell_rc(self, role: str, epoch: int, command: Command) -> Applied:
+        """Send a command to the RC of this role, under this epoch, and return what the RC applied."""
         at = address(Subsystem.RESOURCE_POOL, self.rc(role))
-        return await self.bus.ask(at, command, Applied, within_s=RC_REPLY_S)
+        return await self.bus.ask(at, command.under(self.name, epoch), Applied, within_s=RC_REPLY_S)
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
@@ -196,7 +204,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 return self._arc_state()
             case _ if asked.source != self._owner:
                 raise NotYours(f"{self.name} belongs to {self._owner}, not to {asked.source}", owner=self._owner)
-            case Drive() | Halt() | Jump() as command:
+            case Command() as command:
                 return await self._command(command)
             case WantIdle(idle=idle):
                 await self._placed.change(SetIdle(self.name, idle), idle=idle)
@@ -292,7 +300,7 @@ class AggregateResourceController(Component[ArcParameters]):
             return
         self._slice.end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
         self.report(f"granted: {', '.join(self._placed.rcs.values())}")
-        noted = self._notices.notify(Resumed(self.name, self._placed.rcs, order.epochs, order.until_s))
+        noted = self._notices.notify(Resumed(self.name, self._placed.rcs, order.epochs, order.until_s, self._robot()))
         if self.parameters.may_say_not_now:
             self._offering = self.start_task(self._slice.offer(noted), "offer more")
 
@@ -324,15 +332,15 @@ class AggregateResourceController(Component[ArcParameters]):
 
     # ------------------------------------------------------------------ commands
 
-    async def _command(self, command: Drive | Halt | Jump) -> Applied:
+    async def _command(self, command: Command) -> Applied:
+        role = self.commands[type(command)]
         try:
-            scout = self.rc("scout")
-            epoch = self._gate.epoch_of(scout)
+            epoch = self._gate.epoch_of(self.rc(role))
         except SwappedOut:
             self._refused += 1
             raise
         self._commands += 1
-        return await self.tell_rc("scout", CommandScout(self.name, epoch, command))
+        return await self.tell_rc(role, epoch, command)
 
     def _arc_state(self) -> ArcState:
         gate = self._gate
@@ -346,7 +354,11 @@ class AggregateResourceController(Component[ArcParameters]):
             reason=gate.reason,
             by=gate.by,
             expected_start_s=gate.expected_s,
+            robot=self._robot(),
         )
+
+    def _robot(self) -> str:
+        return self._placed.rcs.get(self.body, "")
 
     # ------------------------------------------------------------------ watching
 

@@ -11,6 +11,8 @@ import logging
 from collections.abc import Callable
 from typing import Protocol
 
+import msgspec
+
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.errors import LinkError, Refusal, ReplyTimeout
@@ -19,9 +21,10 @@ from backbone.naming import Subsystem, address
 from backbone.placer.messages import Ended, StopComponent
 from backbone.placer.wishes import Wish
 from backbone.scheduling.requests import PathNode, Usage
-from backbone.wire import Envelope, Message
+from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
 from resource_pool.arc_request import claim_parameters
+from resource_pool.commands import Command, Drive, Halt, Jump
 from resource_pool.drivers.world_messages import AskPose, Pose
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
@@ -31,10 +34,7 @@ from resource_pool.messages import (
     ArcState,
     AskArc,
     AskBeat,
-    Drive,
     Frame,
-    Halt,
-    Jump,
     NoSuchAction,
     Noted,
     Release,
@@ -60,6 +60,7 @@ __all__ = [
     "ArcState",
     "AskBeat",
     "AskPose",
+    "Command",
     "EmergencyStopped",
     "Frame",
     "GivenBeforeStop",
@@ -207,22 +208,36 @@ class ArcClient:
             await self._granted.wait()
         return self.granted
 
-    async def drive(self, left_rad_s: float, right_rad_s: float) -> Applied:
-        """Turn the wheels; return the speeds that were applied after clipping.
+    async def command(self, command: Command) -> Applied:
+        """Send a command to the RC of its role; return what the RC applied.
 
         Raises:
-            SwappedOut: The ARC has no grant; no packet was sent.
-            EmergencyStopped: An operator has stopped the robot, or stopped it between the last command and this one.
+            SwappedOut: The ARC has no grant; the RC did not get the command.
+            NoSuchAction: This kind of ARC has no such command.
+            EmergencyStopped: The command moves the robot, and an operator has stopped it, or stopped it between the
+                last command and this one.
         """
-        return await self._move(Drive(left_rad_s, right_rad_s, self._last_stop()))
+        if command.moves:
+            command = msgspec.structs.replace(command, after_stop=self._last_stop())
+        try:
+            return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)
+        except EmergencyStopped as stopped:
+            self._stops.refused(stopped)
+            raise
+        except UnknownMessage as unknown:
+            raise NoSuchAction(f"{self.arc} has no command {command.word()}", command=command.word()) from unknown
+
+    async def drive(self, left_rad_s: float, right_rad_s: float) -> Applied:
+        """Turn the wheels; return the speeds that were applied after clipping; see ``command``."""
+        return await self.command(Drive(left_rad_s, right_rad_s))
 
     async def halt(self) -> Applied:
-        """Stop the wheels; see ``drive``."""
-        return await self._command(Halt())
+        """Stop all motion; see ``command``."""
+        return await self.command(Halt())
 
     async def jump(self) -> Applied:
-        """Jump; see ``drive``."""
-        return await self._move(Jump(self._last_stop()))
+        """Jump; see ``command``."""
+        return await self.command(Jump())
 
     def heard_stop(self, state: StopState) -> bool:
         """Record that a robot was stopped or freed; return whether this is news.
@@ -307,7 +322,7 @@ class ArcClient:
     async def agree(self, state: ArcState) -> None:
         """Apply the ARC's state as if its notice had arrived."""
         if state.granted and (self.granted is None or self.granted.epochs != state.epochs):
-            await self.handle(Resumed(self.arc, state.rcs, state.epochs, -1.0))
+            await self.handle(Resumed(self.arc, state.rcs, state.epochs, -1.0, state.robot))
         elif self.granted is not None and not state.granted:
             await self.handle(Suspended(self.arc, state.reason, state.by, state.expected_start_s))
 
@@ -322,17 +337,7 @@ class ArcClient:
         return self.granted.epochs if self.granted is not None else {}
 
     def _last_stop(self) -> int:
-        return self._stops.number(self.granted.rcs.get("scout", "")) if self.granted is not None else 0
-
-    async def _move(self, command: Drive | Jump) -> Applied:
-        try:
-            return await self._command(command)
-        except EmergencyStopped as stopped:
-            self._stops.refused(stopped)
-            raise
-
-    async def _command(self, command: Message) -> Applied:
-        return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)
+        return self._stops.number(self.granted.robot) if self.granted is not None else 0
 
     async def _request(self, wish: Message) -> None:
         await self._bus.ask(self.address, wish, Accepted, within_s=REPLY_TIME_S)

@@ -1,10 +1,9 @@
 """Messages of the resource pool and of its client interface, the ARCs.
 
-* decision process → ARC: ``ArcQuestion``; ARC → decision process: ``ArcNotice``.
-* ARC → scout RC: ``ScoutCommand``; scout RC → command radio RC: ``RadioCommand``; ARC → framegrabber RC: ``Tune``.
+* decision process → ARC: ``ArcQuestion``, and the commands of its kind (``commands``); ARC → decision process:
+  ``ArcNotice``.
+* robot RC → command radio RC: ``LoadPacket``.
 * framegrabber RC → subscribers of its ARC: ``Frame``, published under the ARC's address.
-
-Commands to RCs are questions: the answer contains the applied values, or is the refusal ``StaleEpoch``.
 """
 
 from __future__ import annotations
@@ -25,41 +24,12 @@ from backbone.ranges import (
     Pixels,
     RunTime,
     Text,
-    WheelSpeed,
 )
 from backbone.scheduling.requests import Usage
 from backbone.wire import Message
 
 
 # ---------------------------------------------------------------------- decision process → ARC
-class Drive(Message, frozen=True):
-    """Turn the wheels at these speeds from now on, until another command or ``COMMAND_TIMEOUT_S``.
-
-    Attributes:
-        left_rad_s: Left wheel, forward is positive.
-        right_rad_s: Right wheel.
-        after_stop: Number of the robot's last stop whose lift the sender knows; 0: no stop.
-    """
-
-    left_rad_s: WheelSpeed
-    right_rad_s: WheelSpeed
-    after_stop: Count = 0
-
-
-class Halt(Message, frozen=True):
-    """Stop the wheels."""
-
-
-class Jump(Message, frozen=True):
-    """Wind the spring foot and kick.
-
-    Attributes:
-        after_stop: As for ``Drive``.
-    """
-
-    after_stop: Count = 0
-
-
 class WantIdle(Message, frozen=True):
     """Want no time (True), or want time again (False)."""
 
@@ -89,19 +59,20 @@ class AskArc(Message, frozen=True):
     """Ask for the state of an ARC."""
 
 
-class ArcState(Message, frozen=True):
+class ArcState(Message, frozen=True, tag="ArcState/2"):
     """Answer to ``AskArc``.
 
     Attributes:
         arc: Name of the ARC.
         kind: Its type.
         owner: Address of its decision process.
-        rcs: Kind → name of the chosen RCs; empty until they are chosen.
+        rcs: Role → name of the chosen RCs; empty until they are chosen.
         granted: True while commands pass.
         epochs: RC name → epoch while granted.
         reason: Why it is swapped out, empty while granted.
         by: The ARC or operator that caused it.
         expected_start_s: Next expected slot, mission time; negative: unknown.
+        robot: The RC in ``rcs`` that has a body; empty: none.
     """
 
     arc: Mention
@@ -113,6 +84,7 @@ class ArcState(Message, frozen=True):
     reason: Text
     by: Mention
     expected_start_s: Instant
+    robot: Mention = ""
 
 
 class Accepted(Message, frozen=True):
@@ -126,7 +98,7 @@ class Applied(Message, frozen=True):
         rc: The RC.
         epoch: Epoch of the grant.
         at_s: Mission time.
-        command: ``drive``, ``halt``, ``jump``, ``transmitter``.
+        command: The command's ``word``.
         values: Applied values, clipped to the hardware's limits, with units in their names.
     """
 
@@ -137,24 +109,26 @@ class Applied(Message, frozen=True):
     values: Annotated[dict[Mention, Measure], FEW] = {}
 
 
-ArcQuestion = Drive | Halt | Jump | WantIdle | WantRuntime | WantLonger | Release | AskArc
+ArcQuestion = WantIdle | WantRuntime | WantLonger | Release | AskArc
 
 
 # ---------------------------------------------------------------------- ARC → decision process
-class Resumed(Message, frozen=True):
+class Resumed(Message, frozen=True, tag="Resumed/2"):
     """The RCs are granted: commands pass from now on.
 
     Attributes:
         arc: The ARC.
-        rcs: Kind → name of the RCs.
+        rcs: Role → name of the RCs.
         epochs: RC name → epoch.
         until_s: Mission time until which the slice lasts at least.
+        robot: The RC in ``rcs`` that has a body; empty: none.
     """
 
     arc: Mention
     rcs: Annotated[dict[Mention, Mention], FEW]
     epochs: Annotated[dict[Mention, Epoch], FEW]
     until_s: Instant
+    robot: Mention = ""
 
 
 class SliceEnds(Message, frozen=True):
@@ -213,32 +187,6 @@ ArcNotice = Resumed | SliceEnds | Suspending | Suspended | AskBeat
 
 
 # ---------------------------------------------------------------------- ARC → RCs
-class CommandScout(Message, frozen=True):
-    """A command to a robot under a grant.
-
-    Attributes:
-        arc: The ARC that commands.
-        epoch: Epoch of the scout RC's connection.
-        command: The command.
-    """
-
-    arc: Mention
-    epoch: Epoch
-    command: Drive | Halt | Jump | SwitchTransmitter
-
-
-class SwitchTransmitter(Message, frozen=True):
-    """Switch the robot's video transmitter on at a frequency, or off.
-
-    Attributes:
-        on: On or off.
-        frequency: Name of the video frequency's RC; empty when off.
-    """
-
-    on: bool
-    frequency: Mention = ""
-
-
 class LoadPacket(Message, frozen=True):
     """Send this packet. Robot RCs ask this under the radio's grant to their ARC.
 
@@ -275,22 +223,6 @@ class LoadPacket(Message, frozen=True):
 
 class PacketLoaded(Message, frozen=True):
     """Answer to ``LoadPacket``: the packet is loaded, and sent if ``at_once``."""
-
-
-class Tune(Message, frozen=True):
-    """Receive this video frequency and deliver its pictures to the ARC that holds the framegrabber.
-
-    Attributes:
-        arc: The ARC.
-        epoch: Of the framegrabber's connection.
-        frequency: Name of the video frequency's RC.
-        robot: The robot of the ARC; pictures of other robots are not delivered. Empty: any.
-    """
-
-    arc: Mention
-    epoch: Epoch
-    frequency: Mention
-    robot: Mention = ""
 
 
 class NothingHeard(Message, frozen=True):
@@ -351,10 +283,10 @@ class NotMySet(Refusal):
 
 
 class NoSuchAction(Refusal):
-    """This kind of ARC has no RC for the action."""
+    """This kind of ARC has no RC for the command."""
 
     code = "arc.no_such_action"
-    remedy = "Claim a kind of ARC that has the RC for it (see docs/reference/arcs.md)."
+    remedy = "Claim a kind of ARC that declares this command, and whose set has the RC for it."
 
 
 class NotYours(Refusal):

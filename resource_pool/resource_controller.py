@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
@@ -38,7 +39,8 @@ from backbone.rc_manager.messages import (
     most_epoch,
 )
 from backbone.scheduling.requests import Holder, Lease
-from backbone.wire import Accepts, Envelope, Message
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
+from resource_pool.commands import Command
 from resource_pool.drivers.interface import (
     AdjustableDriver,
     DriverSite,
@@ -48,7 +50,7 @@ from resource_pool.drivers.interface import (
     options_of_drivers,
 )
 from resource_pool.holds import Hold, HoldTable
-from resource_pool.messages import ImpossibleUse, NeedsRestart, NotFromYou
+from resource_pool.messages import Applied, ImpossibleUse, NeedsRestart, NotFromYou
 
 log = logging.getLogger(__name__)
 
@@ -80,12 +82,12 @@ R = TypeVar("R", bound=RcParameters)
 
 
 class ResourceController(Component[R], Generic[R]):
-    """Base class of every RC; derive, set ``parameters_type`` and ``commands``, override the hooks."""
+    """Base class of every RC; derive, set ``parameters_type`` and ``commands``, override ``obey`` and ``make_safe``."""
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RcParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset({"driver", "sharable", "capacity", "links", "options"})
     commands: ClassVar[Accepts | None] = None
-    """Commands of this kind of RC, besides the RC manager's questions; each has the fields ``arc`` and ``epoch``."""
+    """Commands of this kind of RC: classes derived from ``Command``, or other messages for ``command``."""
     driver_kind: ClassVar[str] = ""
     """Kind of its driver; empty: it has no driver."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
@@ -131,9 +133,26 @@ class ResourceController(Component[R], Generic[R]):
         connection.
         """
 
+    def permit(self, order: Command) -> None:
+        """Return if the resource may obey this command now. When: after its admission. What: raise a refusal if not."""
+
+    async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
+        """Carry out a command.
+
+        When: for each command of a present hold. What: return the applied values, clipped to the hardware's limits,
+        with units in their names. Raise ``HardwareFault`` if the hardware does not obey.
+        """
+        raise UnknownMessage(f"{self.name} declares {order.word()} and does not obey it", arc=hold.arc)
+
     async def command(self, asked: Envelope[Message]) -> Message:
-        """Carry out one of ``commands``. Call ``admit`` first, which refuses commands outside a present hold."""
-        return await super().answer(asked)
+        """Admit one of ``commands`` and carry it out. Override for messages with another answer than ``Applied``."""
+        order = asked.body
+        if not isinstance(order, Command):
+            return await super().answer(asked)
+        hold = self.admit(order.arc, order.epoch)
+        self.permit(order)
+        values = await self.obey(hold, order)
+        return Applied(self.name, hold.epoch, self.clock.now_s(), order.word(), dict(values))
 
     def ranked(self, arc: str, epoch: int) -> None:
         """Apply the rank of this hold, if it is present. When: with each renewal."""

@@ -29,16 +29,14 @@ from backbone.placer.messages import (
     StopComponent,
 )
 from backbone.wire import Envelope, Message
+from resource_pool.commands import Command, Drive, Halt, Jump
 from resource_pool.messages import (
     Accepted,
     Applied,
     ArcQuestion,
     ArcState,
     AskArc,
-    Drive,
     Frame,
-    Halt,
-    Jump,
     Noted,
     Release,
     Resumed,
@@ -65,7 +63,7 @@ class FakeArc:
         self.is_idle = self.stays = False  # stays: holds on to its RCs although it is told to rest
         self.wishes: list[Message] = []
         self.rcs = {"scout": parameters["wish"].get("scout", "scout3"), "framegrabber": "grabber1"}
-        bus.serve(self.address, ArcQuestion | Stop, self._answer)
+        bus.serve(self.address, ArcQuestion | Drive | Halt | Jump | Stop, self._answer)
         bus.declare_alive(self.address)
 
     @property
@@ -74,7 +72,7 @@ class FakeArc:
 
     async def grant(self) -> None:
         self.epoch, self.granted = self.epoch + 1, True
-        await self._tell(Resumed(self.name, self.rcs, self.epochs, self.clock.now_s() + 5.0))
+        await self._tell(Resumed(self.name, self.rcs, self.epochs, self.clock.now_s() + 5.0, self.rcs["scout"]))
 
     async def suspend(self, reason: str = "slice", by: str = "other", deadline_s: float = 0.1) -> None:
         if deadline_s > 0:
@@ -114,14 +112,15 @@ class FakeArc:
             case AskArc():
                 epochs = self.epochs if self.granted else {}
                 owner = self.parameters["owner"]
-                return ArcState(self.name, "fake", owner, self.rcs, self.granted, epochs, "slice", "other", -1.0)
-            case Drive() | Halt() | Jump():
-                return self._command(asked.body)
+                robot = self.rcs["scout"]
+                return ArcState(self.name, "fake", owner, self.rcs, self.granted, epochs, "slice", "other", -1.0, robot)
+            case Command() as command:
+                return self._command(command)
             case wish:
                 self.wishes.append(wish)
                 return Accepted()
 
-    def _command(self, command: Message) -> Applied:
+    def _command(self, command: Command) -> Applied:
         if not self.granted:
             raise SwappedOut(f"{self.name} holds nothing", reason="slice", by="other", expected_start_s=-1.0)
         if self.refusal is not None:
@@ -132,7 +131,7 @@ class FakeArc:
         values = (
             {"left_rad_s": command.left_rad_s, "right_rad_s": command.right_rad_s} if isinstance(command, Drive) else {}
         )
-        return Applied(self.rcs["scout"], self.epoch, self.clock.now_s(), type(command).__name__.lower(), values)
+        return Applied(self.rcs["scout"], self.epoch, self.clock.now_s(), command.word(), values)
 
 
 class FakePlacer:

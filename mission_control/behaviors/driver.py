@@ -85,7 +85,7 @@ class Driver(Behavior[D]):
         """Drive; fail after a refusal that would repeat, try again after other refusals."""
         while True:
             try:
-                return await self.drive_on(self.rcs.get("scout", ""))
+                return await self.drive_on(self.robot)
             except (SwappedOut, EmergencyStopped):
                 raise
             except LinkError as error:

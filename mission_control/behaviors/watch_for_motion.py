@@ -79,9 +79,9 @@ class WatchForMotion(Behavior[WatchParameters]):
         self._maximum_s = need.maximum_runtime_s if need is not None else 0.0
         return need
 
-    async def resumed(self, rcs: Mapping[str, str]) -> None:
+    async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002
         """Adapt to changes since the last grant, and draw the next run time."""
-        self._robot = rcs.get("scout", "") or self._robot
+        self._robot = self.robot or self._robot
         self._detector.swapped_in()
         self._certain_frames, self._told_in_slice = 0, False
         self._longest_until_s = self.clock.now_s() + self._maximum_s

@@ -13,19 +13,21 @@ from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import AskRequest, CloseGate, OpenGate, TakePath
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arcs.video_drive import VideoDriveArc
-from resource_pool.messages import Accepted, ArcQuestion, NotFromYou, NothingHeard, Tune
+from resource_pool.commands import Tune
+from resource_pool.messages import Accepted, ArcQuestion, NotFromYou, NothingHeard
 
 
 class CaptureArc(VideoDriveArc):
     """A robot, its radio and video frequency, and a framegrabber tuned to it; frames go out under its address."""
 
-    roles: ClassVar[Sequence[str]] = ("scout", "command_radio", "video_frequency", "framegrabber")
+    roles: ClassVar[Sequence[str]] = (*VideoDriveArc.roles, "framegrabber")
     accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the transmitter on and tune, at the same time."""
-        tune = Tune(self.name, epochs[self.rc("framegrabber")], self.rc("video_frequency"), self.rc("scout"))
-        await asyncio.gather(super().prepare(epochs), self.tell_rc("framegrabber", tune))
+        tune = Tune(self.rc("video_frequency"), self.rc(self.body))
+        tuning = self.tell_rc("framegrabber", epochs[self.rc("framegrabber")], tune)
+        await asyncio.gather(super().prepare(epochs), tuning)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the framegrabber, too: switch on a transmitter that it does not receive."""

@@ -5,13 +5,16 @@ Source: RAM 2002, "Examples of ARCs and RCs".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from resource_pool.aggregate_resource_controller import AggregateResourceController
+from resource_pool.commands import Command, Drive, Halt, Jump
 
 
 class DriveArc(AggregateResourceController):
     """A robot and a share of its command radio."""
 
     roles: ClassVar[Sequence[str]] = ("scout", "command_radio")
+    commands: ClassVar[Mapping[type[Command], str]] = {Drive: "scout", Halt: "scout", Jump: "scout"}
+    body: ClassVar[str] = "scout"

@@ -16,4 +16,4 @@ class LitDriveArc(DriveArc):
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the lamp on; the lamp's RC switches it off when the set is given back."""
-        await self.tell_rc("lamp", Shine(self.name, epochs[self.rc("lamp")], 1.0))
+        await self.tell_rc("lamp", epochs[self.rc("lamp")], Shine(1.0))

@@ -8,16 +8,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-from resource_pool.aggregate_resource_controller import AggregateResourceController
-from resource_pool.messages import CommandScout, SwitchTransmitter
+from resource_pool.arcs.drive import DriveArc
+from resource_pool.commands import SwitchTransmitter
 
 
-class VideoDriveArc(AggregateResourceController):
+class VideoDriveArc(DriveArc):
     """A robot, a share of its command radio, and a video frequency on which it transmits during a grant."""
 
-    roles: ClassVar[Sequence[str]] = ("scout", "command_radio", "video_frequency")
+    roles: ClassVar[Sequence[str]] = (*DriveArc.roles, "video_frequency")
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the robot's transmitter on; when the set is given back the radio switches it off."""
         switch = SwitchTransmitter(True, self.rc("video_frequency"))
-        await self.tell_rc("scout", CommandScout(self.name, epochs[self.rc("scout")], switch))
+        await self.tell_rc(self.body, epochs[self.rc(self.body)], switch)

@@ -146,23 +146,27 @@ class FramegrabberDriver(Protocol):
 class RobotProtocol(Protocol):
     """Encodes commands to one kind of robot as packets. Raise ``HardwareFault`` for commands that the robot lacks."""
 
-    def clip_wheel_speed(self, speed_rad_s: float) -> float:
-        """Return the speed within the robot's limits, rad/s."""
-
-    def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
-        """Return the packet for these wheel speeds."""
-
     def halt(self) -> bytes:
-        """Return the packet that stops the wheels."""
-
-    def jump(self) -> bytes:
-        """Return the packet for a jump."""
+        """Return the packet that stops all motion."""
 
     def transmitter(self, on: bool, frequency: str) -> bytes:
         """Return the packet that switches the video transmitter on at this frequency, or off."""
 
     def safe(self) -> bytes:
         """Return the packet after which the robot neither moves nor transmits."""
+
+
+class ScoutProtocol(RobotProtocol, Protocol):
+    """The commands of a Scout."""
+
+    def clip_wheel_speed(self, speed_rad_s: float) -> float:
+        """Return the speed within the robot's limits, rad/s."""
+
+    def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
+        """Return the packet for these wheel speeds."""
+
+    def jump(self) -> bytes:
+        """Return the packet for a jump."""
 
 
 BUILT_IN: Mapping[str, Mapping[str, str]] = {

@@ -12,7 +12,7 @@ import itertools
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal
 
 import msgspec
@@ -22,10 +22,10 @@ from backbone.component.launch import Launch
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.wire import Envelope, Message
+from resource_pool.commands import Command, Tune
 from resource_pool.drivers.interface import FramegrabberDriver, Picture
 from resource_pool.holds import Hold
-from resource_pool.messages import Accepted, Applied, Frame, NothingHeard, Tune
+from resource_pool.messages import Accepted, Frame, NothingHeard
 from resource_pool.resource_controller import RcParameters, ResourceController
 
 log = logging.getLogger(__name__)
@@ -82,12 +82,10 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         """Stop the delivery of pictures."""
         self._driver.stop()
 
-    async def command(self, asked: Envelope[Message]) -> Message:
+    async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Tune and begin to deliver."""
-        order = asked.body
         if not isinstance(order, Tune):
-            return await super().command(asked)
-        hold = self.admit(order.arc, order.epoch)
+            return await super().obey(hold, order)
         known = self.parameters.links.get("video_frequency", [])
         if order.frequency not in known:
             raise WrongFrequency(f"{self.name} receives {', '.join(known) or 'nothing'}, not {order.frequency}")
@@ -98,7 +96,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
 
         self._silent_since_s = math.inf
         self._driver.tune(order.frequency, deliver)
-        return Applied(self.name, hold.epoch, self.clock.now_s(), "tune")
+        return {}
 
     def statistics(self) -> dict[str, float]:
         """Count delivered pictures, and pictures dropped because no, several or another robot transmitted.

@@ -1,72 +1,18 @@
-"""RC of a Scout: wheel speeds, jump, video transmitter; reached through a command radio.
-
-Any operator may stop it at any time, without a grant and past ARC and RC manager, so that a stop needs only robot,
-radio and hub. The stop outlives this process.
+"""RC of a Scout: wheel speeds, jump, video transmitter.
 
 Source: IROS 2001, section 2; RAM 2002, "Robots for Surveillance and Reconnaissance".
 """
 
 from __future__ import annotations
 
-import asyncio
-import logging
 import math
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
 
-import msgspec
-
-from backbone.atomic_file import replace_file
-from backbone.bus.interface import Bus, Clock
-from backbone.component.launch import Launch
-from backbone.component.messages import StandingStop
-from backbone.errors import LinkError, Refusal
-from backbone.keys import Conversation
-from backbone.naming import Subsystem, address
-from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import RobotProtocol
+from backbone.errors import Refusal
+from resource_pool.commands import Command, Drive, Halt, Jump, SwitchTransmitter
+from resource_pool.drivers.interface import ScoutProtocol
 from resource_pool.holds import Hold
-from resource_pool.messages import (
-    COMMAND_TIMEOUT_S,
-    Applied,
-    CommandScout,
-    Drive,
-    Halt,
-    Jump,
-    LoadPacket,
-    NotFromYou,
-    PacketLoaded,
-    SwitchTransmitter,
-)
-from resource_pool.resource_controller import RcParameters, ResourceController
-from resource_pool.stop_latch import StopLatch
-from resource_pool.stop_messages import AskStop, EmergencyQuestion, EmergencyStop, GivenBeforeStop, LiftStop, StopState
-
-log = logging.getLogger(__name__)
-
-OPERATORS = (f"{Subsystem.UI_CONSOLE}/", f"{Subsystem.BACKBONE}/")
-"""Subsystems whose components may stop a robot past its holder: they act for people."""
-
-RADIO_REPLY_S = 0.5  # chosen: a radio that needs longer for one packet counts as absent
-
-
-class ScoutParameters(RcParameters, frozen=True, kw_only=True):
-    """Parameters of a Scout.
-
-    Attributes:
-        network_id: Its address on the command radio, 1 to 254.
-        protocol: Name of the driver that encodes its packets; empty: the name in ``driver``.
-    """
-
-    network_id: int
-    protocol: str = ""
-
-
-class NoRadio(Refusal):
-    """The ARC holds the robot without its command radio."""
-
-    code = "scout.no_radio"
-    remedy = "Claim a kind of ARC whose set includes the robot's command radio."
+from resource_pool.rcs.robot import Robot, RobotParameters
 
 
 class NotFinite(Refusal):
@@ -76,241 +22,23 @@ class NotFinite(Refusal):
     remedy = "Send finite wheel speeds; those beyond the motor's limit are clipped."
 
 
-class Scout(ResourceController[ScoutParameters]):
-    """Encodes commands as packets of the Scout's protocol; the radio sends them at the ARC's rate."""
+class Scout(Robot[RobotParameters]):
+    """Two wheels and a spring foot."""
 
-    parameters_type = ScoutParameters
-    commands = CommandScout | EmergencyQuestion
-    driver_kind = "robot"
+    commands = Drive | Halt | Jump | SwitchTransmitter
+    _protocol: ScoutProtocol
 
-    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
-        super().__init__(launch, bus, clock)
-        self._protocol: RobotProtocol = self.make_driver(self.parameters.protocol)
-        self._radio = (self.parameters.links.get("command_radio") or [""])[0]
-        self._halt_at_s: float | None = None
-        self._driven = asyncio.Event()
-        self._holder: Hold | None = None
-        self._frequency = ""
-        self._timeouts = 0
-        self._stop_file = Path(launch.run_directory) / "stops" / self.name if launch.run_directory else None
-        self._latch = StopLatch(self.name, _read_stop(self._stop_file))
-
-    async def serve(self) -> None:
-        """Stop the wheels when no command comes, and end the hold when its lease expires."""
-        if self._latch.state.is_stopped:
-            self._tell_stop(self._latch.state, "is still stopped")
-        self.start_task(self._halt_when_silent(), "dead man")
-        await super().serve()
-
-    async def connected(self, hold: Hold) -> None:
-        """Record the grant under which the robot obeys."""
-        self._holder, self._halt_at_s, self._frequency = hold, None, ""
-
-    async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
-        """Send no further command; the radio sends the safe packet at its own disconnection."""
-        self._holder, self._halt_at_s, self._frequency = None, None, ""
-
-    async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer operators, too, who need no grant to stop the robot."""
-        match asked.body:
-            case AskStop():
-                return self._latch.state
-            case EmergencyStop() | LiftStop() if not asked.source.startswith(OPERATORS):
-                self.refused_strangers += 1
-                self.story.note(self.name, f"{asked.source} was refused: {type(asked.body).__name__}")
-                raise NotFromYou(f"{self.name} is stopped and freed by operators, not by {asked.source}")
-            case EmergencyStop(reason=reason, user=user):
-                return await self._stop_now(user or asked.source, reason, asked.source)
-            case LiftStop(number=number, user=user):
-                if self._latch.lift(number, user or asked.source, self.clock.now_s()):
-                    self._keep_stop()
-                    self._tell_stop(self._latch.state, "may move again")
-                return self._latch.state
-            case _:
-                return await super().answer(asked)
-
-    async def command(self, asked: Envelope[Message]) -> Message:
+    async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Drive, halt, jump, or switch the transmitter."""
-        order = asked.body
-        if not isinstance(order, CommandScout):
-            return await super().command(asked)
-        if isinstance(order.command, Drive) and not _is_finite(order.command):
-            raise NotFinite(
-                f"{self.name}: wheel speeds {order.command.left_rad_s} and {order.command.right_rad_s} rad/s"
-            )
-        hold = self.admit(order.arc, order.epoch)
-        if isinstance(order.command, Drive | Jump):
-            self._latch.require_moving(order.command.after_stop)
-        match order.command:
+        match order:
+            case Drive(left_rad_s=left, right_rad_s=right) if not (math.isfinite(left) and math.isfinite(right)):
+                raise NotFinite(f"{self.name}: wheel speeds {left} and {right} rad/s")
             case Drive(left_rad_s=left, right_rad_s=right):
                 left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
-                # Before the packet is sent, because meanwhile the hold may end or the radio's answer may be lost.
-                self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if left or right else None
-                self._driven.set()
-                packet, still = self._protocol.drive(left, right), self._protocol.halt()
-                await self._move(hold, order.command, packet, lasts_s=COMMAND_TIMEOUT_S, afterwards=still)
-                return self._applied(hold, "drive", {"left_rad_s": left, "right_rad_s": right})
-            case Halt():
-                await self._load(hold, self._protocol.halt())
-                self._stopped(hold)
-                return self._applied(hold, "halt", {})
+                await self.move(hold, order, self._protocol.drive(left, right), is_moving=bool(left or right))
+                return {"left_rad_s": left, "right_rad_s": right}
             case Jump():
-                # A repeated drive or halt would trip the robot or cancel the jump.
-                as_it_is = self._protocol.transmitter(bool(self._frequency), self._frequency)
-                packet = self._protocol.jump()
-                await self._move(hold, order.command, packet, at_once=True, afterwards=as_it_is, kind="jump")
-                self._stopped(hold)
-                return self._applied(hold, "jump", {})
-            case SwitchTransmitter(on=on, frequency=frequency):
-                packet = self._protocol.transmitter(on, frequency)
-                self._frequency = frequency if on else ""
-                still = self._protocol.halt()  # repeated, to keep the robot running
-                await self._load(hold, packet, at_once=True, afterwards=still, kind="transmitter")
-                return self._applied(hold, "transmitter", {"on": float(on)})
-
-    def statistics(self) -> dict[str, float]:
-        """Count halts for lack of commands, and emergency stops, too."""
-        stops = float(self._latch.state.number)
-        return {**super().statistics(), "command_timeouts": self._timeouts, "emergency_stops": stops}
-
-    async def _stop_now(self, by: str, reason: str, console: str) -> StopState:
-        """Refuse all further motion, and stop the wheels if a holder may be turning them."""
-        is_new = self._latch.stop(by, reason, self.clock.now_s(), console)
-        self._keep_stop()
-        self._halt_at_s = None
-        holder = self._holder
-        if holder is not None:
-            try:
-                await self._load(holder, self._protocol.halt())
-            except (
-                Refusal,
-                LinkError,
-            ) as error:  # the robot halts by itself when its last drive packet expires
-                self.story.note(holder.arc, f"the stop was not sent: {error}")
-                self._latch.confirm(False)
-            else:
-                self._latch.confirm(True)
-        self._publish_stop()
-        if is_new:
-            self.publish_event(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
-        return self._latch.state
-
-    def standing_stop(self) -> StandingStop | None:
-        """Return the stop in force, for the published state."""
-        state = self._latch.state
-        if not state.is_stopped:
-            return None
-        by = ", ".join(dict.fromkeys([state.by, *(author.by for author in state.also)]))
-        return StandingStop(state.number, by, state.reason, state.at_s, state.is_confirmed)
-
-    def _tell_stop(self, state: StopState, what: str) -> None:
-        self._publish_stop()
-        self.publish_event(self.name, f"{what} (by {state.by})")
-
-    def _publish_stop(self) -> None:
-        self.changed()
-        self.bus.publish(self.address, Conversation.EVENTS, self._latch.state)
-
-    def _keep_stop(self) -> None:
-        """Save the stop for the next process of this RC; a full disk must not prevent the stop."""
-        if self._stop_file is None:
-            return
-        try:
-            self._stop_file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            replace_file(self._stop_file, msgspec.msgpack.encode(self._latch.state), is_lasting=False)
-        except OSError as error:
-            news = "is stopped" if self._latch.state.is_stopped else "is free again"
-            self.publish_event(
-                self.name, f"a restart of this RC will not know that {self.name} {news}: {error.strerror}"
-            )
-
-    def _stopped(self, hold: Hold) -> None:
-        """Record that the wheels stand still, unless the robot has another holder by now."""
-        if self._holder is not None and self._holder.epoch == hold.epoch:
-            self._halt_at_s = None
-
-    async def _move(self, hold: Hold, command: Drive | Jump, payload: bytes, **how: Any) -> None:
-        """Load a packet that moves the robot.
-
-        Raises:
-            EmergencyStopped: The robot was stopped meanwhile, and perhaps freed again; the packet is not sent.
-        """
-        try:
-            await self._load(hold, payload, moves=True, **how)
-        except GivenBeforeStop:
-            self._latch.require_moving(command.after_stop)
-            raise
-
-    async def _load(
-        self,
-        hold: Hold,
-        payload: bytes,
-        *,
-        at_once: bool = False,
-        afterwards: bytes = b"",
-        lasts_s: float = 0.0,
-        kind: str = "drive",
-        moves: bool = False,
-    ) -> None:
-        epoch = hold.companions.get(self._radio)
-        if epoch is None:
-            raise NoRadio(f"{hold.arc} holds {self.name} without {self._radio or 'a radio'}")
-        order = LoadPacket(
-            hold.arc,
-            epoch,
-            self.parameters.network_id,
-            payload,
-            self._protocol.safe(),
-            hold.epoch,
-            at_once,
-            afterwards,
-            lasts_s,
-            kind,
-            moves,
-            self._latch.state.number,
-        )
-        radio = address(Subsystem.RESOURCE_POOL, self._radio)
-        await self.bus.ask(radio, order, PacketLoaded, within_s=RADIO_REPLY_S)
-
-    def _applied(self, hold: Hold, command: str, values: dict[str, float]) -> Applied:
-        return Applied(self.name, hold.epoch, self.clock.now_s(), command, values)
-
-    async def _halt_when_silent(self) -> None:
-        """Dead-man's control: a drive command without a repetition ends after ``COMMAND_TIMEOUT_S``."""
-        while True:
-            self._driven.clear()
-            if self._halt_at_s is None:
-                await self._driven.wait()
-                continue
-            await self.clock.sleep_until_s(self._halt_at_s)
-            hold = self._holder
-            if not self._silent_too_long():
-                continue
-            self._halt_at_s = None
-            if hold is None:
-                continue
-            self._timeouts += 1
-            self.story.note(hold.arc, "sent no command for too long: wheels stopped")
-            try:
-                await self._load(hold, self._protocol.halt())
-            except (Refusal, LinkError) as error:  # swapped out, or no radio: the safe packet or the robot itself halts
-                self.story.note(hold.arc, f"halt not sent: {error}")
-
-    def _silent_too_long(self) -> bool:
-        """Return whether still no command has come after the sleep."""
-        return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s
-
-
-def _read_stop(file: Path | None) -> StopState | None:
-    """Return the stop that an earlier process of this RC saved; an unreadable file counts as a stop."""
-    if file is None or not file.exists():
-        return None
-    try:
-        return msgspec.msgpack.decode(file.read_bytes(), type=StopState)
-    except (OSError, msgspec.DecodeError) as error:
-        log.error("%s: %s", file, error)
-        return StopState(file.name, True, 1, "unknown", "the file of an earlier stop cannot be read", 0.0)
-
-
-def _is_finite(speeds: Drive) -> bool:
-    return math.isfinite(speeds.left_rad_s) and math.isfinite(speeds.right_rad_s)
+                await self.move_once(hold, order, self._protocol.jump(), "jump")
+                return {}
+            case _:
+                return await super().obey(hold, order)

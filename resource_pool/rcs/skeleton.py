@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.ranges import Epoch, Mention, Share
-from backbone.wire import Envelope, Message
+from backbone.ranges import Share
+from resource_pool.commands import Command
 from resource_pool.drivers.interface import DriverSite
 from resource_pool.holds import Hold
-from resource_pool.messages import Applied
 from resource_pool.resource_controller import RcParameters, ResourceController
 
 
-class Shine(Message, frozen=True):
-    """Shine this brightly, 0 (dark) to 1, under the grant of this epoch."""
+class Shine(Command, frozen=True):
+    """Shine this brightly, 0 (dark) to 1."""
 
-    arc: Mention
-    epoch: Epoch
     brightness: Share
 
 
@@ -39,7 +38,7 @@ class PaintedLamp:
 
 
 class Lamp(ResourceController[RcParameters]):
-    """The RC: admit a command, carry it out, return the applied values; and know the safe state."""
+    """The RC: carry out a command, return the applied values; and know the safe state."""
 
     commands, driver_kind = Shine, "lamp"
 
@@ -51,11 +50,9 @@ class Lamp(ResourceController[RcParameters]):
         """Go dark."""
         await self._driver.set_brightness(0.0)
 
-    async def command(self, asked: Envelope[Message]) -> Message:
+    async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Shine."""
-        order = asked.body
         if not isinstance(order, Shine):
-            return await super().command(asked)
-        self.admit(order.arc, order.epoch)
+            return await super().obey(hold, order)
         await self._driver.set_brightness(share := min(1.0, max(0.0, order.brightness)))
-        return Applied(self.name, order.epoch, self.clock.now_s(), "shine", {"brightness": share})
+        return {"brightness": share}

@@ -27,7 +27,7 @@ from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, Refused, write
-from resource_pool.messages import CommandScout, Drive
+from resource_pool.commands import Drive
 from resource_pool.stop_messages import AskStop, LiftStop, StopState
 
 PLACER = "backbone/placer"
@@ -66,7 +66,7 @@ class Attacker:
         for rc in schedule.rcs:
             if rc.kind == "scout" and rc.holders:
                 holder = rc.holders[0]
-                order = CommandScout(holder.arc, holder.epoch, Drive(9.0, -9.0))
+                order = Drive(9.0, -9.0).under(holder.arc, holder.epoch)
                 return self.ask(session, f"resource_pool/{holder.arc}", f"resource_pool/{rc.rc}", order)
         return raw
 

@@ -25,7 +25,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.component.launch import Launch
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem
-from resource_pool.messages import Drive, Halt
+from resource_pool.commands import Drive, Halt
 
 pytestmark = pytest.mark.processes
 

@@ -27,8 +27,9 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskRc, RcState, StaleEpoch
 from mission_control.messages import AskBehavior, BehaviorState
+from resource_pool.commands import Drive
 from resource_pool.drivers.world_messages import AskPose, Pose
-from resource_pool.messages import Applied, CommandScout, Drive
+from resource_pool.messages import Applied
 from ui_console.model.driving import DriveWish
 from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
 from ui_console.session.teleoperation import Teleoperation
@@ -311,7 +312,7 @@ async def test_a_command_of_a_past_epoch_is_refused_counted_and_moves_nothing(mi
         await watcher_holds_scout1(bus)
         before = await bus.ask(WORLD, AskPose("scout1"), Pose, within_s=2)
         refused = (await counted(bus, SCOUT))["refused_stale"]
-        late = CommandScout(f"{turn.console}-drive", epoch, Drive(8, -8))
+        late = Drive(8, -8).under(f"{turn.console}-drive", epoch)
         with pytest.raises(StaleEpoch):
             await bus.ask(SCOUT, late, Applied, within_s=2)
         assert (await counted(bus, SCOUT))["refused_stale"] == refused + 1

@@ -17,11 +17,12 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import Connect, Connected
 from backbone.scheduling.requests import RcUse
+from resource_pool.commands import Tune
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import SimulatedRadio
 from resource_pool.drivers.simulated_video import SimulatedFramegrabber
 from resource_pool.drivers.world_messages import WorldState
-from resource_pool.messages import Applied, Tune
+from resource_pool.messages import Applied
 from resource_pool.simulated_world import SimulatedWorld
 from scout_model import radio_link
 from scout_model.description import CLEAN_AIR, AirDescription, ScoutPlace, WorldDescription
@@ -267,7 +268,7 @@ def test_a_framegrabber_counts_its_pictures_by_kind(local_mission: Any) -> None:
             grabber = address(Subsystem.RESOURCE_POOL, "grabber")
             order = Connect("one", 1, lease_s=2.0, use=RcUse(), companions={})
             await pool.manager_voice.ask(grabber, order, Connected, within_s=1)
-            await pool.voice("one").ask(grabber, Tune("one", 1, "video"), Applied, within_s=1)
+            await pool.voice("one").ask(grabber, Tune("video").under("one", 1), Applied, within_s=1)
             driver = pool.grabber_driver
             assert driver.deliver is not None
             for kind, transmitters in (("clean", 1), ("torn", 1), ("clean", 1), ("snow", 0), ("", 1)):

@@ -30,17 +30,8 @@ from resource_pool.arc_client import (
     stop_robot,
     watch_stops,
 )
-from resource_pool.messages import (
-    COMMAND_TIMEOUT_S,
-    Applied,
-    CommandScout,
-    Drive,
-    Jump,
-    LoadPacket,
-    NotFromYou,
-    NoTurnSoon,
-    PacketLoaded,
-)
+from resource_pool.commands import Drive, Jump
+from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, LoadPacket, NotFromYou, NoTurnSoon, PacketLoaded
 from resource_pool.rcs.scout import Scout
 from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import StopLatch
@@ -229,7 +220,7 @@ def test_a_stop_the_radio_does_not_take_is_told_as_unconfirmed_and_the_robot_sta
             for rc, use in (("radio", RcUse([Usage(0.05, 0.002)])), ("scout1", RcUse())):
                 order = Connect("one", companions[rc], 60.0, use, companions)
                 await pool.manager_voice.ask(f"resource_pool/{rc}", order, Connected, within_s=1)
-            drive = CommandScout("one", 5, Drive(4.0, 4.0))
+            drive = Drive(4.0, 4.0).under("one", 5)
             await pool.voice("one").ask("resource_pool/scout1", drive, Applied, within_s=1)
             await pool.clock.sleep_s(0.1)
             began = await pool.pose("scout1")
@@ -313,7 +304,7 @@ async def held_by_hand(pool: Pool, drive_period_s: float = 0.05) -> AsyncIterato
 
 
 async def command(voice: Bus, what: Drive | Jump) -> Applied:
-    return await voice.ask("resource_pool/scout1", CommandScout("one", 5, what), Applied, within_s=1)
+    return await voice.ask("resource_pool/scout1", what.under("one", 5), Applied, within_s=1)
 
 
 def test_a_drive_sent_before_a_stop_that_arrives_after_its_lift_is_never_applied(local_mission: Any) -> None:
@@ -328,7 +319,7 @@ def test_a_drive_sent_before_a_stop_that_arrives_after_its_lift_is_never_applied
             assert (refusal.value.code, refusal.value.facts["number"]) == (GivenBeforeStop.code, stop.number)
             await pool.clock.sleep_s(0.5)
             assert set(payloads(pool, 1)) <= {encode_halt()}
-            await command(voice, Drive(4.0, 4.0, stop.number))
+            await command(voice, Drive(4.0, 4.0, after_stop=stop.number))
             await pool.clock.sleep_s(0.1)
             assert payloads(pool, 1)[-1] == encode_drive(4.0, 4.0)
 
@@ -411,7 +402,9 @@ def test_in_a_thousand_random_stops_nothing_from_before_a_stop_is_on_the_air_aft
             sent: list[tuple[int, asyncio.Task[Applied]]] = []
             for _stop in range(1000):
                 for _command in range(rng.randrange(4)):
-                    what = Jump(known) if rng.random() < 0.3 else Drive(speed_for(known), 1.0, known)
+                    what = (
+                        Jump(after_stop=known) if rng.random() < 0.3 else Drive(speed_for(known), 1.0, after_stop=known)
+                    )
                     sent.append((known, asyncio.create_task(late(pool, rng.uniform(0, 0.08), voice, what))))
                 await pool.clock.sleep_s(rng.uniform(0, 0.12))
                 stop = await stop_robot(operator, "scout1", "")

@@ -12,7 +12,8 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import Connect, Connected
 from backbone.scheduling.requests import RcUse
-from resource_pool.messages import Applied, Frame, Tune
+from resource_pool.commands import Tune
+from resource_pool.messages import Applied, Frame
 
 
 def test_a_picture_of_another_robot_is_not_delivered_and_one_of_unknown_origin_is_the_expected_ones(
@@ -24,7 +25,7 @@ def test_a_picture_of_another_robot_is_not_delivered_and_one_of_unknown_origin_i
             heard: list[Frame] = []
             pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
             await pool.manager_voice.ask(grabber, Connect("one", 1, 2.0, RcUse(), {}), Connected, within_s=1)
-            await pool.voice("one").ask(grabber, Tune("one", 1, "video", "scout1"), Applied, within_s=1)
+            await pool.voice("one").ask(grabber, Tune("video", "scout1").under("one", 1), Applied, within_s=1)
             driver = pool.grabber_driver
             assert driver.deliver is not None
             driver.deliver(replace(driver.picture(), robot="scout2"))

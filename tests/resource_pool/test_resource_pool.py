@@ -31,22 +31,18 @@ from backbone.rc_manager.messages import (
 )
 from backbone.scheduling.requests import RcUse, Usage
 from backbone.wire import Envelope
+from resource_pool.commands import Drive, Halt, Jump, Tune
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.messages import (
     Accepted,
     Applied,
-    CommandScout,
-    Drive,
     Frame,
-    Halt,
-    Jump,
     LoadPacket,
     NotYours,
     PacketLoaded,
     Release,
     Suspended,
     SwappedOut,
-    Tune,
 )
 from scout_model.radio_link import encode_drive, encode_halt, encode_safe
 
@@ -79,7 +75,7 @@ async def connect_robot(pool: Pool, arc: str, epoch: int, scout: str = "scout1",
 
 
 async def command(pool: Pool, arc: str, epoch: int, what: Any, scout: str = "scout1") -> Applied:
-    return await pool.voice(arc).ask(at(scout), CommandScout(arc, epoch, what), Applied, within_s=1)
+    return await pool.voice(arc).ask(at(scout), what.under(arc, epoch), Applied, within_s=1)
 
 
 # ---------------------------------------------------------------------- driving
@@ -714,7 +710,7 @@ def test_no_picture_arrives_after_the_disconnection_even_if_the_driver_goes_on(l
             heard: list[Frame] = []
             pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
             await connect(pool, "grabber", "one", 1)
-            await pool.voice("one").ask(at("grabber"), Tune("one", 1, "video"), Applied, within_s=1)
+            await pool.voice("one").ask(at("grabber"), Tune("video").under("one", 1), Applied, within_s=1)
             driver = pool.grabber_driver
             late = driver.deliver
             late(driver.picture())
@@ -736,7 +732,7 @@ def test_garbled_and_silent_pictures_are_counted_and_not_delivered(local_mission
             heard: list[Frame] = []
             pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
             await connect(pool, "grabber", "one", 1)
-            await pool.voice("one").ask(at("grabber"), Tune("one", 1, "video"), Applied, within_s=1)
+            await pool.voice("one").ask(at("grabber"), Tune("video").under("one", 1), Applied, within_s=1)
             driver = pool.grabber_driver
             for transmitters in (0, 2, 1, 3, -1, 0):
                 driver.deliver(driver.picture(transmitters))
@@ -757,7 +753,7 @@ def test_a_frequency_the_framegrabber_does_not_receive_is_refused(local_mission:
         async with a_pool(local_mission, ["grabber"], manager=False) as pool:
             await connect(pool, "grabber", "one", 1)
             with pytest.raises(Refusal) as refused:
-                await pool.voice("one").ask(at("grabber"), Tune("one", 1, "elsewhere"), Applied, within_s=1)
+                await pool.voice("one").ask(at("grabber"), Tune("elsewhere").under("one", 1), Applied, within_s=1)
             assert refused.value.code == "framegrabber.frequency"
             assert pool.grabber_driver.deliver is None
 

@@ -36,10 +36,10 @@ def test_the_lamp_shines_for_its_holder_only_and_is_dark_afterwards(local_missio
             await pool.start(Lamp, "lamp1", {"driver": DRIVER, "color": "green"})
             manager, one, two = pool.manager_voice, pool.voice("one"), pool.voice("two")
             await manager.ask("resource_pool/lamp1", Connect("one", 1, 2.0, RcUse(), {}), Connected, within_s=1)
-            applied = await one.ask("resource_pool/lamp1", Shine("one", 1, 7.0), Applied, within_s=1)
+            applied = await one.ask("resource_pool/lamp1", Shine(7.0).under("one", 1), Applied, within_s=1)
             assert applied.values == {"brightness": 1.0}
             with pytest.raises(StaleEpoch):
-                await two.ask("resource_pool/lamp1", Shine("two", 1, 0.5), Applied, within_s=1)
+                await two.ask("resource_pool/lamp1", Shine(0.5).under("two", 1), Applied, within_s=1)
             await manager.ask("resource_pool/lamp1", Disconnect("one", 1), Disconnected, within_s=1)
             assert said(pool) == ["shines green at 100%", "is dark"]
 

@@ -25,7 +25,8 @@ from backbone.rc_manager.messages import (
 )
 from backbone.scheduling.requests import RcUse, Usage
 from backbone.wire import Message
-from resource_pool.messages import Applied, CommandScout, Drive, LoadPacket, NotFromYou, PacketLoaded, Tune
+from resource_pool.commands import Drive, Tune
+from resource_pool.messages import Applied, LoadPacket, NotFromYou, PacketLoaded
 from scout_model.radio_link import encode_drive, encode_safe
 
 STRANGERS = [
@@ -80,13 +81,13 @@ def test_only_the_arc_that_holds_an_rc_commands_it_under_its_name(local_mission:
         async with a_pool(local_mission, ["scout1", "radio", "grabber"], manager=False) as pool:
             await connect_robot(pool, "one", 5)
             await pool.manager_voice.ask(at("grabber"), Connect("one", 7, 60.0, RcUse(), {}), Connected, within_s=1)
-            await refused(pool, stranger, "scout1", CommandScout("one", 5, Drive(9.0, 9.0)), Applied)
-            await refused(pool, stranger, "grabber", Tune("one", 7, "video"), Applied)
+            await refused(pool, stranger, "scout1", Drive(9.0, 9.0).under("one", 5), Applied)
+            await refused(pool, stranger, "grabber", Tune("video").under("one", 7), Applied)
             await pool.clock.sleep_s(0.3)
             assert not pool.radio_driver.heard
             assert pool.grabber_driver.frequency == ""
             assert (await state_of(pool, "scout1")).applied == 0
-            await pool.voice("one").ask(at("scout1"), CommandScout("one", 5, Drive(1.0, 1.0)), Applied, within_s=1)
+            await pool.voice("one").ask(at("scout1"), Drive(1.0, 1.0).under("one", 5), Applied, within_s=1)
             assert pool.radio_driver.heard_by(1)[-1].payload == encode_drive(1.0, 1.0)
 
     run_virtual(main())

@@ -23,7 +23,8 @@ from resource_pool.gate import Gate
 from resource_pool.holds import Hold
 from resource_pool.rcs.command_radio import CommandRadio
 from resource_pool.rcs.framegrabber import Framegrabber, FramegrabberParameters
-from resource_pool.rcs.scout import Scout, ScoutParameters
+from resource_pool.rcs.robot import RobotParameters
+from resource_pool.rcs.scout import Scout
 from resource_pool.rcs.video_frequency import VideoFrequency
 from resource_pool.resource_controller import RcParameters, ResourceController
 
@@ -106,7 +107,7 @@ class AuditedRc(ResourceController[R]):
         self._audit.note(self.name, "safe", arc=hold.arc, epoch=hold.epoch)
 
 
-class AuditedScout(AuditedRc[ScoutParameters], Scout):
+class AuditedScout(AuditedRc[RobotParameters], Scout):
     """A Scout."""
 
 

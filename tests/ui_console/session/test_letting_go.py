@@ -18,9 +18,9 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import EmergencyStopped
-from resource_pool.messages import Drive as ArcDrive
-from resource_pool.messages import Halt as ArcHalt
-from resource_pool.messages import Jump as ArcJump
+from resource_pool.commands import Drive as ArcDrive
+from resource_pool.commands import Halt as ArcHalt
+from resource_pool.commands import Jump as ArcJump
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 from ui_console.model.console import ConsoleModel

@@ -20,8 +20,8 @@ from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction, Suspended
-from resource_pool.messages import Drive as ArcDrive
-from resource_pool.messages import Halt as ArcHalt
+from resource_pool.commands import Drive as ArcDrive
+from resource_pool.commands import Halt as ArcHalt
 from ui_console.model.driving import drive_towards
 from ui_console.model.events import Asked, Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, said
 from ui_console.model.script import read_script

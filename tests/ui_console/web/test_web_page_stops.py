@@ -22,7 +22,7 @@ from web_page import (
 )
 from web_stage import ANYBODY, LOW, Stage
 
-from resource_pool.messages import Drive
+from resource_pool.commands import Drive
 from ui_console.model.driving import STICK_LASTS_S
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]

@@ -16,7 +16,7 @@ from web_stage import ANYBODY, HEIGHT_PX, HIGH, LOW, RIGHTS, WIDTH_PX, WITHIN_S,
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import CloseCode
 
-from resource_pool.messages import Drive, Halt
+from resource_pool.commands import Drive, Halt
 from ui_console.web import login, page_server
 from ui_console.web.login import MAX_MESSAGE_BYTES, Authenticator
 from ui_console.web.page_server import CannotListen

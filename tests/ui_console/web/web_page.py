@@ -12,7 +12,7 @@ import web_browser
 from web_browser import SIZES
 from web_stage import Stage
 
-from resource_pool.messages import Drive, Halt
+from resource_pool.commands import Drive, Halt
 
 QUIET_S = 0.6  # twice what the server counts a drive for
 

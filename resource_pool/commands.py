@@ -1,0 +1,97 @@
+"""Commands: what an RC does for the ARC that holds it.
+
+The RC that obeys a command declares it, as one message class. A decision process sends the command to its ARC; the ARC
+fills in its own name and the epoch, and passes the command on to the RC of its role. The answer contains the applied
+values, or is the refusal ``StaleEpoch``.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar, Self
+
+import msgspec
+
+from backbone.ranges import Count, Epoch, Mention, WheelSpeed
+from backbone.wire import Message
+
+
+class Command(Message, frozen=True, kw_only=True):
+    """Base class of commands; derive and add the command's own fields.
+
+    Attributes:
+        role: Role of the RC in its ARC; empty: the only role that takes this command.
+        after_stop: Number of the robot's last stop whose lift the sender knows; 0: no stop.
+        arc: The ARC that commands; filled in by the ARC.
+        epoch: Epoch of the RC's connection; filled in by the ARC.
+    """
+
+    role: Mention = ""
+    after_stop: Count = 0
+    arc: Mention = ""
+    epoch: Epoch = 0
+
+    moves: ClassVar[bool] = False
+    """True: it moves the robot, so a stopped robot refuses it."""
+
+    @classmethod
+    def word(cls) -> str:
+        """Return its name in ``Applied``, scripts and stories.
+
+        Example:
+            >>> SwitchTransmitter.word()
+            'switch_transmitter'
+        """
+        return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+
+    def under(self, arc: str, epoch: int) -> Self:
+        """Return this command under a grant to an ARC."""
+        return msgspec.structs.replace(self, arc=arc, epoch=epoch)
+
+
+class Drive(Command, frozen=True, tag="Drive/2"):
+    """Turn the wheels at these speeds from now on, until another command or ``COMMAND_TIMEOUT_S``.
+
+    Attributes:
+        left_rad_s: Left wheel, forward is positive.
+        right_rad_s: Right wheel.
+    """
+
+    left_rad_s: WheelSpeed
+    right_rad_s: WheelSpeed
+
+    moves: ClassVar[bool] = True
+
+
+class Halt(Command, frozen=True, tag="Halt/2"):
+    """Stop the wheels."""
+
+
+class Jump(Command, frozen=True, tag="Jump/2"):
+    """Wind the spring foot and kick."""
+
+    moves: ClassVar[bool] = True
+
+
+class SwitchTransmitter(Command, frozen=True, tag="SwitchTransmitter/2"):
+    """Switch the robot's video transmitter on at a frequency, or off.
+
+    Attributes:
+        on: On or off.
+        frequency: Name of the video frequency's RC; empty when off.
+    """
+
+    on: bool
+    frequency: Mention = ""
+
+
+class Tune(Command, frozen=True, tag="Tune/2"):
+    """Receive this video frequency and deliver its pictures to the ARC that holds the framegrabber.
+
+    Attributes:
+        frequency: Name of the video frequency's RC.
+        robot: The robot of the ARC; pictures of other robots are not delivered. Empty: any.
+    """
+
+    frequency: Mention
+    robot: Mention = ""
