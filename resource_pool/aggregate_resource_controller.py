@@ -43,7 +43,6 @@ from backbone.rc_manager.messages import (
     TakePath,
     Withdraw,
 )
-from backbone.scheduling.claims import STREAMED_KINDS
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_request import ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
@@ -88,14 +87,12 @@ class AggregateResourceController(Component[ArcParameters]):
 
     parameters_type = ArcParameters
     accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
-    roles: ClassVar[Sequence[str]] = ()
-    """Kinds of RC in its set, one of each."""
-    commands: ClassVar[Mapping[type[Command], str]] = {}
-    """Commands of its owner, each with the role of the RC that obeys it."""
+    roles: ClassVar[Mapping[str, str] | Sequence[str]] = ()
+    """Role → kind of RC in its set; a sequence of kinds if each role is named like its kind."""
+    commands: ClassVar[Mapping[type[Command], str | Sequence[str]]] = {}
+    """Commands of its owner, each with the role of the RC that obeys it; several roles: the command names one."""
     body: ClassVar[str] = ""
     """Role of the RC that has a body, which operators can stop; empty: none."""
-    sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
-    """Kinds of RC that it uses by streams instead of exclusively."""
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
@@ -128,6 +125,11 @@ class AggregateResourceController(Component[ArcParameters]):
         """
 
     # ------------------------------------------------------------------ for derived classes
+    @classmethod
+    def kinds(cls) -> dict[str, str]:
+        """Return role → kind of RC of its set."""
+        return dict(cls.roles) if isinstance(cls.roles, Mapping) else {kind: kind for kind in cls.roles}
+
     def rc(self, role: str) -> str:
         """Return the name of the RC of this role.
 
@@ -159,11 +161,12 @@ class AggregateResourceController(Component[ArcParameters]):
             NoSuchHardware: No set matches.
         """
         given = self.parameters
-        question = FindRcs(list(self.roles), given.wish, given.features)
+        question = FindRcs(self.kinds(), given.wish, given.features)
         found = await ask_until_answered(
             self.bus, self.clock, DEPENDENCY_DATABASE, question, RcSets, each_s=2.0, within_s=10.0
         )
-        self._placed.make(request_of(self.name, self.parameters, found.sets, self.sharable_roles), found.sets)
+        request = request_of(self.name, self.parameters, found.sets, frozenset(found.sharable))
+        self._placed.make(request, found.sets)
         self.bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases)
 
     async def serve(self) -> None:
@@ -333,7 +336,7 @@ class AggregateResourceController(Component[ArcParameters]):
     # ------------------------------------------------------------------ commands
 
     async def _command(self, command: Command) -> Applied:
-        role = self.commands[type(command)]
+        role = self._role_of(command)
         try:
             epoch = self._gate.epoch_of(self.rc(role))
         except SwappedOut:
@@ -341,6 +344,18 @@ class AggregateResourceController(Component[ArcParameters]):
             raise
         self._commands += 1
         return await self.tell_rc(role, epoch, command)
+
+    def _role_of(self, command: Command) -> str:
+        able = self.commands[type(command)]
+        roles = [able] if isinstance(able, str) else list(able)
+        if command.role not in ([*roles, ""] if len(roles) == 1 else roles):
+            which = f"no {command.role} that obeys" if command.role else "several RCs that obey"
+            raise NoSuchAction(
+                f"{self.launch.type} has {which} {command.word()}",
+                remedy=f"Name one of these roles in the command: {', '.join(roles)}.",
+                role=command.role,
+            )
+        return command.role or roles[0]
 
     def _arc_state(self) -> ArcState:
         gate = self._gate

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 
 import msgspec
 
@@ -21,8 +22,8 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         console: True for consoles.
         minimum_runtime_s: Shortest useful time, seconds.
         maximum_runtime_s: End of extensions; 0: the minimum.
-        wish: Kind of RC → name.
-        features: Kind of RC → features.
+        wish: Role → name of the RC.
+        features: Role → features.
         usage: Period, packet time, deadline, jitter (seconds) and kind of the packets on the radio.
         further_usages: The same for each further kind of packet.
         idle: True: the owner wants no time yet.
@@ -65,8 +66,8 @@ def claim_parameters(
         path: Priority path from the mission's root, or of the console alone.
         minimum_runtime_s: Shortest useful time, seconds, above 0.
         maximum_runtime_s: End of extensions; 0: the minimum.
-        wish: Kind of RC → name (``{"scout": "scout2"}``); kinds left out: any.
-        features: Kind of RC → features it must have (``{"scout": ["camera"]}``).
+        wish: Role → name of the RC (``{"scout": "scout2"}``); roles left out: any.
+        features: Role → features the RC must have (``{"scout": ["camera"]}``).
         usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
             kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period.
         console: True for consoles.
@@ -100,15 +101,15 @@ def claim_parameters(
 
 
 def request_of(
-    arc: str, given: ArcParameters, sets: Sequence[Mapping[str, str]], sharable_roles: frozenset[str]
+    arc: str, given: ArcParameters, sets: Sequence[Mapping[str, str]], sharable: AbstractSet[str]
 ) -> SchedulingRequest:
     """Return the request of the ARC with these parameters.
 
     Args:
         arc: Name of the ARC.
         given: Its parameters.
-        sets: Sets of RCs that match, each kind → name.
-        sharable_roles: Kinds that it uses by streams.
+        sets: Sets of RCs that match, each role → name.
+        sharable: Names of the RCs that it uses by streams.
     """
     return scheduling_request(
         arc,
@@ -116,7 +117,7 @@ def request_of(
         owner=given.owner,
         path=given.path,
         streams=[Usage(*usage) for usage in (given.usage, *given.further_usages)],
-        streamed=sharable_roles,
+        sharable=sharable,
         minimum_runtime_s=given.minimum_runtime_s,
         maximum_runtime_s=given.maximum_runtime_s,
         console=given.console,
@@ -126,7 +127,7 @@ def request_of(
 
 
 def set_of(arc: str, sets: Sequence[dict[str, str]], rcs: Iterable[str]) -> dict[str, str]:
-    """Return the set of these RCs, each kind → name.
+    """Return the set of these RCs, role → name.
 
     Raises:
         NotMySet: The set is no alternative of the request.

@@ -18,7 +18,7 @@ class Multiplicity(StrEnum):
     MANY = "many"
 
 
-class ComponentType(Message, frozen=True):
+class ComponentType(Message, frozen=True, tag="ComponentType/2"):
     """One kind of component.
 
     Attributes:
@@ -30,7 +30,7 @@ class ComponentType(Message, frozen=True):
         tags: Tags that a host of its components must have.
         restart: True if the creator restarts its components after every end without an order; False: the owner must ask
             for a new start.
-        needs: Kinds of RC of which an ARC holds one each; empty if it is no ARC type.
+        needs: Role → kind of RC that an ARC holds; empty if it is no ARC type.
     """
 
     name: Mention
@@ -40,7 +40,7 @@ class ComponentType(Message, frozen=True):
     core: bool = False
     tags: Annotated[list[Mention], FEW] = []
     restart: bool = True
-    needs: Annotated[list[Mention], FEW] = []
+    needs: Annotated[dict[Mention, Mention], FEW] = {}
 
 
 class Admit(Message, frozen=True):

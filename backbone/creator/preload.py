@@ -14,7 +14,7 @@ def arc_modules(types: Iterable[ComponentType]) -> list[str]:
 
     Example:
         >>> from backbone.naming import Subsystem
-        >>> drive = ComponentType("drive", "lab.drive:Drive", Subsystem.RESOURCE_POOL, needs=["scout"])
+        >>> drive = ComponentType("drive", "lab.drive:Drive", Subsystem.RESOURCE_POOL, needs={"scout": "scout"})
         >>> arc_modules([drive, ComponentType("scout", "lab.scout:Scout", Subsystem.RESOURCE_POOL)])
         ['lab.drive']
     """

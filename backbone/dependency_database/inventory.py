@@ -2,9 +2,9 @@
 
 Rules:
 
-* A set has one RC of each wanted kind, matches the wish and the features, and respects every link: an RC with links to
-  some RCs of a kind is never combined with another RC of that kind.
-* Sets are in the order of the mission file: the resources of the first kind vary slowest.
+* A set has for each role another RC of the wanted kind, matches the wish and the features, and respects every link: an
+  RC with links to some RCs of a kind is never combined with another RC of that kind.
+* Sets are in the order of the mission file: the resources of the first role vary slowest.
 * The result has at least one set; otherwise a refusal names the part of the wish that no resource matches.
 
 Source: S000, "static dependency database": all hardware available now, described right before the mission.
@@ -12,7 +12,7 @@ Source: S000, "static dependency database": all hardware available now, describe
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from backbone.dependency_database.messages import FindRcs, NoSuchHardware, Resource
 from backbone.naming import did_you_mean
@@ -35,16 +35,21 @@ class Inventory:
         """All resources, sorted by name."""
         return sorted(self._resources, key=lambda resource: resource.name)
 
+    def sharable(self, sets: Iterable[Mapping[str, str]]) -> set[str]:
+        """Return the names of the RCs in these sets that several ARCs may share."""
+        named = {name for one in sets for name in one.values()}
+        return {resource.name for resource in self._resources if resource.sharable and resource.name in named}
+
     def find(self, wanted: FindRcs) -> list[dict[str, str]]:
-        """Return the sets of RCs that match, kind → name, at most ``MOST_SETS``.
+        """Return the sets of RCs that match, role → name, at most ``MOST_SETS``.
 
         Raises:
-            NoSuchHardware: No set matches; facts: ``role``, the kind without a match.
+            NoSuchHardware: No set matches; facts: ``role``, the role without a match.
         """
         self._refuse_contradictions(wanted)
         candidates = {role: self._candidates(role, wanted) for role in wanted.roles}
         found: list[dict[str, str]] = []
-        for chosen in _sets(wanted.roles, candidates, {}):
+        for chosen in _sets(list(wanted.roles), candidates, {}):
             found.append({role: resource.name for role, resource in chosen.items()})
             if len(found) == MOST_SETS:
                 break
@@ -55,31 +60,29 @@ class Inventory:
     def _refuse_contradictions(self, wanted: FindRcs) -> None:
         if not wanted.roles:
             raise NoSuchHardware("no kind of hardware is asked for", role="")
-        for role in wanted.roles:
-            if wanted.roles.count(role) > 1:
-                raise NoSuchHardware(f"{role} is asked for twice; a set has one of each kind", role=role)
-        for what, kinds in (("wish", wanted.wish), ("features", wanted.features)):
-            for kind in kinds:
-                if kind not in wanted.roles:
-                    hint = did_you_mean(kind, wanted.roles)
+        for what, roles in (("wish", wanted.wish), ("features", wanted.features)):
+            for role in roles:
+                if role not in wanted.roles:
+                    hint = did_you_mean(role, wanted.roles)
                     raise NoSuchHardware(
-                        f"the {what} names {kind!r}{hint}, but only {_listed(wanted.roles)} is asked for", role=kind
+                        f"the {what} names {role!r}{hint}, but only {_listed(wanted.roles)} is asked for", role=role
                     )
 
     def _candidates(self, role: str, wanted: FindRcs) -> list[Resource]:
-        """Return the resources of this kind that match by themselves.
+        """Return the resources that match this role by themselves.
 
         Raises:
-            NoSuchHardware: No resource of this kind matches.
+            NoSuchHardware: No resource matches this role.
         """
-        kind = [resource for resource in self._resources if resource.type == role]
-        if not kind:
-            hint = did_you_mean(role, {resource.type for resource in self._resources})
-            raise NoSuchHardware(f"no {role!r} exists{hint}", role=role)
+        kind = wanted.roles[role]
+        of_kind = [resource for resource in self._resources if resource.type == kind]
+        if not of_kind:
+            hint = did_you_mean(kind, {resource.type for resource in self._resources})
+            raise NoSuchHardware(f"no {kind!r} exists{hint}", role=role)
         name = wanted.wish.get(role)
-        named = [resource for resource in kind if name in (None, resource.name)]
+        named = [resource for resource in of_kind if name in (None, resource.name)]
         if not named:
-            names = [resource.name for resource in kind]
+            names = [resource.name for resource in of_kind]
             raise NoSuchHardware(
                 f"no {role} is named {name!r}{did_you_mean(str(name), names)}; there is {_listed(names)}",
                 remedy=f"Use one of these names, or add the {role} to the mission file.",
@@ -107,7 +110,7 @@ def _sets(
 
 
 def _go_together(one: Resource, other: Resource) -> bool:
-    return _allows(one, other) and _allows(other, one)
+    return one.name != other.name and _allows(one, other) and _allows(other, one)
 
 
 def _allows(one: Resource, other: Resource) -> bool:
@@ -127,7 +130,7 @@ def _lacks_features(role: str, named: Sequence[Resource], features: Sequence[str
 def _nothing_fits_together(wanted: FindRcs, candidates: Mapping[str, Sequence[Resource]]) -> NoSuchHardware:
     """Name the first kind without a partner among the kinds before it, and the links of its resources."""
     for count in range(2, len(wanted.roles) + 1):
-        roles = wanted.roles[:count]
+        roles = list(wanted.roles)[:count]
         if next(_sets(roles, candidates, {}), None) is None:
             break
     role, before = roles[-1], roles[:-1]
@@ -136,14 +139,15 @@ def _nothing_fits_together(wanted: FindRcs, candidates: Mapping[str, Sequence[Re
         for other in roles
         for one in candidates[other]
         for kind, names in one.links.items()
-        if kind in roles
+        if kind in {wanted.roles[role] for role in roles}
     ]
     wish = ", ".join(f"{kind} {name}" for kind, name in wanted.wish.items() if kind in roles)
+    detail = "; ".join(why) or f"the mission has too few of kind {wanted.roles[role]}"
     return NoSuchHardware(
-        f"no {role} goes together with {_listed(before)}{f' as wished ({wish})' if wish else ''}: {'; '.join(why)}",
+        f"no {role} goes together with {_listed(before)}{f' as wished ({wish})' if wish else ''}: {detail}",
         role=role,
     )
 
 
-def _listed(names: Sequence[str]) -> str:
+def _listed(names: Iterable[str]) -> str:
     return ", ".join(names) or "none"

@@ -57,24 +57,30 @@ class Resources(Message, frozen=True):
     resources: Annotated[list[Resource], MANY]
 
 
-class FindRcs(Message, frozen=True):
+class FindRcs(Message, frozen=True, tag="FindRcs/2"):
     """Ask for the sets of RCs that match.
 
     Attributes:
-        roles: Kinds of RC that the ARC needs, one of each: ``["scout", "command_radio", "video_frequency"]``.
-        wish: Kind → name wanted of that kind. Kinds left out: any.
-        features: Kind → features wanted of that kind.
+        roles: Role → kind of RC that the ARC needs for it: ``{"scout": "scout", "left_eye": "camera"}``.
+        wish: Role → name wanted for it. Roles left out: any.
+        features: Role → features wanted for it.
     """
 
-    roles: Annotated[list[Mention], FEW]
+    roles: Annotated[dict[Mention, Mention], FEW]
     wish: Annotated[dict[Mention, Mention], MANY] = {}
     features: Annotated[dict[Mention, Annotated[list[Mention], FEW]], FEW] = {}
 
 
-class RcSets(Message, frozen=True):
-    """Answer to ``FindRcs``: one entry kind → name for each set, in the order of the mission file; never empty."""
+class RcSets(Message, frozen=True, tag="RcSets/2"):
+    """Answer to ``FindRcs``.
+
+    Attributes:
+        sets: One entry role → name for each set, in the order of the mission file; never empty.
+        sharable: Names of the RCs among them that several ARCs may share.
+    """
 
     sets: Annotated[list[Annotated[dict[Mention, Mention], FEW]], MANY]
+    sharable: Annotated[list[Mention], MANY] = []
 
 
 class NoSuchHardware(Refusal):

@@ -52,7 +52,8 @@ class DependencyDatabase(Component[DependencyDatabaseParameters]):
             case AskResources():
                 return Resources(self._inventory.resources)
             case FindRcs() as wanted:
-                return RcSets(self._find(wanted, asked.source))
+                sets = self._find(wanted, asked.source)
+                return RcSets(sets, sorted(self._inventory.sharable(sets)))
         return await super().answer(asked)
 
     def statistics(self) -> dict[str, float]:

@@ -217,7 +217,7 @@ def _claims(description: MissionDescription) -> Iterator[_BehaviorClaim]:
         arc = _arc_name(behavior, wish)
         features = {kind: list(names) for kind, names in wish.features.items()}
         try:
-            sets = inventory.find(FindRcs(list(needs[wish.kind]), wish.wish, features))
+            sets = inventory.find(FindRcs(needs[wish.kind], wish.wish, features))
         except Refusal as refusal:
             yield _BehaviorClaim(arc, behavior, path, None, _refusal_text(refusal))
             continue
@@ -229,6 +229,7 @@ def _claims(description: MissionDescription) -> Iterator[_BehaviorClaim]:
             streams=[Usage(wish.period_s, wish.packet_time_s, kind=wish.kind)],
             minimum_runtime_s=wish.minimum_runtime_s,
             maximum_runtime_s=wish.maximum_runtime_s,
+            sharable=inventory.sharable(sets),
         )
         yield _BehaviorClaim(arc, behavior, path, request)
 

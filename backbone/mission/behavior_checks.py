@@ -82,14 +82,15 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
         wanted, name, features = wish.text("type"), wish.text("name"), wish.words("features")
         if wanted not in needs:
             fits = False
-            if is_known(wish, "type", "component type", tables.types, report):
+            roles = {*tables.types, *needs}
+            if is_known(wish, "type", "component type", roles, report):
                 report.fault(
                     wish.place_of("type"),
                     f"an ARC of kind {kind} has no {wanted}{report.hint(wanted, needs)}",
                     f"It needs: {listed(needs)}",
                 )
             continue
-        there = tables.resources_of(wanted)
+        there = tables.resources_of(needs[wanted])
         if name and not is_known(wish, "name", wanted, [resource.text("name") for resource in there], report):
             fits = False
             continue
@@ -107,7 +108,7 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
                 f"{name or f'no {wanted}'} {'lacks' if name else 'has'} {listed(features)}{hints}",
                 f"There is: {listed(known) or 'no feature at all'}",
             )
-    for needed in needs:
+    for needed in dict.fromkeys(needs.values()):
         if not tables.resources_of(needed) and tables.is_resource_type(needed):
             fits = False
             report.fault(
@@ -120,10 +121,11 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
 
 def _check_set(behavior: Element, arc: Element, tables: Tables, sets: _Sets, report: Report) -> None:
     """Report a demand no sharable resource can serve, and resources that cannot be used together."""
-    needs = [needed for needed in dict.fromkeys(tables.needs(arc.text("kind"))) if tables.resources_of(needed)]
+    kinds = tables.needs(arc.text("kind"))
+    needs = [role for role, kind in kinds.items() if tables.resources_of(kind)]
     wishes = {wish.text("type"): wish for wish in arc.all("wish")}
     roles = {
-        needed: [resource for resource in tables.resources_of(needed) if _wanted(resource, wishes.get(needed))]
+        needed: [resource for resource in tables.resources_of(kinds[needed]) if _wanted(resource, wishes.get(needed))]
         for needed in needs
     }
     demand = _check_demand(behavior, arc, report)
@@ -192,6 +194,8 @@ class _Sets:
 
 
 def _together(resource: Element, other: Element, tables: Tables) -> bool:
+    if resource is other:
+        return False
     named = [used.text("name") for used in resource.all("uses") if used.text("type") == other.text("type")]
     if not all(tables.is_resource_of(name, other.text("type")) for name in named):
         return True  # an unknown name is already reported

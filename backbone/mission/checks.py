@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
@@ -38,6 +38,7 @@ from backbone.mission.tables import (
     host_tags_lacking,
     is_known,
     parameters,
+    role_of,
     section,
 )
 from backbone.mission.world_checks import check_world
@@ -176,9 +177,23 @@ def _check_core_type(component_type: Element, report: Report) -> None:
         )
 
 
+def _check_roles(needs: Sequence[Element], report: Report) -> None:
+    """Report every need with the role of another."""
+    first: dict[str, Element] = {}
+    for needed in needs:
+        role = role_of(needed)
+        before = first.setdefault(role, needed)
+        if role and before is not needed:
+            report.fault(
+                needed.place_of("role" if needed.text("role") else "type"),
+                f"a second need for role {quoted(role)}; the first is in line {before.place.line}",
+                'Give each a role of its own, role="…", or remove one',
+            )
+
+
 def _check_needs(component_type: Element, tables: Tables, report: Report) -> None:
     needs = component_type.all("needs")
-    check_unique(needs, "type", "need of type", report)
+    _check_roles(needs, report)
     known = tables.resource_types()
     for needed in needs:
         is_known(needed, "type", "type of resource", known, report)

@@ -70,7 +70,7 @@ def _component_type(declared: TypeElement) -> ComponentType:
         core=declared.core,
         tags=list(declared.tags),
         restart=declared.restart,
-        needs=[needed.type for needed in declared.needs],
+        needs={needed.role or needed.type: needed.type for needed in declared.needs},
     )
 
 

@@ -63,10 +63,10 @@ class Tables:
         found = self.classes.get(self.types[kind].text("class")) if kind in self.types else None
         return None if found is None or found.failure else found
 
-    def needs(self, kind: str) -> list[str]:
-        """Return the kinds of resource an ARC of this kind needs; none if it is no ARC."""
+    def needs(self, kind: str) -> dict[str, str]:
+        """Return role → type of resource that an ARC of this kind needs; none if it is no ARC."""
         found = self.types.get(kind)
-        return [] if found is None else [needed.text("type") for needed in found.all("needs")]
+        return {} if found is None else {role_of(needed): needed.text("type") for needed in found.all("needs")}
 
     def belongs_to(self, name: str, subsystem: Subsystem) -> bool:
         """Return whether this type is, or if its subsystem is illegal may be meant to be, of the subsystem."""
@@ -107,6 +107,11 @@ class Tables:
     def claims(self) -> list[tuple[Element, Element]]:
         """Return every behavior that claims an ARC, with the ARC."""
         return [(behavior, arc) for behavior in self.behaviors if (arc := behavior.first("arc")) is not None]
+
+
+def role_of(needed: Element) -> str:
+    """Return the role of a need in its ARC."""
+    return needed.text("role") or needed.text("type")
 
 
 def section(root: Element, tag: str) -> list[Element]:

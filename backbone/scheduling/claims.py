@@ -10,9 +10,6 @@ from collections.abc import Set as AbstractSet
 
 from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
 
-STREAMED_KINDS = frozenset({"command_radio"})
-"""Kinds of RC that an ARC uses by streams; all others exclusively. Source: RAM 2002, "Sharable Resources"."""
-
 
 def scheduling_request(
     arc: str,
@@ -23,7 +20,7 @@ def scheduling_request(
     streams: Sequence[Usage],
     minimum_runtime_s: float,
     maximum_runtime_s: float = 0.0,
-    streamed: AbstractSet[str] = STREAMED_KINDS,
+    sharable: AbstractSet[str] = frozenset(),
     console: bool = False,
     idle: bool = False,
     stops_at_once: bool = False,
@@ -31,26 +28,26 @@ def scheduling_request(
     """Return the request of an ARC.
 
     Args:
-        sets: The sets of RCs that would do, best first: kind → name.
+        sets: The sets of RCs that would do, best first: role → name.
         path: Names and priorities from the mission's root, or of the console alone.
-        streams: Kind of RC → the ARC's streams there.
+        streams: The ARC's streams on each sharable RC.
         minimum_runtime_s: Shortest useful time, seconds.
         maximum_runtime_s: End of all extensions, seconds; 0: the minimum.
-        streamed: Kinds of RC it uses by streams.
+        sharable: Names of the RCs that it uses by streams; all others exclusively.
         console: True if the owner is a console.
         idle: True: no time is wanted yet.
         stops_at_once: True: nothing must be brought to rest at the end of a slice.
     """
 
-    def use(kind: str) -> RcUse:
-        return RcUse(list(streams)) if kind in streamed else RcUse()
+    def use(rc: str) -> RcUse:
+        return RcUse(list(streams)) if rc in sharable else RcUse()
 
     return SchedulingRequest(
         arc=arc,
         owner=owner,
         path=[PathNode(name, priority) for name, priority in path],
         console=console,
-        alternatives=[{rc: use(kind) for kind, rc in rcs.items()} for rcs in sets],
+        alternatives=[{rc: use(rc) for rc in rcs.values()} for rcs in sets],
         minimum_runtime_s=minimum_runtime_s,
         maximum_runtime_s=maximum_runtime_s,
         idle=idle,

@@ -37,7 +37,7 @@ class TypeEntry:
         name: Its name in mission files.
         class_path: The class that runs it.
         role: Its role.
-        needs: Types of resource an ARC needs.
+        needs: Role → type of resource that an ARC needs.
         uses: Types of resource a resource must be tied to.
         is_stock: True: the project ships it.
         is_declared: True: the designed file declares it.
@@ -46,7 +46,7 @@ class TypeEntry:
     name: str
     class_path: str
     role: Role
-    needs: tuple[str, ...]
+    needs: Mapping[str, str]
     uses: tuple[str, ...]
     is_stock: bool
     is_declared: bool
@@ -132,7 +132,7 @@ def _shapes() -> tuple[Node, ...]:
 
 
 def _entry(declared: Node, world_type: str, *, is_stock: bool, is_declared: bool) -> TypeEntry:
-    needs = tuple(needed.text("type") for needed in declared.all("needs"))
+    needs = {needed.text("role") or needed.text("type"): needed.text("type") for needed in declared.all("needs")}
     return TypeEntry(
         declared.text("name"),
         declared.text("class"),
@@ -144,7 +144,7 @@ def _entry(declared: Node, world_type: str, *, is_stock: bool, is_declared: bool
     )
 
 
-def _role(declared: Node, needs: tuple[str, ...], world_type: str) -> Role:
+def _role(declared: Node, needs: Mapping[str, str], world_type: str) -> Role:
     match declared.text("subsystem"):
         case Subsystem.MISSION_CONTROL:
             return Role.BEHAVIOR

@@ -6,7 +6,7 @@ Pure: a tree and an element in, offers out.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -194,21 +194,21 @@ def _claims(mission: Node, node: Node) -> list[Offer]:
 
 
 def _wishes(mission: Node, node: Node) -> list[Offer]:
-    needs = next((one.needs for one in entries(mission) if one.name == node.text("kind")), ())
+    needs: Mapping[str, str] = next((one.needs for one in entries(mission) if one.name == node.text("kind")), {})
     wished = {one.text("type") for one in node.all("wish")}
 
-    def offer(kind: str) -> Offer:
+    def offer(role: str, kind: str) -> Offer:
         there = [one.text("name") for one in mission if one.tag == "resource" and one.text("type") == kind]
         doc = vocabulary()["wish"].attributes["name"].documentation
         asks = (Prompt("name", doc, there[0] if there else "", tuple(there)),)
         return Offer(
-            f"wish {kind}",
+            f"wish {role}",
             vocabulary()["wish"].documentation,
             asks,
-            lambda given: Add(node.path, NewElement("wish", {"type": kind, "name": given[0]})),
+            lambda given: Add(node.path, NewElement("wish", {"type": role, "name": given[0]})),
         )
 
-    return [offer(kind) for kind in needs if kind not in wished]
+    return [offer(role, kind) for role, kind in needs.items() if role not in wished]
 
 
 def _resources(mission: Node) -> list[Offer]:

@@ -89,7 +89,7 @@ def choices(mission: Node, node: Node, attribute: str, words: tuple[str, ...] = 
             return _of_role(mission, Role.RESOURCE)
         case ("wish", "type"):
             arc = mission.at(node.path[:-1])
-            return next((one.needs for one in entries(mission) if one.name == arc.text("kind")), ())
+            return next((tuple(one.needs) for one in entries(mission) if one.name == arc.text("kind")), ())
         case ("wish", "name") | ("uses", "name"):
             resources = mission.first("resources")
             there = [] if resources is None else resources.all("resource")

@@ -85,6 +85,7 @@ class NeedsElement(Declared):
     """A kind of resource an ARC needs one of."""
 
     type: Name = Field(description="The component type of that resource.")
+    role: Name = Field(default="", description="Its role in the ARC; left out: named like the type.")
 
 
 class TypeElement(Declared):
@@ -179,9 +180,9 @@ class ResourcesElement(Declared):
 
 
 class WishElement(Declared):
-    """Which one of a kind the ARC should get: by name, by features, or both. Kinds without a wish: any."""
+    """Which resource the ARC should get for a role: by name, by features, or both. Roles without a wish: any."""
 
-    type: Name = Field(description="The kind of resource, one the ARC needs.")
+    type: Name = Field(description="The role in the ARC: the type of resource, unless its needs element names a role.")
     name: Name = Field(default="", description="Name of the resource wanted.")
     features: Names = Field(default=(), description="Features it must have, as names separated by blanks.")
 

@@ -35,10 +35,12 @@ def test_hardware_survives_the_way_through_a_launch_order(local_mission: Any, be
             bus = network.join("ui_console/asker", clock)
             known = await bus.ask(DEPENDENCY_DATABASE, AskResources(), Resources, within_s=1)
             assert known.resources == sorted(HARDWARE, key=lambda resource: resource.name)
-            found = await bus.ask(DEPENDENCY_DATABASE, FindRcs(["scout", "command_radio"]), RcSets, within_s=1)
+            found = await bus.ask(
+                DEPENDENCY_DATABASE, FindRcs({"scout": "scout", "command_radio": "command_radio"}), RcSets, within_s=1
+            )
             assert found.sets == [{"scout": "scout1", "command_radio": "radio"}]
             with pytest.raises(NoSuchHardware):
-                await bus.ask(DEPENDENCY_DATABASE, FindRcs(["framegrabber"]), RcSets, within_s=1)
+                await bus.ask(DEPENDENCY_DATABASE, FindRcs({"framegrabber": "framegrabber"}), RcSets, within_s=1)
             counted = await bus.ask(DEPENDENCY_DATABASE, AskStatistics(), Statistics, within_s=1)
             assert (counted.values["searches_found"], counted.values["searches_refused"]) == (1.0, 1.0)
             story = await bus.ask(DEPENDENCY_DATABASE, AskStory("ui_console/asker"), Story, within_s=1)

@@ -37,22 +37,24 @@ def hardware(draw: st.DrawFn) -> list[Resource]:
 
 @st.composite
 def wishes(draw: st.DrawFn) -> FindRcs:
-    roles = draw(st.lists(st.sampled_from(KINDS), unique=True, min_size=1))
-    some = st.lists(st.sampled_from(roles), unique=True, max_size=2)
-    wish = {kind: f"{kind}{draw(st.integers(1, 3))}" for kind in draw(some)}
-    features = {kind: draw(st.lists(st.sampled_from(FEATURES), max_size=1)) for kind in draw(some)}
+    roles = draw(st.dictionaries(st.sampled_from(["left", "right", *KINDS]), st.sampled_from(KINDS), min_size=1))
+    some = st.lists(st.sampled_from(list(roles)), unique=True, max_size=2)
+    wish = {role: f"{roles[role]}{draw(st.integers(1, 3))}" for role in draw(some)}
+    features = {role: draw(st.lists(st.sampled_from(FEATURES), max_size=1)) for role in draw(some)}
     return FindRcs(roles, wish, features)
 
 
 def every_fitting_set(resources: list[Resource], wanted: FindRcs) -> list[dict[str, str]]:
     """Say the same by trying all combinations."""
-    by_kind = [[resource for resource in resources if resource.type == role] for role in wanted.roles]
+    by_role = [[resource for resource in resources if resource.type == kind] for kind in wanted.roles.values()]
+    sets = [dict(zip(wanted.roles, chosen, strict=True)) for chosen in product(*by_role)]
     return [
-        {one.type: one.name for one in chosen}
-        for chosen in product(*by_kind)
-        if all(wanted.wish.get(one.type, one.name) == one.name for one in chosen)
-        and all(set(wanted.features.get(one.type, [])) <= set(one.features) for one in chosen)
-        and all(b.name in a.links[b.type] for a in chosen for b in chosen if b.type in a.links)
+        {role: one.name for role, one in found.items()}
+        for found in sets
+        if all(wanted.wish.get(role, one.name) == one.name for role, one in found.items())
+        and all(set(wanted.features.get(role, [])) <= set(one.features) for role, one in found.items())
+        and len({one.name for one in found.values()}) == len(found)
+        and all(b.name in a.links[b.type] for a in found.values() for b in found.values() if b.type in a.links)
     ]
 
 
@@ -83,7 +85,11 @@ def iros2001() -> Inventory:
     return Inventory([*scouts, Resource("radio", "command_radio", sharable=True), *channels, *grabbers])
 
 
-CAPTURE = ["scout", "command_radio", "video_frequency", "framegrabber"]
+def kinds(*names: str) -> dict[str, str]:
+    return {name: name for name in names}
+
+
+CAPTURE = kinds("scout", "command_radio", "video_frequency", "framegrabber")
 
 
 def test_any_scout_comes_with_the_frequency_and_grabber_it_can_be_seen_through() -> None:
@@ -101,15 +107,18 @@ def test_any_scout_comes_with_the_frequency_and_grabber_it_can_be_seen_through()
 @pytest.mark.parametrize(
     ("wanted", "told"),
     [
-        (FindRcs(["scuot"]), r"no 'scuot' exists \(did you mean 'scout'\?\)"),
-        (FindRcs(["scout"], {"scout": "scuot2"}), r"no scout is named 'scuot2' \(did you mean 'scout2'\?\)"),
-        (FindRcs(["scout"], {"scot": "scout2"}), r"the wish names 'scot' \(did you mean 'scout'\?\)"),
-        (FindRcs(["scout"], {}, {"radio": ["x"]}), "the features names 'radio'"),
-        (FindRcs(["scout"], {}, {"scout": ["camrea"]}), r"no scout has 'camrea' \(did you mean 'camera'\?\)"),
-        (FindRcs(["scout"], {}, {"scout": ["camera", "gripper"]}), "no scout has all of camera, gripper"),
-        (FindRcs(["scout"], {"scout": "scout3"}, {"scout": ["camera"]}), "scout3 has no 'camera'"),
-        (FindRcs(["scout", "scout"]), "asked for twice"),
-        (FindRcs([]), "no kind of hardware"),
+        (FindRcs(kinds("scuot")), r"no 'scuot' exists \(did you mean 'scout'\?\)"),
+        (FindRcs(kinds("scout"), {"scout": "scuot2"}), r"no scout is named 'scuot2' \(did you mean 'scout2'\?\)"),
+        (FindRcs(kinds("scout"), {"scot": "scout2"}), r"the wish names 'scot' \(did you mean 'scout'\?\)"),
+        (FindRcs(kinds("scout"), {}, {"radio": ["x"]}), "the features names 'radio'"),
+        (FindRcs(kinds("scout"), {}, {"scout": ["camrea"]}), r"no scout has 'camrea' \(did you mean 'camera'\?\)"),
+        (FindRcs(kinds("scout"), {}, {"scout": ["camera", "gripper"]}), "no scout has all of camera, gripper"),
+        (FindRcs(kinds("scout"), {"scout": "scout3"}, {"scout": ["camera"]}), "scout3 has no 'camera'"),
+        (
+            FindRcs({"left": "framegrabber", "right": "framegrabber", "third": "framegrabber"}),
+            "too few of kind framegrab",
+        ),
+        (FindRcs({}), "no kind of hardware"),
         (
             FindRcs(CAPTURE, {"scout": "scout1", "framegrabber": "grabber2"}),
             r"no framegrabber goes together with scout, command_radio, video_frequency as wished "
@@ -125,4 +134,16 @@ def test_a_refusal_names_the_part_of_the_wish_that_nothing_fits(wanted: FindRcs,
 
 def test_a_runaway_number_of_sets_is_cut_off() -> None:
     many = [Resource(f"{kind}{n}", kind) for kind in ("a", "b", "c") for n in range(20)]
-    assert len(Inventory(many).find(FindRcs(["a", "b", "c"]))) == MOST_SETS
+    assert len(Inventory(many).find(FindRcs(kinds("a", "b", "c")))) == MOST_SETS
+
+
+def test_a_set_has_a_different_rc_for_each_role_of_one_kind() -> None:
+    eyes = Inventory([Resource("eye1", "camera"), Resource("eye2", "camera")])
+    assert eyes.find(FindRcs({"left": "camera", "right": "camera"}, {"left": "eye2"})) == [
+        {"left": "eye2", "right": "eye1"}
+    ]
+
+
+def test_the_sharable_rcs_of_a_set_are_those_of_the_mission_file() -> None:
+    inventory = iros2001()
+    assert inventory.sharable(inventory.find(FindRcs(CAPTURE))) == {"radio"}

@@ -39,7 +39,8 @@ def mission(
 
     def component_type(name: str, needs: list[str] | None = None) -> ComponentType:
         subsystem = Subsystem.MISSION_CONTROL if name == "watch" else Subsystem.RESOURCE_POOL
-        return ComponentType(name, "some.module:Class", subsystem, tags=types.get(name, []), needs=needs or [])
+        roles = {kind: kind for kind in needs or []}
+        return ComponentType(name, "some.module:Class", subsystem, tags=types.get(name, []), needs=roles)
 
     return MissionDescription(
         name="m",

@@ -279,7 +279,9 @@ def test_a_new_kind_of_hardware_needs_no_other_schema(tmp_path: Path) -> None:
         ),
     )
     assert description.resources[-1].features == ["long-range"]
-    assert next(kind.needs for kind in description.types if kind.name == "drive") == ["scout", "lidar", "command_radio"]
+    assert next(kind.needs for kind in description.types if kind.name == "drive") == {
+        kind: kind for kind in ("scout", "lidar", "command_radio")
+    }
     assert description.behaviors[1].arc is not None
     assert description.behaviors[1].arc.features == {"lidar": ("long-range",)}
 
@@ -352,7 +354,7 @@ def test_a_type_takes_the_place_of_the_shipped_one_of_its_name(tmp_path: Path) -
     own = '<type name="drive" class="backbone.component.component:Component" subsystem="resource_pool"/>'
     mission = read_text(tmp_path, f'<mission name="m" priority="1"><types>{own}</types></mission>')
     [drive] = [kind for kind in mission.types if kind.name == "drive"]
-    assert (drive.class_path, drive.needs, drive.restart) == ("backbone.component.component:Component", [], True)
+    assert (drive.class_path, drive.needs, drive.restart) == ("backbone.component.component:Component", {}, True)
 
 
 def test_every_host_runs_a_creator_and_the_first_the_other_services(tmp_path: Path) -> None:
