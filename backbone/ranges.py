@@ -104,6 +104,8 @@ Share = Annotated[float, Meta(ge=0, le=1)]
 """A share of a whole, 0 to 1."""
 Meters = Annotated[float, Meta(ge=-1e6, le=1e6)]  # chosen: a thousand kilometres from the corner of the room
 Radians = Annotated[float, Meta(ge=-1e6, le=1e6)]  # chosen: a heading may count turns
+Speed = Annotated[float, Meta(ge=-100, le=100)]  # chosen: m/s, three hundred times a Scout's; RCs clip
+TurnRate = Annotated[float, Meta(ge=-1e3, le=1e3)]  # chosen: rad/s, a hundred times a Scout's; RCs clip
 WheelSpeed = Annotated[float, Meta(ge=-1e4, le=1e4)]  # chosen: a hundred times a Scout's; RCs clip
 Measure = Annotated[float, Meta(ge=-1e18, le=1e18)]
 """A number whose meaning is in its name: statistics, facts."""

@@ -22,6 +22,7 @@ from scout_model.camera import Camera
 from scout_model.description import CLEAN_AIR, AirDescription, Landmark, ScoutPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, WHEEL_SPEED_LIMIT_RAD_S
 from scout_model.radio_link import encode_drive
+from scout_model.scout import wheels_rad_s
 from scout_model.video_link import Receiver, Signal
 from scout_model.world import World
 
@@ -70,8 +71,8 @@ def run(seed: int, air: AirDescription, *, limit_s: float = LIMIT_S) -> Trial:
     step = None
     with Camera(world.mjcf, "paint") as camera:
         while world.time_s < limit_s and servo.stage is not Stage.ARRIVED:
-            left_rad_s, right_rad_s = sent.pop(0).wheels_rad_s()
-            world.hear(1, encode_drive(left_rad_s, right_rad_s))
+            now = sent.pop(0)
+            world.hear(1, encode_drive(*wheels_rad_s(now.forward_m_s, now.turn_rad_s)))
             world.step_frame()
             camera.show(world.state())
             step = servo.see(_received(receiver, world, camera), 1 / FRAMES_PER_S)

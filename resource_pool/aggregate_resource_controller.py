@@ -19,6 +19,7 @@ import msgspec
 
 from backbone.addresses import DEPENDENCY_DATABASE, RC_MANAGER
 from backbone.bus.interface import Bus, Clock
+from backbone.component.abilities import Abilities, command_form
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
 from backbone.component.launch import Launch
@@ -46,7 +47,7 @@ from backbone.rc_manager.messages import (
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_request import ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
-from resource_pool.commands import Command
+from resource_pool.commands import OF_THE_BASE, Command, command_of
 from resource_pool.gate import Gate
 from resource_pool.messages import (
     Accepted,
@@ -55,6 +56,7 @@ from resource_pool.messages import (
     ArcState,
     AskArc,
     AskBeat,
+    GiveCommand,
     NeedsRestart,
     NoSuchAction,
     Noted,
@@ -93,6 +95,8 @@ class AggregateResourceController(Component[ArcParameters]):
     """Commands of its owner, each with the role of the RC that obeys it; several roles: the command names one."""
     body: ClassVar[str] = ""
     """Role of the RC that has a body, which operators can stop; empty: none."""
+    gives_pictures: ClassVar[bool] = False
+    """True if pictures of its robot are published under its address."""
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
@@ -125,6 +129,24 @@ class AggregateResourceController(Component[ArcParameters]):
         """
 
     # ------------------------------------------------------------------ for derived classes
+    @classmethod
+    def abilities(cls) -> Abilities:
+        """Return the commands that it passes on, see ``Component``."""
+        return Abilities(
+            gives_pictures=cls.gives_pictures,
+            body=cls.body,
+            commands=[
+                command_form(kind, kind.word(), moves=kind.moves, without=OF_THE_BASE, roles=cls.roles_of(kind))
+                for kind in cls.commands
+            ],
+        )
+
+    @classmethod
+    def roles_of(cls, command: type[Command]) -> list[str]:
+        """Return the roles of the RCs that obey this command."""
+        able = cls.commands[command]
+        return [able] if isinstance(able, str) else list(able)
+
     @classmethod
     def kinds(cls) -> dict[str, str]:
         """Return role → kind of RC of its set."""
@@ -209,6 +231,8 @@ class AggregateResourceController(Component[ArcParameters]):
                 raise NotYours(f"{self.name} belongs to {self._owner}, not to {asked.source}", owner=self._owner)
             case Command() as command:
                 return await self._command(command)
+            case GiveCommand() as order:
+                return await self._command(self._command_by_word(order))
             case WantIdle(idle=idle):
                 await self._placed.change(SetIdle(self.name, idle), idle=idle)
             case WantRuntime(minimum_runtime_s=least, maximum_runtime_s=most):
@@ -345,9 +369,15 @@ class AggregateResourceController(Component[ArcParameters]):
         self._commands += 1
         return await self.tell_rc(role, epoch, command)
 
+    def _command_by_word(self, order: GiveCommand) -> Command:
+        for kind in self.commands:
+            if kind.word() == order.word:
+                return command_of(kind, order.values, role=order.role, after_stop=order.after_stop)
+        known = ", ".join(kind.word() for kind in self.commands)
+        raise NoSuchAction(f"{self.launch.type} has no command {order.word}; it has: {known}", command=order.word)
+
     def _role_of(self, command: Command) -> str:
-        able = self.commands[type(command)]
-        roles = [able] if isinstance(able, str) else list(able)
+        roles = self.roles_of(type(command))
         if command.role not in ([*roles, ""] if len(roles) == 1 else roles):
             which = f"no {command.role} that obeys" if command.role else "several RCs that obey"
             raise NoSuchAction(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import msgspec
@@ -24,7 +24,7 @@ from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
 from resource_pool.arc_request import claim_parameters
-from resource_pool.commands import Command, Drive, Halt, Jump
+from resource_pool.commands import Command, Drive, Halt, Jump, Move
 from resource_pool.drivers.world_messages import AskPose, Pose
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
@@ -35,6 +35,7 @@ from resource_pool.messages import (
     AskArc,
     AskBeat,
     Frame,
+    GiveCommand,
     NoSuchAction,
     Noted,
     Release,
@@ -220,12 +221,21 @@ class ArcClient:
         if command.moves:
             command = msgspec.structs.replace(command, after_stop=self._last_stop())
         try:
-            return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)
-        except EmergencyStopped as stopped:
-            self._stops.refused(stopped)
-            raise
+            return await self._ask(command)
         except UnknownMessage as unknown:
             raise NoSuchAction(f"{self.arc} has no command {command.word()}", command=command.word()) from unknown
+
+    async def give(self, word: str, values: Mapping[str, object], role: str = "") -> Applied:
+        """Send a command by its word; see ``command``.
+
+        Raises:
+            WrongCommand: The values do not fit the command's fields.
+        """
+        return await self._ask(GiveCommand(word, dict(values), role, self._last_stop()))
+
+    async def move(self, forward_m_s: float, turn_rad_s: float = 0.0) -> Applied:
+        """Move forward, and turn left; see ``command``."""
+        return await self.command(Move(forward_m_s, turn_rad_s))
 
     async def drive(self, left_rad_s: float, right_rad_s: float) -> Applied:
         """Turn the wheels; return the speeds that were applied after clipping; see ``command``."""
@@ -338,6 +348,13 @@ class ArcClient:
 
     def _last_stop(self) -> int:
         return self._stops.number(self.granted.robot) if self.granted is not None else 0
+
+    async def _ask(self, command: Message) -> Applied:
+        try:
+            return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)
+        except EmergencyStopped as stopped:
+            self._stops.refused(stopped)
+            raise
 
     async def _request(self, wish: Message) -> None:
         await self._bus.ask(self.address, wish, Accepted, within_s=REPLY_TIME_S)

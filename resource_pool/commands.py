@@ -8,11 +8,13 @@ values, or is the refusal ``StaleEpoch``.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import ClassVar, Self
 
 import msgspec
 
-from backbone.ranges import Count, Epoch, Mention, WheelSpeed
+from backbone.errors import Refusal
+from backbone.ranges import Count, Epoch, Mention, Speed, TurnRate, WheelSpeed
 from backbone.wire import Message
 
 
@@ -47,6 +49,53 @@ class Command(Message, frozen=True, kw_only=True):
     def under(self, arc: str, epoch: int) -> Self:
         """Return this command under a grant to an ARC."""
         return msgspec.structs.replace(self, arc=arc, epoch=epoch)
+
+
+OF_THE_BASE = Command.__struct_fields__
+"""Fields that the ARC and its client fill in, not the person or behavior that commands."""
+
+
+class WrongCommand(Refusal):
+    """A command by its word has a field that the command lacks, lacks a field, or has a value out of range."""
+
+    code = "arc.wrong_command"
+    remedy = "Give the fields of this command within their ranges; 'scout-backbone components' lists them."
+
+
+def command_of(kind: type[Command], values: Mapping[str, object], *, role: str, after_stop: int) -> Command:
+    """Return the command of a class with these values.
+
+    Raises:
+        WrongCommand: The values do not fit the command's fields.
+    """
+    fields = [field for field in msgspec.structs.fields(kind) if field.name not in OF_THE_BASE]
+    if unknown := sorted(values.keys() - {field.name for field in fields}):
+        known = ", ".join(field.name for field in fields) or "none"
+        raise WrongCommand(f"{kind.word()} has no field {unknown[0]}; its fields: {known}", field=unknown[0])
+    missing = [field.name for field in fields if field.required and field.name not in values]
+    if missing:
+        raise WrongCommand(f"{kind.word()} needs a value of {missing[0]}", field=missing[0])
+    given = [values.get(field.name, field.default) for field in fields]
+    try:
+        return msgspec.convert([kind.__struct_config__.tag, *given, role, after_stop], kind)
+    except msgspec.ValidationError as error:
+        raise WrongCommand(f"{kind.word()}: {error}") from None
+
+
+class Move(Command, frozen=True):
+    """Move forward and turn at these speeds from now on, until another command or ``COMMAND_TIMEOUT_S``.
+
+    Every kind of robot that moves obeys it.
+
+    Attributes:
+        forward_m_s: Along its heading; negative is backward.
+        turn_rad_s: To the left; negative is to the right.
+    """
+
+    forward_m_s: Speed
+    turn_rad_s: TurnRate = 0.0
+
+    moves: ClassVar[bool] = True
 
 
 class Drive(Command, frozen=True, tag="Drive/2"):

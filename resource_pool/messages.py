@@ -24,12 +24,29 @@ from backbone.ranges import (
     Pixels,
     RunTime,
     Text,
+    Values,
 )
 from backbone.scheduling.requests import Usage
 from backbone.wire import Message
 
 
 # ---------------------------------------------------------------------- decision process → ARC
+class GiveCommand(Message, frozen=True):
+    """Send a command by its word, for owners that do not know its class.
+
+    Attributes:
+        word: Word of one of the ARC's commands.
+        values: Field → value; fields left out have their defaults.
+        role: Role of the RC that obeys it; empty: the only one.
+        after_stop: Number of the robot's last stop whose lift the sender knows; 0: no stop.
+    """
+
+    word: Mention
+    values: Values = {}
+    role: Mention = ""
+    after_stop: Count = 0
+
+
 class WantIdle(Message, frozen=True):
     """Want no time (True), or want time again (False)."""
 
@@ -109,7 +126,7 @@ class Applied(Message, frozen=True):
     values: Annotated[dict[Mention, Measure], FEW] = {}
 
 
-ArcQuestion = WantIdle | WantRuntime | WantLonger | Release | AskArc
+ArcQuestion = GiveCommand | WantIdle | WantRuntime | WantLonger | Release | AskArc
 
 
 # ---------------------------------------------------------------------- ARC → decision process

@@ -19,6 +19,7 @@ import msgspec
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
+from backbone.component.abilities import Abilities, command_form, field_forms
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
@@ -39,8 +40,8 @@ from backbone.rc_manager.messages import (
     most_epoch,
 )
 from backbone.scheduling.requests import Holder, Lease
-from backbone.wire import Accepts, Envelope, Message, UnknownMessage
-from resource_pool.commands import Command
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of
+from resource_pool.commands import OF_THE_BASE, Command
 from resource_pool.drivers.interface import (
     AdjustableDriver,
     DriverSite,
@@ -88,6 +89,12 @@ class ResourceController(Component[R], Generic[R]):
     given_elsewhere: ClassVar[frozenset[str]] = frozenset({"driver", "sharable", "capacity", "links", "options"})
     commands: ClassVar[Accepts | None] = None
     """Commands of this kind of RC: classes derived from ``Command``, or other messages for ``command``."""
+    limits: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Field of its commands → smallest and largest value that the hardware obeys, if narrower than the field's."""
+    reports: ClassVar[type[msgspec.Struct] | None] = None
+    """Struct of its reports; None: it reports nothing but its state."""
+    is_robot: ClassVar[bool] = False
+    """True if it has a body, and operators can stop it."""
     driver_kind: ClassVar[str] = ""
     """Kind of its driver; empty: it has no driver."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
@@ -114,6 +121,19 @@ class ResourceController(Component[R], Generic[R]):
         self._drivers: list[Any] = []
         self._changing = asyncio.Lock()
         self._lease_changed = asyncio.Event()
+
+    @classmethod
+    def abilities(cls) -> Abilities:
+        """Return its commands and reports, see ``Component``."""
+        return Abilities(
+            is_robot=cls.is_robot,
+            commands=[
+                command_form(kind, kind.word(), moves=kind.moves, without=OF_THE_BASE, limits=cls.limits)
+                for kind in (kinds_of(cls.commands) if cls.commands is not None else ())
+                if issubclass(kind, Command)
+            ],
+            reports=field_forms(cls.reports) if cls.reports is not None else [],
+        )
 
     @classmethod
     def driver_options(cls) -> dict[str, type[msgspec.Struct]] | None:

@@ -25,6 +25,8 @@ from scout_model.dimensions import (
     FOOT_STROKE_M,
     KICK_S,
     PRELOAD_S,
+    TRACK_M,
+    WHEEL_RADIUS_M,
     WHEEL_SPEED_LIMIT_RAD_S,
     WINCH_SPEED_M_S,
 )
@@ -83,6 +85,17 @@ def clip_wheel_speed(speed_rad_s: float) -> float:
         -17.5
     """
     return max(-WHEEL_SPEED_LIMIT_RAD_S, min(WHEEL_SPEED_LIMIT_RAD_S, speed_rad_s))
+
+
+def wheels_rad_s(forward_m_s: float, turn_rad_s: float) -> tuple[float, float]:
+    """Return the speeds of the left and the right wheel that give this motion; left turns are positive.
+
+    Example:
+        >>> wheels_rad_s(0.2, 0.0)
+        (10.0, 10.0)
+    """
+    side_m_s = turn_rad_s * TRACK_M / 2
+    return (forward_m_s - side_m_s) / WHEEL_RADIUS_M, (forward_m_s + side_m_s) / WHEEL_RADIUS_M
 
 
 class Firmware:

@@ -22,6 +22,7 @@ from backbone.addresses import NAMESERVER
 from backbone.authentication import secret_of
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.abilities import NO_ABILITIES, Abilities
 from backbone.component.asking import ask_until_answered
 from backbone.component.launch import Launch
 from backbone.component.messages import (
@@ -106,6 +107,11 @@ class Component(Generic[P_co]):
     def driver_options(cls) -> dict[str, type[msgspec.Struct]] | None:
         """Return the additional parameters of each built-in driver; None: the class uses no driver."""
         return None
+
+    @classmethod
+    def abilities(cls) -> Abilities:
+        """Return what its components can be commanded to do, and what they report."""
+        return NO_ABILITIES
 
     @classmethod
     def before_bus(cls, launch: Launch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Annotated
 
+from backbone.component.abilities import NO_ABILITIES, Abilities
 from backbone.errors import Refusal
 from backbone.naming import Subsystem
 from backbone.ranges import FEW, MANY, Count, Line, Mention
@@ -31,6 +32,7 @@ class ComponentType(Message, frozen=True, tag="ComponentType/2"):
         restart: True if the creator restarts its components after every end without an order; False: the owner must ask
             for a new start.
         needs: Role → kind of RC that an ARC holds; empty if it is no ARC type.
+        abilities: What its components can be commanded to do, and what they report.
     """
 
     name: Mention
@@ -41,6 +43,7 @@ class ComponentType(Message, frozen=True, tag="ComponentType/2"):
     tags: Annotated[list[Mention], FEW] = []
     restart: bool = True
     needs: Annotated[dict[Mention, Mention], FEW] = {}
+    abilities: Abilities = NO_ABILITIES
 
 
 class Admit(Message, frozen=True):

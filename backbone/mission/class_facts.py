@@ -12,6 +12,8 @@ from typing import Annotated, Any, Literal, Union
 
 import msgspec
 
+from backbone.component.abilities import NO_ABILITIES, Abilities
+
 SHIPPED = "shipped_classes.json"
 
 _LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
@@ -93,6 +95,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
         options: Driver → what can be given besides, while this driver is used; None: the class uses no driver.
         has_rules: Whether it has rules for its parameters besides their types; only the class itself can judge by them.
         failure: Why the facts are unknown; empty: they are known.
+        abilities: What its components can be commanded to do, and what they report.
     """
 
     doc: str = ""
@@ -100,6 +103,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     options: dict[str, tuple[ParameterFacts, ...]] | None = None
     has_rules: bool = False
     failure: str = ""
+    abilities: Abilities = NO_ABILITIES
 
     def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
         """Return all that can be given while this driver is used; None if nothing is known of the driver."""

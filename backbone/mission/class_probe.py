@@ -5,16 +5,14 @@ from __future__ import annotations
 import importlib
 import inspect
 import os
-import re
 import sys
 from collections.abc import Sequence
 
 import msgspec
 
 from backbone.component.component import Component
+from backbone.component.field_docs import field_docs
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
-
-_ENTRY = re.compile(r"^    (\w+): (.*)$")
 
 
 def facts_of(class_path: str) -> ClassFacts:
@@ -33,32 +31,13 @@ def facts_of(class_path: str) -> ClassFacts:
         own,
         None if options is None else {driver: _documented(struct) for driver, struct in options.items()},
         hasattr(found.parameters_type, "__post_init__"),
+        abilities=found.abilities(),
     )
 
 
 def _documented(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
-    docs = _documentation(struct)
-    found = parameters_of(struct)
-    return tuple(
-        msgspec.structs.replace(one, doc=one.doc or docs.get(one.name, "").replace("``", "'")) for one in found
-    )
-
-
-def _documentation(struct: type) -> dict[str, str]:
-    """Return what the docstrings of a struct and its bases say of each field."""
-    found: dict[str, str] = {}
-    for base in reversed(struct.__mro__):
-        _, _, section = inspect.cleandoc(base.__dict__.get("__doc__") or "").partition("Attributes:\n")
-        name = ""
-        for line in section.splitlines():
-            if entry := _ENTRY.match(line):
-                name = entry[1]
-                found[name] = entry[2]
-            elif name and line.startswith("        "):
-                found[name] += " " + line.strip()
-            else:
-                name = ""
-    return found
+    docs = field_docs(struct)
+    return tuple(msgspec.structs.replace(one, doc=one.doc or docs.get(one.name, "")) for one in parameters_of(struct))
 
 
 def refusal(question: Question) -> str:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from backbone.component.abilities import NO_ABILITIES
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.elements import (
     ArcAttributes,
     ArcElement,
@@ -29,8 +31,12 @@ from backbone.mission.room_files import room_text
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, parameter_value
 
 
-def describe(mission: MissionElement, source: str) -> MissionDescription:
-    """Return the description of a mission without faults."""
+def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFacts]) -> MissionDescription:
+    """Return the description of a mission without faults.
+
+    Args:
+        classes: Class path → what is known of the class.
+    """
     hosts = () if mission.hosts is None else mission.hosts.host
     world = mission.world
     resources = () if mission.resources is None else mission.resources.resource
@@ -41,7 +47,7 @@ def describe(mission: MissionElement, source: str) -> MissionDescription:
         priority=mission.priority,
         hosts=hosts,
         core=_core(mission, [host.name for host in hosts]),
-        types=() if mission.types is None else tuple(map(_component_type, mission.types.type)),
+        types=() if mission.types is None else tuple(_component_type(one, classes) for one in mission.types.type),
         resources=tuple(_resource(resource, world, host_of_process) for resource in resources),
         components=() if world is None else (_world(world, resources, source, host_of_process),),
         behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
@@ -61,7 +67,8 @@ def _core(mission: MissionElement, hosts: Sequence[str]) -> tuple[CoreServiceDes
     return tuple(sorted(services, key=lambda one: (CORE_SERVICES.index(one.type), hosts.index(one.host))))
 
 
-def _component_type(declared: TypeElement) -> ComponentType:
+def _component_type(declared: TypeElement, classes: Mapping[str, ClassFacts]) -> ComponentType:
+    facts = classes.get(declared.class_path)
     return ComponentType(
         name=declared.name,
         class_path=declared.class_path,
@@ -71,6 +78,7 @@ def _component_type(declared: TypeElement) -> ComponentType:
         tags=list(declared.tags),
         restart=declared.restart,
         needs={needed.role or needed.type: needed.type for needed in declared.needs},
+        abilities=NO_ABILITIES if facts is None else facts.abilities,
     )
 
 

@@ -52,20 +52,19 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
     """
     report = Report(source)
     root, mission = parse(data, report), None
+    known: Mapping[str, ClassFacts] = {}
     if root is not None and repair(root, report):
         complete(root)
         mission = validated(root, report)
         fill_defaults(root)
+        known = known_classes(root) if classes is None else {**classes, **shipped_classes()}
+        check(root, known, report)
         if classes is None:
-            known = known_classes(root)
-            check(root, known, report)
             _check_rules(root, known, report)
-        else:
-            check(root, {**classes, **shipped_classes()}, report)
     faults = report.faults()
     if faults or mission is None:
         raise MissionInvalid(faults)
-    return describe(mission, source)
+    return describe(mission, source, known)
 
 
 def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:

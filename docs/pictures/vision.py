@@ -19,6 +19,7 @@ from mission_control.vision.visual_servo import VisualServo
 from scout_model.camera import Camera
 from scout_model.description import AS_THE_PAPERS, Landmark, ScoutPlace, Target, WorldDescription
 from scout_model.radio_link import encode_drive
+from scout_model.scout import wheels_rad_s
 from scout_model.video_link import Receiver, Signal
 from scout_model.world import World
 
@@ -48,7 +49,8 @@ def approach() -> tuple[Image, Image]:
     cv2.drawMarker(way, _above(BOARD.x_m - STOP_M, BOARD.y_m), (0, 0, 0), cv2.MARKER_TILTED_CROSS, 12, 2)
     with Camera(world.mjcf, "paint") as camera:
         while servo.stage is not Stage.ARRIVED and world.time_s < 120:
-            world.hear(1, encode_drive(*sent.pop(0).wheels_rad_s()))
+            now = sent.pop(0)
+            world.hear(1, encode_drive(*wheels_rad_s(now.forward_m_s, now.turn_rad_s)))
             world.step_frame()
             camera.show(world.state())
             picture = receiver.receive([Signal(camera.picture("scout"), "scout", motors=0.3)], world.frame).picture

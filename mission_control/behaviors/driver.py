@@ -59,8 +59,8 @@ class Driver(Behavior[D]):
         return self.arc
 
     async def move(self, motion: Motion) -> None:
-        """Turn the wheels for this motion, until the next call or for half a second."""
-        await self.held.drive(*motion.wheels_rad_s())
+        """Move like this, until the next call or for half a second."""
+        await self.held.move(motion.forward_m_s, motion.turn_rad_s)
 
     async def locate(self, localizer: str, robot: str) -> Position:
         """Return the position of the robot, as the localizer tracks it from above the room.

@@ -12,8 +12,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-WHEEL_RADIUS_M = 0.020  # RAM 2002, "Robots for Surveillance and Reconnaissance": 4 cm in diameter
-TRACK_M = 0.098  # chosen: between the middles of the wheels of a body 11 cm long; equals scout_model.dimensions
 MOST_M_S = 0.30  # chosen: below the 0.35 m/s of the motors, so that a wheel is left to steer with
 MOST_RAD_S = 1.5  # chosen: a quarter turn a second; ten decisions a second turn it 9 degrees at most in between
 TURN_PER_S = 2.5  # chosen: an error of heading shrinks to a tenth in a second, without swinging over at ten decisions
@@ -52,16 +50,6 @@ class Motion:
 
     forward_m_s: float = 0.0
     turn_rad_s: float = 0.0
-
-    def wheels_rad_s(self) -> tuple[float, float]:
-        """Return the speeds of the left and the right wheel that give this motion.
-
-        Example:
-            >>> Motion(forward_m_s=0.2).wheels_rad_s()
-            (10.0, 10.0)
-        """
-        side_m_s = self.turn_rad_s * TRACK_M / 2
-        return (self.forward_m_s - side_m_s) / WHEEL_RADIUS_M, (self.forward_m_s + side_m_s) / WHEEL_RADIUS_M
 
 
 STILL = Motion()

@@ -143,7 +143,7 @@ class Servo(Driver[S]):
 
     async def follow(self, robot: str, step: ServoStep) -> None:
         """Send the command of a picture's decision, and report it."""
-        await self.held.drive(*step.command.wheels_rad_s())
+        await self.held.move(step.command.forward_m_s, step.command.turn_rad_s)
         self.report(f"{robot} {step.stage}, {step.track.phase}, {self._servo.approaches} approaches until now")
 
     def has_searched(self, turns: float) -> bool:

@@ -67,16 +67,6 @@ class Command:
     forward_m_s: float
     turn_rad_s: float
 
-    def wheels_rad_s(self, track_m: float = 0.098, wheel_radius_m: float = 0.02) -> tuple[float, float]:
-        """Return the speeds of the left and right wheel; the default sizes are the Scout's.
-
-        Example:
-            >>> Command(0.2, 0.0).wheels_rad_s()
-            (10.0, 10.0)
-        """
-        half_m_s = self.turn_rad_s * track_m / 2
-        return (self.forward_m_s - half_m_s) / wheel_radius_m, (self.forward_m_s + half_m_s) / wheel_radius_m
-
 
 HALT = Command(0.0, 0.0)
 

@@ -21,6 +21,7 @@ class CaptureArc(VideoDriveArc):
     """A robot, its radio and video frequency, and a framegrabber tuned to it; frames go out under its address."""
 
     roles: ClassVar[Sequence[str]] = (*VideoDriveArc.roles, "framegrabber")
+    gives_pictures = True
     accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:

@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from resource_pool.aggregate_resource_controller import AggregateResourceController
-from resource_pool.commands import Command, Drive, Halt, Jump
+from resource_pool.commands import Command, Drive, Halt, Jump, Move
 
 
 class DriveArc(AggregateResourceController):
     """A robot and a share of its command radio."""
 
     roles: ClassVar[Sequence[str]] = ("scout", "command_radio")
-    commands: ClassVar[Mapping[type[Command], str]] = {Drive: "scout", Halt: "scout", Jump: "scout"}
+    commands: ClassVar[Mapping[type[Command], str]] = dict.fromkeys((Move, Drive, Halt, Jump), "scout")
     body: ClassVar[str] = "scout"

@@ -6,13 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from resource_pool.arcs.drive import DriveArc
+from resource_pool.commands import Command
 from resource_pool.rcs.skeleton import Shine
 
 
 class LitDriveArc(DriveArc):
-    """The set of ``DriveArc`` and a lamp, which shines during a grant."""
+    """The set of ``DriveArc`` and a lamp, which shines during a grant as brightly as its owner says."""
 
     roles: ClassVar[Sequence[str]] = (*DriveArc.roles, "lamp")
+    commands: ClassVar[Mapping[type[Command], str]] = {**DriveArc.commands, Shine: "lamp"}
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the lamp on; the lamp's RC switches it off when the set is given back."""

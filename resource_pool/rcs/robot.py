@@ -70,6 +70,7 @@ class Robot(ResourceController[P], Generic[P]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RobotParameters
     driver_kind = "robot"
+    is_robot = True
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)

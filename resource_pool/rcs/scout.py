@@ -7,12 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import ClassVar
 
 from backbone.errors import Refusal
-from resource_pool.commands import Command, Drive, Halt, Jump, SwitchTransmitter
+from resource_pool.commands import Command, Drive, Halt, Jump, Move, SwitchTransmitter
 from resource_pool.drivers.interface import ScoutProtocol
 from resource_pool.holds import Hold
 from resource_pool.rcs.robot import Robot, RobotParameters
+from scout_model.dimensions import TRACK_M, WHEEL_RADIUS_M, WHEEL_SPEED_LIMIT_RAD_S
+from scout_model.scout import wheels_rad_s
+
+MOST_M_S = WHEEL_SPEED_LIMIT_RAD_S * WHEEL_RADIUS_M
+MOST_TURN_RAD_S = 2 * MOST_M_S / TRACK_M
 
 
 class NotFinite(Refusal):
@@ -25,20 +31,31 @@ class NotFinite(Refusal):
 class Scout(Robot[RobotParameters]):
     """Two wheels and a spring foot."""
 
-    commands = Drive | Halt | Jump | SwitchTransmitter
+    commands = Move | Drive | Halt | Jump | SwitchTransmitter
+    limits: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "forward_m_s": (-MOST_M_S, MOST_M_S),
+        "turn_rad_s": (-MOST_TURN_RAD_S, MOST_TURN_RAD_S),
+        "left_rad_s": (-WHEEL_SPEED_LIMIT_RAD_S, WHEEL_SPEED_LIMIT_RAD_S),
+        "right_rad_s": (-WHEEL_SPEED_LIMIT_RAD_S, WHEEL_SPEED_LIMIT_RAD_S),
+    }
     _protocol: ScoutProtocol
 
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
-        """Drive, halt, jump, or switch the transmitter."""
+        """Move, drive, halt, jump, or switch the transmitter."""
         match order:
-            case Drive(left_rad_s=left, right_rad_s=right) if not (math.isfinite(left) and math.isfinite(right)):
-                raise NotFinite(f"{self.name}: wheel speeds {left} and {right} rad/s")
+            case Move(forward_m_s=forward, turn_rad_s=turn):
+                return await self._turn_wheels(hold, order, *wheels_rad_s(forward, turn))
             case Drive(left_rad_s=left, right_rad_s=right):
-                left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
-                await self.move(hold, order, self._protocol.drive(left, right), is_moving=bool(left or right))
-                return {"left_rad_s": left, "right_rad_s": right}
+                return await self._turn_wheels(hold, order, left, right)
             case Jump():
                 await self.move_once(hold, order, self._protocol.jump(), "jump")
                 return {}
             case _:
                 return await super().obey(hold, order)
+
+    async def _turn_wheels(self, hold: Hold, order: Command, left: float, right: float) -> Mapping[str, float]:
+        if not (math.isfinite(left) and math.isfinite(right)):
+            raise NotFinite(f"{self.name}: wheel speeds {left} and {right} rad/s")
+        left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
+        await self.move(hold, order, self._protocol.drive(left, right), is_moving=bool(left or right))
+        return {"left_rad_s": left, "right_rad_s": right}

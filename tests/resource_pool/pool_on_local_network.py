@@ -35,7 +35,7 @@ from resource_pool.messages import ArcNotice, AskBeat, Resumed, Suspended, Suspe
 from resource_pool.rcs.command_radio import CommandRadio
 from resource_pool.rcs.framegrabber import Framegrabber
 from resource_pool.rcs.scout import Scout
-from resource_pool.rcs.skeleton import Lamp
+from resource_pool.rcs.skeleton import Lamp, Shine
 from resource_pool.rcs.video_frequency import VideoFrequency
 from resource_pool.simulated_world import SimulatedWorld
 from scout_model.description import ScoutPlace, WorldDescription
@@ -53,6 +53,7 @@ HARDWARE = [
     Resource("video", "video_frequency", connect_s=0.1),
     Resource("grabber", "framegrabber", driver=f"{HERE}:HandOperatedGrabber", links={"video_frequency": ["video"]}),
     Resource("lamp1", "lamp", driver="resource_pool.rcs.skeleton:PaintedLamp", parameters={"color": "green"}),
+    Resource("lamp2", "lamp", driver="resource_pool.rcs.skeleton:PaintedLamp", parameters={"color": "red"}),
 ]
 RC_CLASSES: dict[str, type[Component[Any]]] = {
     "scout": Scout,
@@ -61,11 +62,21 @@ RC_CLASSES: dict[str, type[Component[Any]]] = {
     "framegrabber": Framegrabber,
     "lamp": Lamp,
 }
+
+
+class TwoLampsArc(DriveArc):
+    """A robot with two lamps, which obey the same command."""
+
+    roles = {"scout": "scout", "command_radio": "command_radio", "left": "lamp", "right": "lamp"}
+    commands = {**DriveArc.commands, Shine: ("left", "right")}
+
+
 ARC_CLASSES: dict[str, type[AggregateResourceController]] = {
     "drive": DriveArc,
     "video_drive": VideoDriveArc,
     "capture": CaptureArc,
     "lit_drive": LitDriveArc,
+    "two_lamps": TwoLampsArc,
 }
 
 

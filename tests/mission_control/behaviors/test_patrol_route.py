@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import pytest
 from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -14,8 +13,6 @@ from mission_control.behaviors.motion import (
     MOST_M_S,
     MOST_RAD_S,
     STILL,
-    TRACK_M,
-    WHEEL_RADIUS_M,
     FloorPoint,
     Maneuver,
     Motion,
@@ -27,6 +24,7 @@ from mission_control.behaviors.motion import (
 )
 from mission_control.behaviors.patrol_route import PatrolRoute
 from scout_model import dimensions
+from scout_model.scout import wheels_rad_s
 
 STEP_S = 0.1
 SQUARE = [FloorPoint(1.0, 1.0), FloorPoint(3.0, 1.0), FloorPoint(3.0, 3.0), FloorPoint(1.0, 3.0)]
@@ -79,10 +77,8 @@ take_overs = st.lists(
 )
 
 
-def test_the_robot_has_the_sizes_of_the_model() -> None:
-    assert WHEEL_RADIUS_M == dimensions.WHEEL_RADIUS_M
-    assert pytest.approx(dimensions.TRACK_M) == TRACK_M
-    assert max(Motion(MOST_M_S, 0.0).wheels_rad_s()) < dimensions.WHEEL_SPEED_LIMIT_RAD_S
+def test_a_scouts_wheels_reach_the_speed_of_a_patrol() -> None:
+    assert max(wheels_rad_s(MOST_M_S, 0.0)) < dimensions.WHEEL_SPEED_LIMIT_RAD_S
 
 
 @given(positions, places, st.floats(0.05, 0.3))

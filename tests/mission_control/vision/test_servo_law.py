@@ -106,12 +106,6 @@ def test_the_whole_target_stays_in_the_picture_however_near(range_m: float) -> N
     assert FOCAL_PX * (math.tan(limit_rad) + 0.08 / range_m) <= HALF_VIEW_PX or limit_rad == 0
 
 
-def test_wheels_of_a_turn_in_place_run_against_each_other() -> None:
-    left_rad_s, right_rad_s = Command(0.0, 1.0).wheels_rad_s()
-    assert left_rad_s == -right_rad_s
-    assert right_rad_s > 0
-
-
 @settings(max_examples=share(25))
 @given(range_m=st.floats(0.7, 2.5), off_axis=st.floats(-45.0, 45.0), heading=st.floats(-180.0, 180.0))
 def test_from_anywhere_within_two_and_a_half_metres_and_45_degrees_it_arrives(

@@ -45,9 +45,6 @@ def test_landmark_and_camera_have_the_numbers_of_the_simulated_ones() -> None:
     assert math.isclose(SCOUT_CAMERA.tilt_rad, dimensions.CAMERA_TILT_RAD)
     assert math.isclose(servo_law.FOCAL_PX, target_pose.SCOUT_CAMERA.focal_px, rel_tol=1e-3)
     assert 2 * servo_law.HALF_VIEW_PX == dimensions.PICTURE_WIDTH_PX
-    assert servo_law.Command(0.2, 1.0).wheels_rad_s() == servo_law.Command(0.2, 1.0).wheels_rad_s(
-        dimensions.TRACK_M, dimensions.WHEEL_RADIUS_M
-    )
 
 
 def test_the_camera_sits_where_the_model_of_it_says() -> None:

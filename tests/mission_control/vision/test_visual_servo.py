@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from landmark_pictures import BOARD, polar, view, world_with_landmark
 
-from mission_control.vision.servo_law import CREEP_M_S, HALT, STOP_M, Command, Stage
+from mission_control.vision.servo_law import CREEP_M_S, HALT, STOP_M, Stage
 from mission_control.vision.skeleton_tracking import TrackingPhase
 from mission_control.vision.visual_servo import VisualServo
 from scout_model.camera import Camera
 from scout_model.description import AS_THE_PAPERS
 from scout_model.radio_link import encode_drive
+from scout_model.scout import wheels_rad_s
 from scout_model.video_link import Receiver, Signal
 
 FRAME_S = 1 / 30
@@ -28,7 +29,8 @@ def servo(seed: int, limit_s: float) -> tuple[VisualServo, float, float]:
     sent = [HALT] * LATENCY_FRAMES
     with Camera(world.mjcf, "paint") as camera:
         while world.time_s < limit_s and servo.stage is not Stage.ARRIVED:
-            world.hear(1, encode_drive(*sent.pop(0).wheels_rad_s()))
+            now = sent.pop(0)
+            world.hear(1, encode_drive(*wheels_rad_s(now.forward_m_s, now.turn_rad_s)))
             world.step_frame()
             camera.show(world.state())
             motors = min(1.0, sum(abs(speed) for speed in world.wheel_speeds("scout")) / 35.0)
@@ -107,7 +109,3 @@ def test_bad_input_is_refused() -> None:
         servo.see(np.zeros((240, 320, 3), np.uint8), FRAME_S)
     with pytest.raises(ValueError, match="before the one before"):
         servo.see(view(1.0), -FRAME_S)
-
-
-def test_a_command_of_rest_turns_no_wheel() -> None:
-    assert Command(0.0, 0.0).wheels_rad_s() == (0.0, 0.0)
