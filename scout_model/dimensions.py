@@ -44,6 +44,12 @@ STEPS_PER_FRAME = 8
 FRAMES_PER_S = 30  # RAM 2002, "Visual Servoing": close to 30 frames per second
 COMMAND_TIMEOUT_S = 0.5  # chosen: a robot without commands must neither move nor jam the air
 
+# Battery
+IDLE_W = 0.3  # chosen: two small processors and a radio receiver
+TRANSMITTER_W = 1.0  # chosen: camera and analog transmitter
+MOTORS_W = 1.5  # chosen: two small geared motors that are held
+BATTERY_J = 7 * 24 * 3600 * (IDLE_W + TRANSMITTER_W + MOTORS_W)  # chosen: a week of all that; outlasts every experiment
+
 # Targets
 PIONEER_RADIUS_M = 0.20  # chosen: a Pioneer is 38 to 45 cm wide and long
 PIONEER_HEIGHT_M = 0.24  # chosen: a Pioneer's top plate

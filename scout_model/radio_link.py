@@ -1,10 +1,13 @@
-"""The command radio's packets: what a Scout understands, as bytes.
+"""The command radio's packets: what a Scout understands and answers, as bytes.
 
 A packet is one byte that says which command it is, then the command's values in network byte order:
 
 * ``D`` drive: two 32-bit floats, left and right wheel in rad/s, forward is positive
 * ``H`` halt, ``J`` jump, ``S`` safe, ``X`` transmitter off: nothing more
 * ``V`` transmitter on: name of the video frequency, 1 to 15 ASCII characters
+
+Its answer is ``R``, then one byte each for the charge of its battery, its tilt (255 is upside down) and the load of
+its motors.
 
 The network id that addresses a Scout is the radio's business and stands outside of the payload.
 """
@@ -24,6 +27,7 @@ FIRST_NETWORK_ID = 1
 LAST_NETWORK_ID = 254  # chosen: one byte, without all zeros and all ones
 
 _DRIVE = struct.Struct("!ff")
+_REPLY = struct.Struct("!cBBB")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,21 @@ class TransmitterOff:
 @dataclass(frozen=True, slots=True)
 class Safe:
     """Stop the wheels and send no picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScoutReply:
+    """What a Scout answers.
+
+    Attributes:
+        battery: Charge of its battery, 0 to 1.
+        tilt_rad: Angle between its up and the vertical, 0 to pi.
+        load: How hard its motors work, 0 to 1.
+    """
+
+    battery: float
+    tilt_rad: float
+    load: float
 
 
 Packet = DrivePacket | HaltPacket | JumpPacket | TransmitterOn | TransmitterOff | Safe
@@ -145,6 +164,45 @@ def decode(payload: bytes) -> Packet:
         case b"X":
             return TransmitterOff()
     raise MalformedPacket(f"no command begins with {command!r}")
+
+
+def encode_reply(reply: ScoutReply) -> bytes:
+    """Return the answer as bytes; its numbers are rounded to a 255th of their range.
+
+    Raises:
+        MalformedPacket: A number is outside its range.
+    """
+    return _REPLY.pack(
+        b"R", share_to_byte(reply.battery), share_to_byte(reply.tilt_rad / math.pi), share_to_byte(reply.load)
+    )
+
+
+def decode_reply(payload: bytes) -> ScoutReply:
+    """Return what a Scout answered.
+
+    Raises:
+        MalformedPacket: The bytes are no answer of a Scout.
+    """
+    if len(payload) != _REPLY.size or payload[:1] != b"R":
+        raise MalformedPacket(f"{payload!r} is no answer of a Scout")
+    _, battery, tilt, load = _REPLY.unpack(payload)
+    return ScoutReply(byte_to_share(battery), byte_to_share(tilt) * math.pi, byte_to_share(load))
+
+
+def share_to_byte(share: float) -> int:
+    """Return a share, 0 to 1, as a byte, 0 to 255.
+
+    Raises:
+        MalformedPacket: It is no share.
+    """
+    if not 0.0 <= share <= 1.0:
+        raise MalformedPacket(f"{share} is not between 0 and 1")
+    return round(share * 255)
+
+
+def byte_to_share(byte: int) -> float:
+    """Return the share, 0 to 1, that a byte stands for."""
+    return byte / 255
 
 
 def _decode_drive(values: bytes) -> DrivePacket:

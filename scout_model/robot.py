@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 from scout_model.errors import InvalidWorld
@@ -47,6 +47,25 @@ class Robot(Protocol):
         """Return what it counted since it was switched on, by name."""
 
 
+@runtime_checkable
+class FeelingRobot(Robot, Protocol):
+    """A robot that feels the sensors of its body."""
+
+    def feel(self, readings: Mapping[str, Sequence[float]], now_s: float) -> None:
+        """Take the newest reading of each MJCF sensor of its body, by the sensor's name there.
+
+        Called at the beginning and after each frame, but not while all readings stay the same.
+        """
+
+
+@runtime_checkable
+class AnsweringRobot(Robot, Protocol):
+    """A robot that answers on the digital link."""
+
+    def reply(self, now_s: float) -> bytes:
+        """Return its answer to the packets it heard since its last answer; empty: nothing to say."""
+
+
 def robot_class(kind: str) -> type[Robot]:
     """Return the class of a kind of robot.
 
@@ -63,9 +82,7 @@ def robot_class(kind: str) -> type[Robot]:
         found = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError) as error:
         raise InvalidWorld(f"there is no kind of robot {kind}: {error}") from error
-    lacking = [
-        part for part in ("body_mjcf", "frequency", "motors", "hear", "controls", "counts") if not hasattr(found, part)
-    ]
+    lacking = [part for part in _PARTS if not hasattr(found, part)]
     if not isinstance(found, type) or lacking:
         raise InvalidWorld(f"{kind} is no kind of robot: it lacks {', '.join(lacking) or 'a class'}")
     return found

@@ -14,24 +14,44 @@ Source: IROS 2001, section 2: the on-board processors do communications and actu
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from importlib import resources
 from typing import assert_never
 
+from scout_model.battery import Battery, Consumption
 from scout_model.dimensions import (
+    BATTERY_J,
     COMMAND_TIMEOUT_S,
     FOOT_PRELOAD_M,
     FOOT_STROKE_M,
+    IDLE_W,
     KICK_S,
+    MOTORS_W,
     PRELOAD_S,
     TRACK_M,
+    TRANSMITTER_W,
     WHEEL_RADIUS_M,
     WHEEL_SPEED_LIMIT_RAD_S,
+    WHEEL_TORQUE_LIMIT_N_M,
     WINCH_SPEED_M_S,
 )
 from scout_model.errors import MalformedPacket
-from scout_model.radio_link import DrivePacket, HaltPacket, JumpPacket, Safe, TransmitterOff, TransmitterOn, decode
+from scout_model.inclinometer import Inclinometer
+from scout_model.radio_link import (
+    DrivePacket,
+    HaltPacket,
+    JumpPacket,
+    Safe,
+    ScoutReply,
+    TransmitterOff,
+    TransmitterOn,
+    decode,
+    encode_reply,
+)
+
+_CONSUMPTION = Consumption(IDLE_W, TRANSMITTER_W, MOTORS_W)
 
 
 class Spring(StrEnum):
@@ -209,7 +229,21 @@ class Firmware:
 
 
 class Scout(Firmware):
-    """The Scout as a kind of robot: the body of ``scout.xml`` and the firmware's actuation by actuator."""
+    """The Scout as a kind of robot: the body of ``scout.xml``, its battery, and the firmware's actuation by actuator.
+
+    Once its battery is empty it hears nothing, its wheels are not driven and its transmitter is off; the winch and the
+    latch of its spring stay as they are.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.battery = Battery(BATTERY_J)
+        """What it lives on."""
+        self._inclinometer = Inclinometer()
+        self._load = 0.0
+        self._draws: tuple[float, bool] | None = None
+        self._actuation = Actuation(0.0, 0.0, kick=False, winch_m=0.0)
+        self._answered = 0
 
     @classmethod
     def body_mjcf(cls) -> str:
@@ -221,14 +255,39 @@ class Scout(Firmware):
         """How hard its motors are driven, 0 to 1."""
         return max(abs(self._left_rad_s), abs(self._right_rad_s)) / WHEEL_SPEED_LIMIT_RAD_S
 
+    def hear(self, payload: bytes, now_s: float) -> None:
+        """Obey one packet, as long as there is power; see ``Firmware.hear``."""
+        if not self.battery.is_empty(now_s):
+            super().hear(payload, now_s)
+
+    def feel(self, readings: Mapping[str, Sequence[float]], now_s: float) -> None:
+        """Take the readings of accelerometer and motor currents."""
+        self._inclinometer.feel(readings["accelerometer"], now_s)
+        torque_n_m = abs(readings["left_torque"][0]) + abs(readings["right_torque"][0])
+        self._load = min(1.0, torque_n_m / (2 * WHEEL_TORQUE_LIMIT_N_M))
+
+    def reply(self, now_s: float) -> bytes:
+        """Return charge, tilt and load if it obeyed a packet since its last answer; else nothing."""
+        if self._answered == self._heard or self.battery.is_empty(now_s):
+            return b""
+        self._answered = self._heard
+        return encode_reply(ScoutReply(self.battery.share(now_s), self._inclinometer.tilt_rad(now_s), self._load))
+
     def controls(self, now_s: float) -> dict[str, float]:
         """Advance to this time and return what the actuators shall do."""
-        actuation = self.tick(now_s)
+        if self.battery.is_empty(now_s):
+            self._safe(now_s)
+            self._actuation = replace(self._actuation, left_rad_s=0.0, right_rad_s=0.0)
+        else:
+            self._actuation = self.tick(now_s)
+            if (draws := (self._load, bool(self._frequency))) != self._draws:
+                self._draws = draws
+                self.battery.draw(_CONSUMPTION.power_w(self._load, is_transmitting=bool(self._frequency)), now_s)
         return {
-            "left_wheel": actuation.left_rad_s,
-            "right_wheel": actuation.right_rad_s,
-            "kick": float(actuation.kick),
-            "winch": actuation.winch_m,
+            "left_wheel": self._actuation.left_rad_s,
+            "right_wheel": self._actuation.right_rad_s,
+            "kick": float(self._actuation.kick),
+            "winch": self._actuation.winch_m,
         }
 
     def counts(self) -> dict[str, int]:

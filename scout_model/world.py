@@ -22,7 +22,8 @@ from scout_model.composition import compose
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
-from scout_model.robot import Robot, robot_class
+from scout_model.readings import Senses
+from scout_model.robot import AnsweringRobot, Robot, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
 from scout_model.targets import Route, TargetState, part_poses, parts
 
@@ -43,6 +44,7 @@ class _Body:
     Attributes:
         kind: Class path, for refusals.
         program: What runs on board.
+        answers: The same, if it is one that answers.
         actuators: Name → index of its control.
         free: First of the seven numbers of its position.
         positions: Its part of the positions.
@@ -51,6 +53,7 @@ class _Body:
 
     kind: str
     program: Robot
+    answers: AnsweringRobot | None
     actuators: dict[str, int]
     free: int
     positions: slice
@@ -92,6 +95,7 @@ class World:
         self._place_targets()
         self._hold_carried()
         mujoco.mj_forward(self._model, self._data)
+        self._senses = Senses(self._model, self._data, {name: robot.program for name, robot in self._robots.items()})
 
     @property
     def time_s(self) -> float:
@@ -106,6 +110,16 @@ class World:
         robot = self._by_network_id.get(network_id)
         if robot is not None:
             robot.program.hear(payload, self.time_s)
+
+    def reply(self, network_id: int) -> bytes:
+        """Return what the robot with this id answers to the packets it heard since its last answer.
+
+        Empty if it has nothing to say, is of a kind that never answers, or is not there.
+        """
+        robot = self._by_network_id.get(network_id)
+        if robot is None or not robot.answers:
+            return b""
+        return robot.answers.reply(self.time_s)
 
     def strike(
         self, robot: str, velocity_m_s: tuple[float, float, float], spin_rad_s: tuple[float, float, float]
@@ -134,14 +148,18 @@ class World:
             # Nothing to integrate: one step detects robots that a target touches, and wakes them.
             self._step += STEPS_PER_FRAME
             self._place_targets()
-            mujoco.mj_step(self._model, self._data)
+            self._senses.step()
         else:
-            for _ in range(STEPS_PER_FRAME):
-                mujoco.mj_step(self._model, self._data)
+            for step in range(1, STEPS_PER_FRAME + 1):
+                if step < STEPS_PER_FRAME:
+                    mujoco.mj_step(self._model, self._data)
+                else:
+                    self._senses.step()
                 self._step += 1
                 self._place_targets()
                 self._hold_carried()
         self.frame += 1
+        self._senses.update(self.time_s)
 
     def transmitting(self) -> dict[str, str]:
         """Return robot → video frequency, of the robots whose transmitter is on."""
@@ -266,9 +284,11 @@ class World:
         last = own[-1]
         last_position = int(model.jnt_qposadr[last]) + _POSITIONS[int(model.jnt_type[last])]
         last_velocity = int(model.jnt_dofadr[last]) + _VELOCITIES[int(model.jnt_type[last])]
+        program = robot_class(kind)()
         return _Body(
             kind=kind,
-            program=robot_class(kind)(),
+            program=program,
+            answers=program if isinstance(program, AnsweringRobot) else None,
             actuators={full.removeprefix(prefix): number for number, full in names.items() if full.startswith(prefix)},
             free=int(free.qposadr[0]),
             positions=slice(int(free.qposadr[0]), last_position),

@@ -1,10 +1,20 @@
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from scout_model import radio_link
 from scout_model.errors import MalformedPacket
-from scout_model.radio_link import DrivePacket, HaltPacket, JumpPacket, Safe, TransmitterOff, TransmitterOn
+from scout_model.radio_link import (
+    DrivePacket,
+    HaltPacket,
+    JumpPacket,
+    Safe,
+    ScoutReply,
+    TransmitterOff,
+    TransmitterOn,
+)
 
 speeds = st.floats(allow_nan=False, allow_infinity=False, width=32)
 names = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=15)
@@ -81,3 +91,28 @@ def test_impossible_speeds_are_never_sent(speed_rad_s: float) -> None:
 def test_impossible_frequency_names_are_never_sent(frequency: str) -> None:
     with pytest.raises(MalformedPacket):
         radio_link.encode_transmitter_on(frequency)
+
+
+@given(st.floats(0, 1), st.floats(0, math.pi), st.floats(0, 1))
+def test_an_answer_says_what_was_put_in_to_a_255th(battery: float, tilt_rad: float, load: float) -> None:
+    payload = radio_link.encode_reply(ScoutReply(battery, tilt_rad, load))
+    told = radio_link.decode_reply(payload)
+    assert (told.battery, told.load) == pytest.approx((battery, load), abs=0.501 / 255)
+    assert told.tilt_rad == pytest.approx(tilt_rad, abs=0.501 * math.pi / 255)
+    assert radio_link.encode_reply(told) == payload
+
+
+@given(st.one_of(st.binary(max_size=8), st.binary(min_size=3, max_size=3).map(lambda rest: b"R" + rest)))
+def test_any_bytes_are_an_answer_that_encodes_to_the_same_bytes_or_are_refused(payload: bytes) -> None:
+    try:
+        told = radio_link.decode_reply(payload)
+    except MalformedPacket:
+        assert len(payload) != 4 or payload[:1] != b"R"
+        return
+    assert radio_link.encode_reply(told) == payload
+
+
+@pytest.mark.parametrize("wrong", [ScoutReply(1.1, 0, 0), ScoutReply(0, -0.1, 0), ScoutReply(0, 0, math.nan)])
+def test_impossible_answers_are_never_sent(wrong: ScoutReply) -> None:
+    with pytest.raises(MalformedPacket):
+        radio_link.encode_reply(wrong)

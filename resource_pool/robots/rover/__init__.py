@@ -1,0 +1,1 @@
+"""A Pioneer 2-class rover: body, on-board program and packets."""

@@ -1,0 +1,48 @@
+"""How far a robot leans, from its accelerometer: the smoothed direction of what holds it up.
+
+A reading counts until the next one, so that a robot whose readings stay the same need not be asked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+SMOOTHING_S = 0.25  # chosen: several frames, so that a bump is no fall; well below the time of falling over and lying
+
+_WEIGHTLESS_M_S2 = 1.0  # chosen: a tenth of gravity; below it the direction says nothing
+
+
+class Inclinometer:
+    """Upright until its first reading."""
+
+    def __init__(self) -> None:
+        self._held_m_s2 = self._smooth_m_s2 = (0.0, 0.0, 9.81)
+        self._since_s = 0.0
+        self._tilt_rad = 0.0
+
+    def feel(self, acceleration_m_s2: Sequence[float], now_s: float) -> None:
+        """Take a reading.
+
+        Args:
+            acceleration_m_s2: As an accelerometer measures it, forward, left and up; 9.81 up at rest.
+            now_s: Time, never before an earlier call's.
+        """
+        self._advance(now_s)
+        forward, left, up = acceleration_m_s2
+        self._held_m_s2 = forward, left, up
+
+    def tilt_rad(self, now_s: float) -> float:
+        """Return the angle between the robot's up and the vertical, 0 to pi; in free fall the last one."""
+        self._advance(now_s)
+        forward, left, up = self._smooth_m_s2
+        across = math.hypot(forward, left)
+        if math.hypot(across, up) >= _WEIGHTLESS_M_S2:
+            self._tilt_rad = math.atan2(across, up)
+        return self._tilt_rad
+
+    def _advance(self, now_s: float) -> None:
+        rest = math.exp((self._since_s - now_s) / SMOOTHING_S)
+        (x, y, z), (held_x, held_y, held_z) = self._smooth_m_s2, self._held_m_s2
+        self._smooth_m_s2 = held_x + (x - held_x) * rest, held_y + (y - held_y) * rest, held_z + (z - held_z) * rest
+        self._since_s = now_s

@@ -1,0 +1,79 @@
+"""The sensors of the robots' bodies: from MuJoCo's array of all readings to the programs on board.
+
+Sensors cost time and change no motion, so they are computed in the last step of a frame only, and in a world where no
+robot feels never. A reading is of the moment before that step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scout_model.robot import FeelingRobot, Robot
+
+
+class Senses:
+    """The sensors of all robots that feel; each felt those of its body once, as they read now."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, programs: Mapping[str, Robot]) -> None:
+        self._model, self._data, self._option = model, data, model.opt
+        feeling = [
+            _BodySenses(model, name, program) for name, program in programs.items() if isinstance(program, FeelingRobot)
+        ]
+        self._bodies = [body for body in feeling if body.has_sensors]
+        self._felt = b""
+        self.update(0.0)
+        self._on = int(self._option.disableflags)
+        self._off = self._on | int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+        self._option.disableflags = self._off
+
+    def step(self) -> None:
+        """Advance the world by one step, and compute what the sensors read at its beginning."""
+        if not self._bodies:
+            mujoco.mj_step(self._model, self._data)
+            return
+        self._option.disableflags = self._on
+        mujoco.mj_step(self._model, self._data)
+        self._option.disableflags = self._off
+
+    def update(self, now_s: float) -> None:
+        """Let each robot feel its sensors, unless all of them read the same as before."""
+        if not self._bodies:
+            return
+        readings = self._data.sensordata
+        raw = readings.tobytes()
+        if raw == self._felt:
+            return
+        self._felt = raw
+        for body in self._bodies:
+            body.update(readings, now_s)
+
+
+class _BodySenses:
+    """Where the readings of one robot's body are in MuJoCo's array."""
+
+    def __init__(self, model: mujoco.MjModel, robot: str, program: FeelingRobot) -> None:
+        prefix = f"{robot}/"
+        own = {
+            sensor.name.removeprefix(prefix): (int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))
+            for sensor in map(model.sensor, range(model.nsensor))
+            if sensor.name.startswith(prefix)
+        }
+        self.has_sensors = bool(own)
+        first = min((begin for begin, _ in own.values()), default=0)
+        self._part = slice(first, max((end for _, end in own.values()), default=0))
+        self._numbers = {name: slice(begin - first, end - first) for name, (begin, end) in own.items()}
+        self._program = program
+        self._felt = b""
+
+    def update(self, readings: NDArray[np.float64], now_s: float) -> None:
+        own = readings[self._part]
+        raw = own.tobytes()
+        if raw == self._felt:
+            return
+        self._felt = raw
+        numbers = own.tolist()
+        self._program.feel({name: numbers[where] for name, where in self._numbers.items()}, now_s)
