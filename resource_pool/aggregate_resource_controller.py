@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import msgspec
 
@@ -45,7 +45,7 @@ from backbone.rc_manager.messages import (
     Withdraw,
 )
 from backbone.wire import Accepts, Envelope, Message
-from resource_pool.arc_request import ArcParameters, request_of, require_runtime
+from resource_pool.arc_request import ROBOT, ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
 from resource_pool.commands import OF_THE_BASE, Command, command_of
 from resource_pool.gate import Gate
@@ -76,6 +76,8 @@ from resource_pool.placed_request import PlacedRequest
 from resource_pool.set_lease import SetLease
 
 log = logging.getLogger(__name__)
+
+W = TypeVar("W")
 
 OWNER_GONE_S = 0.5  # chosen: a robot is free within a second of its console's death; a new hub is found sooner
 OWNER_BEAT_S = 0.9  # chosen: less than the RC manager's limit of 1 s for a beat, with one beat to spare
@@ -183,7 +185,7 @@ class AggregateResourceController(Component[ArcParameters]):
             NoSuchHardware: No set matches.
         """
         given = self.parameters
-        question = FindRcs(self.kinds(), given.wish, given.features)
+        question = FindRcs(self.kinds(), self._by_role(given.wish), self._by_role(given.features))
         found = await ask_until_answered(
             self.bus, self.clock, DEPENDENCY_DATABASE, question, RcSets, each_s=2.0, within_s=10.0
         )
@@ -261,6 +263,9 @@ class AggregateResourceController(Component[ArcParameters]):
         if self._placed.request is not None:
             self._placed.ask_by({name: getattr(now, name) for name in RUN_TIMES})
             self._placed.sending = self.start_task(self._placed.send_run_times(), "send run times")
+
+    def _by_role(self, wanted: Mapping[str, W]) -> dict[str, W]:
+        return {self.body if role == ROBOT and self.body else role: value for role, value in wanted.items()}
 
     def _set_parameters(self, changed: Mapping[str, object]) -> None:
         self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)

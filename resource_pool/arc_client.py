@@ -23,7 +23,7 @@ from backbone.placer.wishes import Wish
 from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
-from resource_pool.arc_request import claim_parameters
+from resource_pool.arc_request import ROBOT, claim_parameters
 from resource_pool.commands import Command, Drive, Halt, Jump, Move
 from resource_pool.drivers.world_messages import AskPose, Pose
 from resource_pool.messages import (
@@ -54,6 +54,7 @@ from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, Other
 
 __all__ = [
     "DEFAULT_DRIVE_USAGE",
+    "ROBOT",
     "Applied",
     "ArcClient",
     "ArcListener",

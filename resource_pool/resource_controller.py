@@ -93,8 +93,6 @@ class ResourceController(Component[R], Generic[R]):
     """Field of its commands → smallest and largest value that the hardware obeys, if narrower than the field's."""
     reports: ClassVar[type[msgspec.Struct] | None] = None
     """Struct of its reports; None: it reports nothing but its state."""
-    is_robot: ClassVar[bool] = False
-    """True if it has a body, and operators can stop it."""
     driver_kind: ClassVar[str] = ""
     """Kind of its driver; empty: it has no driver."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})

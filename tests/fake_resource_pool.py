@@ -29,6 +29,7 @@ from backbone.placer.messages import (
     StopComponent,
 )
 from backbone.wire import Envelope, Message
+from resource_pool.arc_request import ROBOT
 from resource_pool.commands import Command, Drive, Halt, Jump
 from resource_pool.messages import (
     Accepted,
@@ -62,7 +63,7 @@ class FakeArc:
         self.released = ""
         self.is_idle = self.stays = False  # stays: holds on to its RCs although it is told to rest
         self.wishes: list[Message] = []
-        self.rcs = {"scout": parameters["wish"].get("scout", "scout3"), "framegrabber": "grabber1"}
+        self.rcs = {"scout": parameters["wish"].get(ROBOT, "scout3"), "framegrabber": "grabber1"}
         bus.serve(self.address, ArcQuestion | Drive | Halt | Jump | Stop, self._answer)
         bus.declare_alive(self.address)
 

@@ -47,11 +47,7 @@ def complete_robot(ctx: typer.Context) -> list[str]:
     """Return the robots of the mission that is up, for a shell."""
     picture = picture_for(ctx)
     rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
-    if not rcs:
-        return []
-    from ui_console.model.robot_board import ROBOT_KIND
-
-    return sorted(rc.rc for rc in rcs if rc.kind == ROBOT_KIND)
+    return sorted(rc.rc for rc in rcs if rc.is_robot)
 
 
 Mission = Annotated[

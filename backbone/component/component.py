@@ -100,6 +100,8 @@ class Component(Generic[P_co]):
     """Parameters that a mission file sets by other elements and attributes, not by <parameter>."""
     accepts: ClassVar[Accepts | None] = None
     """Its own questions, besides the common ones: a message class or a union of them."""
+    is_robot: ClassVar[bool] = False
+    """True for the RC of a robot, which operators can stop."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
 
@@ -285,6 +287,7 @@ class Component(Generic[P_co]):
             self.absences() if self._state is LifeState.READY else [],
             self.standing_stop(),
             self.person(),
+            self.is_robot,
         )
 
     # ------------------------------------------------------------------ the shell

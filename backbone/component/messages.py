@@ -62,7 +62,7 @@ class StandingStop(Message, frozen=True):
     is_confirmed: bool = True
 
 
-class ComponentState(Message, frozen=True):
+class ComponentState(Message, frozen=True, tag="ComponentState/2"):
     """Answer to ``AskState``; also published as the component's status on every change.
 
     Attributes:
@@ -74,6 +74,7 @@ class ComponentState(Message, frozen=True):
         absent: Absent components that this one wants.
         stop: The emergency stop in force on it; None: no stop.
         user: Name of the person at it, as the person gave it; empty: no person.
+        is_robot: True for the RC of a robot, which operators can stop.
     """
 
     address: Address
@@ -87,6 +88,7 @@ class ComponentState(Message, frozen=True):
     absent: Annotated[list[Absence], MANY] = []
     stop: StandingStop | None = None
     user: Mention = ""
+    is_robot: bool = False
 
 
 class Register(Message, frozen=True):

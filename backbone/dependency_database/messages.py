@@ -9,7 +9,7 @@ from backbone.ranges import FEW, MANY, Duration, Mention, Share, Values
 from backbone.wire import Message
 
 
-class Resource(Message, frozen=True):
+class Resource(Message, frozen=True, tag="Resource/2"):
     """One physical resource, and the launch of its RC.
 
     Attributes:
@@ -26,6 +26,7 @@ class Resource(Message, frozen=True):
         links: The only resources with which it can be combined, by kind (a framegrabber's ``video_frequency``, a
             scout's ``command_radio``).
         process: Name of its RC's shared process; empty: a process of its own.
+        is_robot: True if it is a robot, which operators can stop.
     """
 
     name: Mention
@@ -40,6 +41,7 @@ class Resource(Message, frozen=True):
     features: Annotated[list[Mention], FEW] = []
     links: Annotated[dict[Mention, Annotated[list[Mention], MANY]], FEW] = {}
     process: Mention = ""
+    is_robot: bool = False
 
     def rc_parameters(self) -> dict[str, object]:
         """Return the parameters of its RC's launch: driver, sharing and links, then its own."""

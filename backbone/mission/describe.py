@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from backbone.component.abilities import NO_ABILITIES
 from backbone.component_database.messages import ComponentType
@@ -42,13 +42,15 @@ def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFa
     resources = () if mission.resources is None else mission.resources.resource
     members = (*resources, *(() if world is None else (world,)))
     host_of_process = {one.process: one.host for one in members if one.process and one.host}
+    types = () if mission.types is None else tuple(_component_type(one, classes) for one in mission.types.type)
+    robots = {one.name for one in types if one.abilities.is_robot}
     return MissionDescription(
         name=mission.name,
         priority=mission.priority,
         hosts=hosts,
         core=_core(mission, [host.name for host in hosts]),
-        types=() if mission.types is None else tuple(_component_type(one, classes) for one in mission.types.type),
-        resources=tuple(_resource(resource, world, host_of_process) for resource in resources),
+        types=types,
+        resources=tuple(_resource(resource, world, host_of_process, robots) for resource in resources),
         components=() if world is None else (_world(world, resources, source, host_of_process),),
         behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
         source=source,
@@ -82,7 +84,9 @@ def _component_type(declared: TypeElement, classes: Mapping[str, ClassFacts]) ->
     )
 
 
-def _resource(declared: ResourceElement, world: WorldElement | None, host_of_process: Mapping[str, str]) -> Resource:
+def _resource(
+    declared: ResourceElement, world: WorldElement | None, host_of_process: Mapping[str, str], robots: Collection[str]
+) -> Resource:
     links: dict[str, list[str]] = {}
     for used in declared.uses:
         links.setdefault(used.type, []).append(used.name)
@@ -94,6 +98,7 @@ def _resource(declared: ResourceElement, world: WorldElement | None, host_of_pro
         features=list(declared.features),
         parameters={**played_by, **_parameters(declared.parameter)},
         links=links,
+        is_robot=declared.type in robots,
     )
 
 

@@ -89,6 +89,7 @@ def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
         disconnect_s=resource.disconnect_s,
         up=state is not None,
         last_epoch=0 if state is None else state.last_epoch,
+        is_robot=resource.is_robot,
     )
 
 

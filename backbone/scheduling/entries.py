@@ -34,6 +34,7 @@ class RcEntry:
         granted_epoch: Largest epoch of a grant so far.
         failed: True if it went down; False if it only was not started yet.
         fault: Why it is put aside although it answers; empty: it is not.
+        is_robot: True if it is a robot, for people.
         holders: ARCs that hold it, settling or not yet free of it, in the order in which they got it.
     """
 
@@ -48,6 +49,7 @@ class RcEntry:
     granted_epoch: int = 0
     failed: bool = False
     fault: str = ""
+    is_robot: bool = False
     holders: dict[ArcEntry, None] = field(default_factory=dict)
 
 

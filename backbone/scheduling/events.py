@@ -26,6 +26,7 @@ class RcKnown:
         disconnect_s: Release time.
         up: True if its RC answers.
         last_epoch: Largest epoch it has seen.
+        is_robot: True if it is a robot, for people.
     """
 
     rc: str
@@ -36,6 +37,7 @@ class RcKnown:
     disconnect_s: float
     up: bool
     last_epoch: int
+    is_robot: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,6 +106,7 @@ class ScheduleState:
             known.disconnect_s,
             known.up,
             known.last_epoch,
+            is_robot=known.is_robot,
         )
         self.rcs[known.rc] = entry
         return entry

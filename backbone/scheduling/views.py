@@ -9,7 +9,7 @@ from backbone.scheduling.requests import Holder, PathNode, RcUse, RequestState
 from backbone.wire import Message
 
 
-class RcView(Message, frozen=True):
+class RcView(Message, frozen=True, tag="RcView/2"):
     """One RC in the master schedule.
 
     Attributes:
@@ -20,6 +20,7 @@ class RcView(Message, frozen=True):
         next: ARCs that get it, in the order of their predicted starts.
         until_s: Mission time at which the slice of each holder ends; negative: it is being disconnected.
         next_s: Mission times of their predicted starts, for each of ``next``.
+        is_robot: True if it is a robot, which operators can stop.
     """
 
     rc: Mention
@@ -32,6 +33,7 @@ class RcView(Message, frozen=True):
     next: Annotated[list[Mention], MANY]
     until_s: Annotated[list[Instant], MANY] = []
     next_s: Annotated[list[Instant], MANY] = []
+    is_robot: bool = False
 
 
 class RequestView(Message, frozen=True):

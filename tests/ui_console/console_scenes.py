@@ -12,7 +12,9 @@ from resource_pool.arc_client import StopState
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import Asked, ConsoleEvent, Granted, Heard, LinkHeard, PictureSeen
 
-GRANT = Granted(10.0, {"scout": "scout1", "command_radio": "radio"}, {"scout1": 7, "radio": 3}, 15.0, 9.95, False)
+GRANT = Granted(
+    10.0, "scout1", {"scout": "scout1", "command_radio": "radio"}, {"scout1": 7, "radio": 3}, 15.0, 9.95, False
+)
 ASK = Asked(9.95, "scout1", "capture", 100)
 
 
@@ -38,7 +40,7 @@ def rc(
     following = following or []
     until_s = [10.0] * len(holders)
     starts_s = [12.0] * len(following)
-    return RcView(name, kind, "up", sharable, 1.0, holders, 6, following, until_s, starts_s)
+    return RcView(name, kind, "up", sharable, 1.0, holders, 6, following, until_s, starts_s, is_robot=kind == "scout")
 
 
 SCHEDULE = Schedule(
@@ -74,7 +76,7 @@ def component(
     requester: str = "backbone/launcher",
     pid: int = 100,
 ) -> ComponentState:
-    return ComponentState(address, kind, "base", pid, state, since_s, feedback, requester)
+    return ComponentState(address, kind, "base", pid, state, since_s, feedback, requester, is_robot=kind == "scout")
 
 
 COMPONENTS = [

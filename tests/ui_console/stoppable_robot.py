@@ -14,6 +14,7 @@ from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 class StoppableRobot(Component[Any]):
     """Keeps the authors of its stop, and publishes it."""
 
+    is_robot = True
     accepts = AskStop | EmergencyStop | LiftStop
 
     def __init__(self, *given: Any) -> None:

@@ -22,7 +22,6 @@ from ui_console.model import events, views
 from ui_console.model.alarms import AlarmBook
 from ui_console.model.consent import Settled, Sought, Topic
 from ui_console.model.lifting import question_line
-from ui_console.model.robot_board import ROBOT_KIND
 from ui_console.model.team import TeamModel
 
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
@@ -282,11 +281,11 @@ class ConsoleModel:
                 self._asked_whom = self._went = None
                 self._refused = ""
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
-            case events.Granted(rcs=rcs):
+            case events.Granted(robot=robot):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
                 alarms.mended((views.AlarmKind.TAKEN, views.AlarmKind.REFUSED, views.AlarmKind.NO_ANSWER))
                 self._went = None
-                self.robot = rcs.get(ROBOT_KIND, self.robot)
+                self.robot = robot or self.robot
             case events.CommandApplied():
                 self.applied = event
                 alarms.mended((views.AlarmKind.NO_ANSWER,))

@@ -48,13 +48,15 @@ class Granted(Event):
     """The RCs are held; repeated, with ``again``, after each suspension.
 
     Attributes:
-        rcs: Kind → name of each RC held.
+        robot: The robot held.
+        rcs: Role → name of each RC held.
         epochs: RC → epoch.
         until_s: The slice lasts at least until then.
         asked_s: When it was requested.
         again: True if it was held before.
     """
 
+    robot: str
     rcs: Mapping[str, str]
     epochs: Mapping[str, int]
     until_s: float

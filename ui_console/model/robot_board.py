@@ -21,8 +21,6 @@ from ui_console.model.lifting import author_name, authors, is_own, lift_line
 from ui_console.model.link_board import LinkBoard
 from ui_console.model.views import LEAVING, NONE_S, AlarmKind, RobotView, StopView
 
-ROBOT_KIND = "scout"
-
 
 class RobotBoard:
     """State of the robots, from messages.
@@ -72,14 +70,14 @@ class RobotBoard:
         if self._picture.schedule is None:
             return []
         requests = {request.arc: request for request in self._picture.schedule.requests}
-        rcs = sorted((rc for rc in self._picture.schedule.rcs if rc.kind == ROBOT_KIND), key=lambda rc: rc.rc)
+        rcs = sorted((rc for rc in self._picture.schedule.rcs if rc.is_robot), key=lambda rc: rc.rc)
         return [self._robot(rc, number, requests, now_s) for number, rc in enumerate(rcs, 1)]
 
     def names(self) -> list[str]:
         """Return every known robot, from the schedule or from components."""
         schedule, there = self._picture.schedule, self._picture.components.values()
-        in_schedule = {rc.rc for rc in (schedule.rcs if schedule else []) if rc.kind == ROBOT_KIND}
-        return sorted(in_schedule | {component_of(one.address) for one in there if one.type == ROBOT_KIND})
+        in_schedule = {rc.rc for rc in (schedule.rcs if schedule else []) if rc.is_robot}
+        return sorted(in_schedule | {component_of(one.address) for one in there if one.is_robot})
 
     def stop_of(self, robot: str) -> StopState | None:
         """Return the operator's stop in force on the robot."""

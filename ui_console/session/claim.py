@@ -8,11 +8,10 @@ import msgspec
 
 from backbone.bus.interface import Bus
 from backbone.naming import component_of
-from resource_pool.arc_client import PathNode, arc_name, claim_parameters
-from ui_console.model.robot_board import ROBOT_KIND
+from resource_pool.arc_client import ROBOT, PathNode, arc_name, claim_parameters
 
 ANY_ROBOT = "any robot"
-ANY_CAMERA = {ROBOT_KIND: ["camera"]}
+ANY_CAMERA = {ROBOT: ["camera"]}
 
 
 class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -43,7 +42,7 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
             address,
             path=[PathNode(component_of(address), self.priority)],
             minimum_runtime_s=self.minimum_runtime_s,
-            wish={ROBOT_KIND: self.robot} if self.robot else {},
+            wish={ROBOT: self.robot} if self.robot else {},
             features={} if self.robot else ANY_CAMERA,
             console=True,
         )

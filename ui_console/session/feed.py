@@ -44,7 +44,6 @@ from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said, failed
-from ui_console.model.robot_board import ROBOT_KIND
 
 log = logging.getLogger(__name__)
 
@@ -119,7 +118,8 @@ class ConsoleFeed:
 
     async def find_robots(self) -> frozenset[str]:
         """Return every robot of the mission, also robots not known so far."""
-        return self.robots | set(map(component_of, await self._list_of(Subsystem.RESOURCE_POOL, ROBOT_KIND)))
+        pool = await self._list_of(Subsystem.RESOURCE_POOL)
+        return self.robots | {component_of(one.address) for one in pool if one.is_robot}
 
     async def ask_stop(self, robot: str) -> StopState | None:
         """Return the state of the robot's stop; None: its RC did not answer."""
@@ -131,7 +131,7 @@ class ConsoleFeed:
 
     async def consoles(self) -> list[str]:
         """Return the addresses of all consoles of the mission; none if the nameserver did not answer."""
-        return await self._list_of(Subsystem.UI_CONSOLE)
+        return [one.address for one in await self._list_of(Subsystem.UI_CONSOLE)]
 
     async def lift(self, stop: StopState, user: str = "") -> bool:
         """Let a robot move again; return whether it may."""
@@ -198,12 +198,11 @@ class ConsoleFeed:
         resolved = await self._bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)
         return resolved.component.address
 
-    async def _list_of(self, subsystem: Subsystem, kind: str = "") -> list[str]:
-        """Return the addresses of these components; none if the nameserver did not answer."""
+    async def _list_of(self, subsystem: Subsystem) -> list[ComponentState]:
+        """Return the components of a subsystem; none if the nameserver did not answer."""
         with self._showing_failure():
-            question = ListComponents(subsystem=str(subsystem), type=kind)
-            listing = await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)
-            return [component.address for component in listing.components]
+            question = ListComponents(subsystem=str(subsystem))
+            return (await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)).components
         return []
 
     async def _list_when_due(self) -> None:
@@ -220,7 +219,7 @@ class ConsoleFeed:
             self._hear(listing)
             at = [component.address for component in listing.components]
             behaviors = [one for one in at if one.startswith(f"{Subsystem.MISSION_CONTROL}/")]
-            robots = [component_of(one.address) for one in listing.components if one.type == ROBOT_KIND]
+            robots = [component_of(one.address) for one in listing.components if one.is_robot]
             await asyncio.gather(*map(self._ask_how_it_went, behaviors), *map(self._ask_stop, robots), self._ask_log())
 
     async def _ask_schedule(self) -> None:
@@ -301,7 +300,7 @@ class ConsoleFeed:
                     self._meet(component)
             case Schedule():
                 self._radios = {rc.rc for rc in said.rcs if rc.sharable and rc.state != "down"}
-                self._robots |= {rc.rc for rc in said.rcs if rc.kind == ROBOT_KIND}
+                self._robots |= {rc.rc for rc in said.rcs if rc.is_robot}
         self._show(Heard(self._clock.now_s(), said, source))
 
     def _meet(self, component: ComponentState) -> None:
@@ -312,7 +311,7 @@ class ConsoleFeed:
                 self._bus.subscribe(address, Conversation.TELEMETRY, HostLoad, self._heard, latest=True),
                 self._bus.subscribe(address, Conversation.EVENTS, ProcessFell, self._heard),
             ]
-        if component.type == ROBOT_KIND:
+        if component.is_robot:
             self._robots.add(component_of(address))
 
     def _heard_link(self, is_up: bool) -> None:

@@ -26,7 +26,6 @@ from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, DriveWish, HaltWish, JumpWish
 from ui_console.model.lifting import AskLift
-from ui_console.model.robot_board import ROBOT_KIND
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
@@ -329,7 +328,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._keeping is None:
             log.info("%s was granted after it was given back", notice.arc)
             return  # the RC manager granted before it got the withdrawal; it revokes the RCs then
-        robot = notice.rcs.get(ROBOT_KIND, "no robot")
+        robot = notice.robot or "no robot"
         self.require_let_go()
         await self._ear.listen(robot)
         if not self.is_held or self._arc is None or self._arc.epochs != notice.epochs:
@@ -339,7 +338,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not again:
             self.publish_event(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
-        self.show(events.Granted(self.clock.now_s(), notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
+        now_s, epochs = self.clock.now_s(), notice.epochs
+        self.show(events.Granted(now_s, robot, notice.rcs, epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
 
     async def arc_suspending(self, notice: Suspending) -> None:  # noqa: ARG002  one command needs no deadline

@@ -24,7 +24,6 @@ from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent, Heard
-from ui_console.model.robot_board import ROBOT_KIND
 from ui_console.model.team import TeamModel
 from ui_console.model.views import AlarmKind
 from ui_console.session.consent_answers import ConsentAnswers
@@ -192,7 +191,7 @@ class WebHub:
         self._model.apply(event)
         if isinstance(event, Heard) and isinstance(event.body, Schedule):
             rcs = event.body.rcs
-            self._arcs = {rc.rc: rc.holders[0].arc for rc in rcs if rc.kind == ROBOT_KIND and rc.holders}
+            self._arcs = {rc.rc: rc.holders[0].arc for rc in rcs if rc.is_robot and rc.holders}
             self.watching_changed()
             for operator in self.clients:
                 operator.schedule_heard()

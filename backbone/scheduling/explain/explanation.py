@@ -115,6 +115,7 @@ class Explanation:
             next=[arc.name for arc, _ in coming],
             until_s=[self._until_s(arc) for arc in holders],
             next_s=[granted_s for _, granted_s in coming],
+            is_robot=rc.is_robot,
         )
 
     def _request_view(self, arc: ArcEntry, slot: Slot | None, granted_s: float, now_s: float) -> RequestView:

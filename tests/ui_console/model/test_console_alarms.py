@@ -244,7 +244,7 @@ def test_five_minutes_of_ordinary_use_are_few_alarms_and_in_the_end_none() -> No
             Heard(61.0, fine),
             Heard(61.0, component("resource_pool/scout1", "scout", since_s=61.0, pid=77)),
             Heard(61.0, held),
-            Granted(61.0, GRANT.rcs, GRANT.epochs, 300.0, 60.0, True),
+            Granted(61.0, "scout1", GRANT.rcs, GRANT.epochs, 300.0, 60.0, True),
         ],
         90.0: [Heard(90.0, ben)],
         150.0: [Heard(150.0, Disappeared(ben.address))],

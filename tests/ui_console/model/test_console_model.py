@@ -394,7 +394,7 @@ def test_whatever_is_heard_in_whatever_order_the_view_is_whole_and_consistent(
             "suspended",
             {"reason": "higher", "by": "console-2"},
         ),
-        (Granted(1.0, {}, {}, 2.0, 0.0, True), "resumed", {"until_s": 2.0}),
+        (Granted(1.0, "", {}, {}, 2.0, 0.0, True), "resumed", {"until_s": 2.0}),
         (CommandApplied(1.0, "scout1", 7, "drive", {"left_rad_s": 4.0}), "applied", {"epoch": 7, "rc": "scout1"}),
         (CommandRefused(1.0, "a.b", "no", "ask later"), "refused", {"code": "a.b", "remedy": "ask later"}),
         (GivenBack(1.0, "released", True), "released", {"confirmed": True}),

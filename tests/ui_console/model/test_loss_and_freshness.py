@@ -42,7 +42,7 @@ def test_a_robot_lost_with_its_link_is_said_to_be_lost_while_the_console_asks_fo
     lost = shown.own(12.0).lost
     assert lost is not None
     assert (lost.robot, lost.at_s, lost.may_retake) == ("scout1", 12.0, False)
-    shown.apply(Granted(14.0, GRANT.rcs, {"scout1": 8}, 20.0, 9.95, True))
+    shown.apply(Granted(14.0, "scout1", GRANT.rcs, {"scout1": 8}, 20.0, 9.95, True))
     assert shown.own(14.0).lost is None
 
 

@@ -54,6 +54,7 @@ class RcManager(Component[Any]):
 class Robot(Component[Any]):
     """Only stops and moves again; silent on request."""
 
+    is_robot = True
     accepts = AskStop | EmergencyStop | LiftStop
 
     def __init__(self, *given: Any) -> None:

@@ -14,7 +14,7 @@ DRIVE = '{"at_s": 0, "left_rad_s": 4, "right_rad_s": 4}\n{"at_s": 2, "left_rad_s
 UNANSWERED = LinkTrouble(2.0, "nobody answered Drive at resource_pool/console-1-drive", "drive")
 LATE = LinkTrouble(2.1, "resource_pool/console-1-drive did not answer Halt within 0.5 s", "halt")
 APPLIED = CommandApplied(3.0, "scout1", 7, "drive", {"left_rad_s": 4.0}, 0.01)
-GRANTED = Granted(4.0, {"scout": "scout1"}, {"scout1": 8}, 9.0, 1.0, True)
+GRANTED = Granted(4.0, "scout1", {"scout": "scout1"}, {"scout1": 8}, 9.0, 1.0, True)
 
 
 def heard(*events: ConsoleEvent) -> list[dict[str, Any]]:

@@ -87,7 +87,7 @@ def test_a_console_claims_with_its_own_priority_beside_the_mission(placer_world:
             await placer.wait(lambda: placer.arcs)
             asked = placer.arcs["console-7-video_drive"].parameters
             assert asked["path"] == [["console-7", 100]]
-            assert (asked["console"], asked["wish"]) == (True, {"scout": "scout1"})
+            assert (asked["console"], asked["wish"]) == (True, {"robot": "scout1"})
 
     placer_world(scene)
 
@@ -218,7 +218,7 @@ def test_an_arc_that_rested_is_ended_when_something_else_is_asked_for(placer_wor
             await driven.switch("scout2")
             await placer.wait(lambda: driven.is_held)
             [arc] = placer.arcs.values()
-            assert arc.parameters["wish"] == {"scout": "scout2"}
+            assert arc.parameters["wish"] == {"robot": "scout2"}
 
     placer_world(scene)
 
@@ -413,7 +413,7 @@ def test_switching_gives_the_first_robot_back_before_the_other_is_asked_for(plac
             assert first.released == "console-7 takes scout2"
             await placer.wait(lambda: driven.is_held)
             [second] = placer.arcs.values()
-            assert second.parameters["wish"] == {"scout": "scout2"}
+            assert second.parameters["wish"] == {"robot": "scout2"}
             await driven.switch("scout2")
             assert list(placer.arcs.values()) == [second]
         kinds = [type(event) for event in events if isinstance(event, Granted | GivenBack)]
@@ -430,7 +430,7 @@ def test_of_several_robots_asked_for_in_a_row_the_last_is_taken(placer_world: An
             await asyncio.gather(*(driven.switch(robot) for robot in ("scout2", "scout3", "scout1", "scout3")))
             await placer.wait(lambda: driven.is_held)
             [arc] = placer.arcs.values()
-            assert arc.parameters["wish"] == {"scout": "scout3"}
+            assert arc.parameters["wish"] == {"robot": "scout3"}
 
     placer_world(scene)
 

@@ -158,7 +158,7 @@ async def test_pictures_of_any_robot_that_somebody_holds_can_be_watched(stage: S
     arcs = {}
     for robot, name in robots.items():
         bus = stage.placer.network.join(f"resource_pool/{name}", stage.clock)
-        arcs[robot] = FakeArc(bus, stage.clock, name, {"wish": {"scout": robot}, "owner": "mission_control/w"})
+        arcs[robot] = FakeArc(bus, stage.clock, name, {"wish": {"robot": robot}, "owner": "mission_control/w"})
     try:
         async with stage.browser() as anna, stage.browser(LOW) as ben:
             stage.publish_schedule(**robots)

@@ -11,7 +11,7 @@ from ui_console.model.views import AlarmKind
 def holding(team: TeamModel, name: str, robot: str) -> ConsoleModel:
     model = ConsoleModel(name, name, team)
     model.apply(Asked(0.0, robot, "capture", 100))
-    model.apply(Granted(1.0, {"scout": robot}, {robot: 3}, 99.0, 0.0, False))
+    model.apply(Granted(1.0, robot, {"scout": robot}, {robot: 3}, 99.0, 0.0, False))
     return model
 
 

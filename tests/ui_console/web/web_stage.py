@@ -38,6 +38,10 @@ WITHIN_S = 15.0
 WIDTH_PX, HEIGHT_PX = 32, 24
 
 
+def robot_view(robot: str, holders: list[Holder], *until_s: float) -> RcView:
+    return RcView(robot, "scout", "up", False, 1.0, holders, 1, [], list(until_s), is_robot=True)
+
+
 class Browser:
     """What a page does, without a page: keeps the newest of each section, and says that pictures are drawn."""
 
@@ -222,8 +226,7 @@ class Stage:
         """Say which ARC holds which robot; an empty name: none."""
         now_s = self.clock.now_s()
         rcs = [
-            RcView(robot, "scout", "up", False, 1.0, [Holder(arc, 1, now_s, 0.0)] if arc else [], 1, [], [now_s + 5.0])
-            for robot, arc in arcs.items()
+            robot_view(robot, [Holder(arc, 1, now_s, 0.0)] if arc else [], now_s + 5.0) for robot, arc in arcs.items()
         ]
         schedule = Schedule(now_s, rcs, [], [])
         self.rc_manager.publish(RC_MANAGER, Conversation.SCHEDULE, schedule)
@@ -238,7 +241,7 @@ class Stage:
                 RequestView(name, arc.parameters["owner"], RequestState.WAITING, [], 0.0, 0.0, 0.0, "", [], 5.0, "", 0)
                 for name, arc in self.placer.arcs.items()
             ]
-            return Schedule(now_s, [RcView("scout1", "scout", "up", False, 1.0, held, 1, [], [])], requests, [])
+            return Schedule(now_s, [robot_view("scout1", held)], requests, [])
 
         self.rc_manager.serve(RC_MANAGER, AskSchedule, answer)
 

@@ -62,6 +62,7 @@ export interface ComponentState {
   absent: Absence[];
   stop: StandingStop | null;
   user: string;
+  is_robot: boolean;
 }
 
 export interface ConsentView {
