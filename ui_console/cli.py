@@ -20,11 +20,11 @@ from backbone.command_line.options import (
 )
 from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode, say
+from ui_console.model.arc_kinds import Sight
 from ui_console.model.profile import Profile
 
-KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
-"""With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
-others; a script needs no picture, so it waits for none to settle and leaves the video frequency to others too."""
+SIGHTS = {Profile.TERMINAL: Sight.PICTURES, Profile.PENDANT: Sight.BROADCAST}
+"""With a screen, pictures come to this machine; a person with a pendant looks at a video monitor."""
 
 WEB_PORT = 8420  # chosen: free on most machines
 LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
@@ -97,7 +97,7 @@ def attach(
             help="Shortest useful time beside equals, seconds.",
         ),
     ] = 5.0,
-    kind: Annotated[str, typer.Option(help="Kind of ARC; default: what the console shows needs.")] = "",
+    kind: Annotated[str, typer.Option(help="Kind of ARC; default: the robot's, for what the console shows.")] = "",
     away_after: Annotated[
         float,
         typer.Option(
@@ -122,7 +122,8 @@ def attach(
     wished = {
         "robot": robot,
         "priority": priority,
-        "kind": kind or KINDS["script" if script else profile],
+        "kind": kind,
+        "sight": Sight.NOTHING if script else SIGHTS[profile],
         "minimum_runtime_s": minimum_runtime,
     }
     if script:
@@ -132,7 +133,7 @@ def attach(
     _need_a_terminal("attach", "--script FILE or --json")
     from ui_console.terminal.on_screen import Looks, drive_by_hand
 
-    sees = wished["kind"] == KINDS[Profile.TERMINAL] and profile is Profile.TERMINAL
+    sees = SIGHTS[profile] is Sight.PICTURES
     looks = Looks(profile, user, sees, is_bare=video_only, has_gamepad=gamepad)
     run(lambda: drive_by_hand(where, {**wished, "away_after_s": away_after}, looks))
 
@@ -182,7 +183,7 @@ def serve(
     design: Annotated[
         str, typer.Option(help="Serve the designer of this mission file instead; nothing needs to be up.")
     ] = "",
-    kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim.")] = KINDS["terminal"],
+    kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim; default: the robot's.")] = "",
     new_tokens: Annotated[
         bool,
         typer.Option("--new-tokens", help="Forget the tokens of the server before; its open pages do not come back."),

@@ -9,6 +9,7 @@ import msgspec
 from backbone.bus.interface import Bus
 from backbone.naming import component_of
 from resource_pool.arc_client import ROBOT, PathNode, arc_name, claim_parameters
+from ui_console.model.arc_kinds import Sight
 
 ANY_ROBOT = "any robot"
 ANY_CAMERA = {ROBOT: ["camera"]}
@@ -19,7 +20,8 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
 
     Attributes:
         robot: Robot to claim; empty: any free one with a camera.
-        kind: Component type of the ARC.
+        kind: Component type of the ARC; empty: one for the robot, by ``sight``.
+        sight: What the operator is to see of the robot.
         priority: Among the consoles and the mission; larger is higher.
         minimum_runtime_s: Shortest useful time, seconds; only matters beside equals.
         away_after_s: The console gives the robot back after so long without a touch of its operator, so that the robot
@@ -27,7 +29,8 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
     """
 
     robot: str = ""
-    kind: str = "capture"
+    kind: str = ""
+    sight: Sight = Sight.PICTURES
     priority: int = 100
     minimum_runtime_s: float = 5.0
     away_after_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0

@@ -31,6 +31,7 @@ from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
 from ui_console.session.controls import Controls
 from ui_console.session.hand_over import AskHandOver, HandOver
+from ui_console.session.kind_finder import find_arc_kind
 from ui_console.session.observer import Observer
 from ui_console.session.presence import Presence
 from ui_console.session.stop_ear import StopEar
@@ -84,6 +85,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._is_asking = self._takes_next = False
         self._asked_s = 0.0
         self._grants = 0
+        self._finds_kind = not self.parameters.kind
+        self._finding: asyncio.Task[None] | None = None
         self._decided = asyncio.Event()
         self._controls = Controls(self)
         self._consent = ConsentTalk(self, self.give_back)
@@ -118,6 +121,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
             return
         if self._is_asking:
             return
+        if not self.parameters.kind:
+            if self._finding is None or self._finding.done():
+                self._decided.clear()
+                self._finding = self.start_task(self._find_kind_and_take(), "kind of ARC")
+            return
         wished, rested = self.parameters, self._arc
         claim = (wished.kind, wished.claim(self.address))
         self._rests = self._rests and self._claimed == claim
@@ -147,7 +155,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
             if robot != self._next_robot:
                 return
             if robot != self.parameters.robot:
-                self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
+                kind = "" if self._finds_kind else self.parameters.kind
+                self.parameters = msgspec.structs.replace(self.parameters, robot=robot, kind=kind)
                 await self.give_back(f"{self.user} takes {robot}", for_good=True)
             self.take()
 
@@ -213,6 +222,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
             wanted: False if the operator did not ask for it.
         """
         async with self._giving_back:
+            if self._finding is not None:
+                self._finding.cancel()
+                self._finding = None
             if self._arc is not None and (self._is_asking or for_good):
                 await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
         if self._takes_next and self.is_ready:
@@ -363,6 +375,24 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not self._watches and state.number > 0:  # 0: it never was stopped
             self.show(events.Heard(self.clock.now_s(), state))
 
+    async def _find_kind_and_take(self) -> None:
+        wished = self.parameters
+        try:
+            kind = await find_arc_kind(self.bus, self.clock, wished.robot, wished.sight)
+        except Refusal as refusal:
+            self._claim_refused(refusal)
+            return
+        self._finding = None
+        if self.parameters == wished:
+            self.parameters = msgspec.structs.replace(wished, kind=kind)
+            self.take()
+
+    def _claim_refused(self, refusal: Refusal) -> None:
+        self.refusal = refusal
+        refused = events.CommandRefused(self.clock.now_s(), code_of(refusal), refusal.detail, refusal.remedy, True)
+        self.show(refused)
+        self._decided.set()
+
     async def _keep(self, arc: ArcClient, rested: ArcClient | None) -> None:
         """Keep the ARC as it was claimed; first end an ARC that rested and cannot be used any more."""
         assert self._claimed is not None  # noqa: S101  made in take
@@ -375,10 +405,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         except Refusal as refusal:
             self._controls.disconnect()
             self._arc, self._keeping, self._is_asking = None, None, False
-            self.refusal = refusal
-            refused = events.CommandRefused(self.clock.now_s(), code_of(refusal), refusal.detail, refusal.remedy, True)
-            self.show(refused)
-            self._decided.set()
+            self._claim_refused(refusal)
 
     def _saw(self, frame: Frame) -> None:
         if self._see is not None:

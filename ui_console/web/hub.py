@@ -54,12 +54,12 @@ class WebHub:
         bus: Of that component.
         clock: The mission's time.
         join: Opens a bus for one more component of this process.
-        kind: Component type of the ARCs that operators claim.
+        kind: Component type of the ARCs that operators claim; empty: one for the robot, with pictures.
         away_after_s: A console gives its robot back after so long without a touch of its operator; 0: never.
     """
 
     def __init__(
-        self, launch: Launch, bus: Bus, clock: Clock, join: Join, *, kind: str = "capture", away_after_s: float = 0.0
+        self, launch: Launch, bus: Bus, clock: Clock, join: Join, *, kind: str = "", away_after_s: float = 0.0
     ) -> None:
         self.clock = clock
         self.team = TeamModel(launch.mission, LIFT_REMEDY)

@@ -32,7 +32,7 @@ class Stage:
         self.network, self.clock = network, VirtualClock()
         self.robot = StoppableRobot(*self._who(Subsystem.RESOURCE_POOL, "scout1"))
         launch, bus, clock = self._who(Subsystem.UI_CONSOLE, "web-1")
-        self.hub = WebHub(launch, bus, clock, self._join)
+        self.hub = WebHub(launch, bus, clock, self._join, kind="capture")
         self.ben = ConsoleModel("ben", "ben")
         self.terminal: Observer[Any] = Observer(
             *self._who(Subsystem.UI_CONSOLE, "ben"), show=self.ben.apply, user="ben"

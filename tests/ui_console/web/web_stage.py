@@ -153,7 +153,7 @@ class Stage:
         async def join(one_more: Launch) -> Bus:
             return network.join(one_more.address, clock)
 
-        self.hub = WebHub(launch, network.join(launch.address, clock), clock, join)
+        self.hub = WebHub(launch, network.join(launch.address, clock), clock, join, kind="capture")
         self.port = 0
         self.robots: dict[str, FakeRobot] = {}
         self._network = network

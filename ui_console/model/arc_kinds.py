@@ -1,0 +1,58 @@
+"""Which kind of ARC a console claims for a robot. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from enum import StrEnum
+
+from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
+from backbone.errors import Refusal
+
+
+class Sight(StrEnum):
+    """What the operator is to see of the robot."""
+
+    PICTURES = "pictures"  # pictures come to this machine
+    BROADCAST = "broadcast"  # the robot transmits to a video monitor; a framegrabber is left to others
+    NOTHING = "nothing"  # no picture, so the robot waits for none to settle, and leaves the frequency to others
+
+
+class NoArcKind(Refusal):
+    """No kind of ARC of this mission drives the robot."""
+
+    code = "console.no_arc_kind"
+    remedy = "Declare an ARC kind for it in the mission file (docs/how-to/add-a-robot.md), or name one by --kind."
+
+
+def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources: Collection[Resource]) -> str:
+    """Return the kind of ARC to claim: one whose body is this robot, with the RCs that this sight needs and no others.
+
+    Args:
+        robot: The robot; empty: any.
+        types: Component types of the mission.
+        resources: Hardware of the mission.
+
+    Raises:
+        NoArcKind: The mission has no kind for the robot.
+    """
+    there = {resource.type for resource in resources}
+    of_robot = {resource.type for resource in resources if resource.is_robot and robot in ("", resource.name)}
+    drives = [one for one in types if one.needs.get(one.abilities.body, "") in of_robot]
+    complete = [one for one in drives if there.issuperset(one.needs.values())] or drives
+    if not complete:
+        kinds = ", ".join(sorted(of_robot)) or "robot of this name"
+        raise NoArcKind(f"no kind of ARC has a body of kind {kinds}", robot=robot)
+    return min(complete, key=lambda one: _badness(one, sight)).name
+
+
+def _badness(kind: ComponentType, sight: Sight) -> tuple[bool, int, str]:
+    """Return a key: kinds that suit the sight better sort first."""
+    pictures, size = kind.abilities.gives_pictures, len(kind.needs)
+    match sight:
+        case Sight.PICTURES:
+            return not pictures, -size if not pictures else size, kind.name
+        case Sight.BROADCAST:
+            return pictures, -size, kind.name
+        case Sight.NOTHING:
+            return pictures, size, kind.name
