@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from mission_control.vision.frame_averaging import FrameAveraging
 from mission_control.vision.motion_detection import MotionDetector
 from scout_model.camera import Camera
-from scout_model.description import AirDescription, Furniture, ScoutPlace, Target, WorldDescription
+from scout_model.description import AirDescription, Furniture, RobotPlace, Target, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.video_link import Receiver, Signal
 from scout_model.world import World
@@ -64,9 +64,9 @@ class Count:
 
 def crossing(target: Target) -> tuple[list[Picture], list[bool]]:
     """Return the pictures as sent while the target passes, and in which of them it is in view."""
-    places = [ScoutPlace("scout", 1, 4.0, 0.7, math.pi / 2)]
+    places = [RobotPlace("scout", 1, 4.0, 0.7, math.pi / 2)]
     table = [Furniture("table", 6.5, 4.8, 1.6, 0.7, 0.72)]
-    world = World(WorldDescription(9.0, 6.0, 1, furniture=table, scouts=places, targets=[target]))
+    world = World(WorldDescription(9.0, 6.0, 1, furniture=table, robots=places, targets=[target]))
     pictures: list[Picture] = []
     for _ in range(FRAMES_PER_S):
         world.step_frame()

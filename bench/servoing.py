@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mission_control.vision.servo_law import HALT, STOP_M, Command, Stage
 from mission_control.vision.visual_servo import VisualServo
 from scout_model.camera import Camera
-from scout_model.description import CLEAN_AIR, AirDescription, Landmark, ScoutPlace, WorldDescription
+from scout_model.description import CLEAN_AIR, AirDescription, Landmark, RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, WHEEL_SPEED_LIMIT_RAD_S
 from scout_model.radio_link import encode_drive
 from scout_model.scout import wheels_rad_s
@@ -63,8 +63,8 @@ def run(seed: int, air: AirDescription, *, limit_s: float = LIMIT_S) -> Trial:
     range_m = float(rng.uniform(NEAREST_M, FARTHEST_M))
     off_axis_rad = float(rng.uniform(-OFF_AXIS_RAD, OFF_AXIS_RAD))
     ahead_m, left_m = range_m * math.cos(off_axis_rad), range_m * math.sin(off_axis_rad)
-    place = ScoutPlace("scout", 1, BOARD.x_m - ahead_m, BOARD.y_m + left_m, float(rng.uniform(-math.pi, math.pi)))
-    world = World(WorldDescription(*ROOM_M, seed=seed, scouts=[place], landmarks=[BOARD]))
+    place = RobotPlace("scout", 1, BOARD.x_m - ahead_m, BOARD.y_m + left_m, float(rng.uniform(-math.pi, math.pi)))
+    world = World(WorldDescription(*ROOM_M, seed=seed, robots=[place], landmarks=[BOARD]))
     receiver, servo = Receiver(seed, "A", air), VisualServo()
     sent: list[Command] = [HALT] * LATENCY_FRAMES
     frames = tracked = 0

@@ -27,7 +27,7 @@ from mission_control.vision.target_acquisition import acquire
 from mission_control.vision.target_pose import estimate_poses
 from mission_control.vision.visual_servo import VisualServo
 from scout_model.camera import Camera
-from scout_model.description import AirDescription, Landmark, ScoutPlace, WorldDescription
+from scout_model.description import AirDescription, Landmark, RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.radio_link import encode_drive
 from scout_model.video_link import Receiver, Signal
@@ -44,7 +44,7 @@ def drive_up(frames: int, noise: float) -> list[Picture]:
             6.0,
             8.0,
             1,
-            scouts=[ScoutPlace("scout", 1, 3.3, 4.2, -0.1)],
+            robots=[RobotPlace("scout", 1, 3.3, 4.2, -0.1)],
             landmarks=[Landmark("home", 5.5, 4.0, math.pi)],
         )
     )

@@ -15,7 +15,7 @@ from measuring import percentile
 
 from scout_model import radio_link
 from scout_model.camera import Camera
-from scout_model.description import Furniture, ScoutPlace, Target, WorldDescription
+from scout_model.description import Furniture, RobotPlace, Target, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.video_link import Receiver, Signal
 from scout_model.world import World
@@ -33,8 +33,8 @@ def description() -> WorldDescription:
         6.0,
         seed=1,
         furniture=[Furniture(f"table{number}", 0.9 + 0.9 * number, 5.5, 0.6, 0.5, 0.7) for number in range(9)],
-        scouts=[
-            ScoutPlace(f"scout{number}", number, 0.8 * number, 1.0, 0.3 * number) for number in range(1, SCOUTS + 1)
+        robots=[
+            RobotPlace(f"scout{number}", number, 0.8 * number, 1.0, 0.3 * number) for number in range(1, SCOUTS + 1)
         ],
         targets=[
             Target("pioneer", "pioneer", [(0.0, 3.0), (9.0, 3.0)], 0.5),

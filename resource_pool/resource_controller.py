@@ -93,6 +93,8 @@ class ResourceController(Component[R], Generic[R]):
     """Field of its commands → smallest and largest value that the hardware obeys, if narrower than the field's."""
     reports: ClassVar[type[msgspec.Struct] | None] = None
     """Struct of its reports; None: it reports nothing but its state."""
+    body_class: ClassVar[str] = ""
+    """Class path of a robot's body in simulated worlds, see ``scout_model.robot``; empty: mission files name one."""
     driver_kind: ClassVar[str] = ""
     """Kind of its driver; empty: it has no driver."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
@@ -125,6 +127,7 @@ class ResourceController(Component[R], Generic[R]):
         """Return its commands and reports, see ``Component``."""
         return Abilities(
             is_robot=cls.is_robot,
+            body_class=cls.body_class,
             commands=[
                 command_form(kind, kind.word(), moves=kind.moves, without=OF_THE_BASE, limits=cls.limits)
                 for kind in (kinds_of(cls.commands) if cls.commands is not None else ())

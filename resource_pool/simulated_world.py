@@ -52,7 +52,7 @@ class SimulatedWorld(Component[WorldParameters]):
         self._world = World(described)
         self._antenna_m = antenna_m(described.air, described.width_m, described.depth_m)
         self._air = RadioAir(described.seed, described.air)
-        self._robots = {scout.network_id: scout.name for scout in described.scouts}
+        self._robots = {scout.network_id: scout.name for scout in described.robots}
         self._on_since: dict[str, tuple[str, int]] = {}
         self._epochs: dict[int, int] = {}
         self._stops: dict[int, tuple[int, int]] = {}
@@ -86,7 +86,7 @@ class SimulatedWorld(Component[WorldParameters]):
         """Answer ``AskWorld`` and ``AskPose``."""
         match asked.body:
             case AskWorld():
-                robots = {scout.name: scout.network_id for scout in self.parameters.world.scouts}
+                robots = {scout.name: scout.network_id for scout in self.parameters.world.robots}
                 described = self.parameters.world
                 return WorldModel(self._world.mjcf, robots, described.seed, described.air, self._antenna_m)
             case AskPose(body=body):

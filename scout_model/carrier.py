@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from scout_model.description import ScoutPlace, Target, WorldDescription
+from scout_model.description import RobotPlace, Target, WorldDescription
 from scout_model.dimensions import (
     CARRIER_DECK_M,
     CARRIER_LENGTH_M,
@@ -51,7 +51,7 @@ class CarriedPose:
 @dataclass(frozen=True, slots=True)
 class _Stop:
     at_m: float
-    place: ScoutPlace
+    place: RobotPlace
     slot: int
 
 
@@ -63,7 +63,7 @@ class CarrierTrip:
         places: Where its passengers are to be set down, in the order of the mission file.
     """
 
-    def __init__(self, target: Target, places: list[ScoutPlace]) -> None:
+    def __init__(self, target: Target, places: list[RobotPlace]) -> None:
         self._target, self._route = target, Route(target)
         leg_s = path_length_m(target.path) / target.speed_m_s
         # The first millimetre of a further lap would lead it back.
@@ -109,7 +109,7 @@ class CarrierTrip:
 def trips(description: WorldDescription) -> dict[str, CarrierTrip]:
     """Return the trip of each carrier, by its name."""
     return {
-        target.name: CarrierTrip(target, [place for place in description.scouts if place.carried_by == target.name])
+        target.name: CarrierTrip(target, [place for place in description.robots if place.carried_by == target.name])
         for target in description.targets
         if target.shape == CARRIER
     }
@@ -123,7 +123,7 @@ def check_stops(description: WorldDescription) -> None:
     """
     carriers = {target.name: target for target in description.targets if target.shape == CARRIER}
     aboard = dict.fromkeys(carriers, 0)
-    for place in description.scouts:
+    for place in description.robots:
         if not place.carried_by:
             continue
         carrier = carriers.get(place.carried_by)
@@ -140,7 +140,7 @@ def check_stops(description: WorldDescription) -> None:
             )
 
 
-def _nearest(target: Target, place: ScoutPlace) -> tuple[float, float]:
+def _nearest(target: Target, place: RobotPlace) -> tuple[float, float]:
     """Return how far a place is from the path, and how far along the path that is, metres."""
     best, behind_m = (math.inf, 0.0), 0.0
     for (ax, ay), (bx, by) in pairwise(target.path):
@@ -170,7 +170,7 @@ def _aboard(carrier: TargetState, slot: int) -> CarriedPose:
     )
 
 
-def _between(aboard: CarriedPose, place: ScoutPlace, share: float) -> CarriedPose:
+def _between(aboard: CarriedPose, place: RobotPlace, share: float) -> CarriedPose:
     """Return where the arm holds a Scout after this share, 0 to 1, of the time it takes to set it down."""
     reach = min(1.0, max(0.0, (share - _LIFT_SHARE) / (1 - 2 * _LIFT_SHARE)))
     top_m = aboard.z_m + _LIFT_M

@@ -13,7 +13,7 @@ from importlib import resources
 import mujoco
 import numpy as np
 
-from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, ScoutPlace, Target, WorldDescription
+from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, RobotPlace, Target, WorldDescription
 from scout_model.description_checks import check
 from scout_model.dimensions import (
     BLOB_DIAMETER_M,
@@ -69,7 +69,7 @@ def compose(description: WorldDescription) -> str:
         _add_ramp(spec, ramp)
     for landmark in description.landmarks:
         _add_landmark(spec, landmark)
-    for place in description.scouts:
+    for place in description.robots:
         _add_robot(spec, place)
     for target in description.targets:
         _add_target(spec, target)
@@ -272,7 +272,7 @@ def _add_landmark(spec: mujoco.MjSpec, landmark: Landmark) -> None:
         _part(body, name, _CYLINDER, [0.0, right_m, up_m], size_m, 0.05, _MARKS, quat=facing)
 
 
-def _add_robot(spec: mujoco.MjSpec, place: ScoutPlace) -> None:
+def _add_robot(spec: mujoco.MjSpec, place: RobotPlace) -> None:
     frame = spec.worldbody.add_frame(pos=[place.x_m, place.y_m, 0.0], quat=_turned(place.heading_rad))
     try:
         body = mujoco.MjSpec.from_string(robot_class(place.kind).body_mjcf())

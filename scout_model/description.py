@@ -94,7 +94,7 @@ SCOUT = "scout_model.scout:Scout"
 """Class path of the robot of the papers."""
 
 
-class ScoutPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class RobotPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A Scout, or a robot of another kind, and where it begins.
 
     Attributes:
@@ -197,7 +197,7 @@ class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         depth_m: Along y.
         seed: Of everything random in it.
         furniture: What stands on the floor.
-        scouts: Robots.
+        robots: Robots.
         targets: Moving bodies.
         air: Between them and the base.
         ramps: Slopes.
@@ -210,7 +210,7 @@ class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     depth_m: float
     seed: int = 0
     furniture: list[Furniture] = []
-    scouts: list[ScoutPlace] = []
+    robots: list[RobotPlace] = []
     targets: list[Target] = []
     air: AirDescription = AirDescription()
     ramps: list[Ramp] = []

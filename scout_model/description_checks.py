@@ -6,7 +6,7 @@ import math
 from collections import Counter
 
 from scout_model.carrier import check_stops
-from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, ScoutPlace, Target, WorldDescription
+from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, RobotPlace, Target, WorldDescription
 from scout_model.dimensions import TABLE_LEG_M, TABLE_TOP_M
 from scout_model.errors import InvalidWorld
 from scout_model.radio_link import FIRST_NETWORK_ID, LAST_NETWORK_ID
@@ -25,9 +25,9 @@ def check(description: WorldDescription) -> None:
     width_m, depth_m = description.width_m, description.depth_m
     if not (0 < width_m < math.inf and 0 < depth_m < math.inf):
         raise InvalidWorld(f"a room of {width_m} by {depth_m} m")
-    parts: list[Furniture | ScoutPlace | Target | Ramp | Landmark | DarkPlace] = [
+    parts: list[Furniture | RobotPlace | Target | Ramp | Landmark | DarkPlace] = [
         *description.furniture,
-        *description.scouts,
+        *description.robots,
         *description.targets,
         *description.ramps,
         *description.landmarks,
@@ -37,13 +37,13 @@ def check(description: WorldDescription) -> None:
     for name, uses in names.items():
         if uses > 1 or not name or "/" in name:
             raise InvalidWorld(f"name {name!r} is empty, has a '/', or is used {uses} times")
-    ids = Counter(place.network_id for place in description.scouts)
+    ids = Counter(place.network_id for place in description.robots)
     for network_id, uses in ids.items():
         if uses > 1 or not FIRST_NETWORK_ID <= network_id <= LAST_NETWORK_ID:
             raise InvalidWorld(
                 f"network id {network_id} is used {uses} times or outside {FIRST_NETWORK_ID} to {LAST_NETWORK_ID}"
             )
-    for place in description.scouts:
+    for place in description.robots:
         if not (0 < place.x_m < width_m and 0 < place.y_m < depth_m and math.isfinite(place.heading_rad)):
             raise InvalidWorld(f"{place.name} at ({place.x_m}, {place.y_m}) m is not in the room")
         robot_class(place.kind)

@@ -76,10 +76,10 @@ class World:
         self.frame = 0
         """Frames stepped so far."""
         self._step = 0
-        self._robots = {place.name: self._body(place.name, place.kind) for place in description.scouts}
-        self._by_network_id = {place.network_id: self._robots[place.name] for place in description.scouts}
+        self._robots = {place.name: self._body(place.name, place.kind) for place in description.robots}
+        self._by_network_id = {place.network_id: self._robots[place.name] for place in description.robots}
         self._trips = trips(description)
-        self._carried = {place.name: self._trips[place.carried_by] for place in description.scouts if place.carried_by}
+        self._carried = {place.name: self._trips[place.carried_by] for place in description.robots if place.carried_by}
         self._rest = self._data.qpos.copy()
         self._targets = {target.name: target for target in description.targets}
         self._whereabouts = {

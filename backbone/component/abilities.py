@@ -96,6 +96,7 @@ class Abilities(Message, frozen=True):
         is_robot: True for an RC of a robot with a body, which operators can stop.
         gives_pictures: True for an ARC whose owner gets pictures.
         body: Role of the RC with a body in an ARC; empty: none.
+        body_class: Class path of the body of a robot's RC in a simulated world; empty: the mission file names one.
         commands: What an RC obeys, or an ARC passes on.
         reports: Fields of its reports.
     """
@@ -103,6 +104,7 @@ class Abilities(Message, frozen=True):
     is_robot: bool = False
     gives_pictures: bool = False
     body: Mention = ""
+    body_class: Line = ""
     commands: Annotated[list[CommandForm], FEW] = []
     reports: Annotated[list[FieldForm], FEW] = []
 

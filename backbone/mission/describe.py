@@ -51,7 +51,7 @@ def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFa
         core=_core(mission, [host.name for host in hosts]),
         types=types,
         resources=tuple(_resource(resource, world, host_of_process, robots) for resource in resources),
-        components=() if world is None else (_world(world, resources, source, host_of_process),),
+        components=() if world is None else (_world(world, resources, source, host_of_process, types),),
         behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
         source=source,
     )
@@ -121,28 +121,46 @@ def _arc(declared: ArcElement) -> ArcWish:
 
 # ---------------------------------------------------------------------- the world
 def _world(
-    world: WorldElement, resources: Sequence[ResourceElement], source: str, host_of_process: Mapping[str, str]
+    world: WorldElement,
+    resources: Sequence[ResourceElement],
+    source: str,
+    host_of_process: Mapping[str, str],
+    types: Sequence[ComponentType],
 ) -> ComponentDescription:
-    ids = {one.name: _parameters(one.parameter).get(NETWORK_ID) for one in resources}
+    body_of = {one.name: one.abilities.body_class for one in types}
+    given = {
+        one.name: {NETWORK_ID: _parameters(one.parameter).get(NETWORK_ID), "kind": body_of.get(one.type, "")}
+        for one in resources
+    }
     return ComponentDescription(
         type=world.type,
         name=world.name,
         host=world.host or host_of_process.get(world.process, ""),
-        parameters={**_parameters(world.parameter), WORLD: _world_content(world, ids, source)},
+        parameters={**_parameters(world.parameter), WORLD: _world_content(world, given, source)},
         process=world.process,
     )
 
 
-def _world_content(world: WorldElement, ids: Mapping[str, object], source: str) -> dict[str, object]:
-    """Return the world as plain data, with the field names of ``scout_model.description.WorldDescription``."""
+def _world_content(world: WorldElement, given: Mapping[str, Mapping[str, object]], source: str) -> dict[str, object]:
+    """Return the world as plain data, with the field names of ``scout_model.description.WorldDescription``.
+
+    Args:
+        world: The declared world.
+        given: Robot → what its resource says of its body.
+        source: Path of the mission file.
+    """
     return {
         "width_m": world.room.width_m,
         "depth_m": world.room.depth_m,
         "seed": world.seed,
         "furniture": list(map(_body, world.furniture)),
-        "scouts": [
-            {**_body(scout, "class_path"), "kind": scout.class_path, NETWORK_ID: ids[scout.name]}
-            for scout in world.scout
+        "robots": [
+            {
+                **_body(robot, "class_path"),
+                **given[robot.name],
+                **({"kind": robot.class_path} if robot.class_path else {}),
+            }
+            for robot in world.robot
         ],
         "targets": list(map(_target, world.target)),
         "ramps": list(map(_body, world.ramp)),

@@ -17,6 +17,10 @@ from backbone.mission.report import Report, listed, quoted
 FOR_EDITORS = frozenset({"xmlns:xsi", "xsi:noNamespaceSchemaLocation"})  # let an editor complete; mean nothing here
 
 
+FORMER_ROBOT = "scout"
+"""Tag of a robot's body in mission files from before there were other robots; still read."""
+
+
 def repair(root: Element, report: Report) -> bool:
     """Report what has no place in the file; afterwards the tree holds declared elements and attributes only.
 
@@ -32,6 +36,8 @@ def repair(root: Element, report: Report) -> bool:
         return False
     for name in FOR_EDITORS:
         root.attributes.pop(name, None)
+    for body in (child for world in root.all("world") for child in world.children if child.tag == FORMER_ROBOT):
+        body.tag = "robot"
     _repair(root, report)
     return True
 

@@ -22,7 +22,8 @@ from backbone.mission.tables import (
 )
 from backbone.naming import Subsystem, is_legal
 
-BODIES = ("furniture", "ramp", "landmark", "dark", "scout", "target")
+BODY = 'Write class="package.module:Class" of the robot\'s body, importable on this machine'
+BODIES = ("furniture", "ramp", "landmark", "dark", "robot", "target")
 CARRIER = "carrier"  # the shape of a target that brings robots in
 NEAREST_SET_DOWN_M, FARTHEST_SET_DOWN_M = 0.45, 1.2  # as scout_model.dimensions has them; a test compares
 CARRIER_PLACES = 6  # same
@@ -42,7 +43,7 @@ def check_world(tables: Tables, report: Report) -> None:
     bodies = [child for child in world.children if child.tag in BODIES]
     check_unique(bodies, "name", "body", report)
     _check_robots(world, tables, report)
-    _check_classes(world, report)
+    _check_classes(world, tables, report)
     room = world.first("room")
     if room is not None:
         check_room_file(room, report)
@@ -52,9 +53,9 @@ def check_world(tables: Tables, report: Report) -> None:
             for place in body.all("point") if body.tag == "target" else [body]:
                 _check_inside(place, body, width_m, depth_m, report)
     boxes = [box for box in world.all("furniture") if box.text("shape") != "table"]
-    _check_not_in_boxes(world.all("scout"), boxes, report)
+    _check_not_in_boxes(world.all("robot"), boxes, report)
     _check_tables(world, report)
-    _check_not_in_ramps(world.all("scout"), world.all("ramp"), report)
+    _check_not_in_ramps(world.all("robot"), world.all("ramp"), report)
     _check_carried(world, report)
     for target in world.all("target"):
         _check_path(target, report)
@@ -80,20 +81,20 @@ def _check_type(world: Element, tables: Tables, report: Report) -> None:
 
 def _check_robots(world: Element, tables: Tables, report: Report) -> None:
     robots = {robot.text("name"): robot for robot in tables.robots()}
-    bodies = {scout.text("name") for scout in world.all("scout")}
-    for scout in world.all("scout"):
-        name = scout.text("name")
-        if not is_known(scout, "name", "resource", sorted(tables.resources), report):
+    bodies = {robot.text("name") for robot in world.all("robot")}
+    for robot in world.all("robot"):
+        name = robot.text("name")
+        if not is_known(robot, "name", "resource", sorted(tables.resources), report):
             continue
         if name not in robots:
             report.fault(
-                scout.place_of("name"),
+                robot.place_of("name"),
                 f"resource {name} has no network id, so it is no robot and has no body",
                 f'Name a robot, or add <parameter name="{NETWORK_ID}" value="…"/> to the resource',
             )
         elif tables.resources[name].text("driver") != SIMULATED:
             report.fault(
-                scout.place_of("name"),
+                robot.place_of("name"),
                 f"resource {name} is real (driver {tables.resources[name].text('driver')}), but has a simulated body",
                 'Remove the body, or write driver="simulated"',
             )
@@ -103,7 +104,7 @@ def _check_robots(world: Element, tables: Tables, report: Report) -> None:
                 robot.place_of("name"),
                 f"simulated robot {quoted(name)} has no body in the world"
                 f"{report.hint(name, sorted(bodies - tables.resources.keys()))}",
-                f'Add <scout name="{name}" x-m="…" y-m="…"/> to <world>',
+                f'Add <robot name="{name}" x-m="…" y-m="…"/> to <world>',
             )
 
 
@@ -121,16 +122,16 @@ def _check_inside(place: Element, body: Element, width_m: float, depth_m: float,
         )
 
 
-def _check_not_in_boxes(scouts: list[Element], boxes: list[Element], report: Report) -> None:
-    if len(scouts) * len(boxes) > PAIRS_AT_MOST:
+def _check_not_in_boxes(robots: list[Element], boxes: list[Element], report: Report) -> None:
+    if len(robots) * len(boxes) > PAIRS_AT_MOST:
         return
     extents = [(box, [box.number(name) for name in ("x-m", "y-m", "width-m", "depth-m")]) for box in boxes]
-    for scout in scouts:
-        x_m, y_m = scout.number("x-m"), scout.number("y-m")
+    for robot in robots:
+        x_m, y_m = robot.number("x-m"), robot.number("y-m")
         for box, (box_x_m, box_y_m, width_m, depth_m) in extents:
             if _is_within(x_m, box_x_m, width_m) and _is_within(y_m, box_y_m, depth_m):
                 report.fault(
-                    scout.place, f"scout {scout.text('name')} stands inside {box.text('name')}", "Move one of them"
+                    robot.place, f"robot {robot.text('name')} stands inside {box.text('name')}", "Move one of them"
                 )
 
 
@@ -147,22 +148,22 @@ def _check_tables(world: Element, report: Report) -> None:
                 )
 
 
-def _check_not_in_ramps(scouts: list[Element], ramps: list[Element], report: Report) -> None:
-    if len(scouts) * len(ramps) > PAIRS_AT_MOST:
+def _check_not_in_ramps(robots: list[Element], ramps: list[Element], report: Report) -> None:
+    if len(robots) * len(ramps) > PAIRS_AT_MOST:
         return
     for ramp in ramps:
         heading_rad = math.radians(ramp.number("heading-deg") or 0.0)
         x_m, y_m = ramp.number("x-m"), ramp.number("y-m")
-        for scout in scouts:
-            scout_x_m, scout_y_m = scout.number("x-m"), scout.number("y-m")
-            if x_m is None or y_m is None or scout_x_m is None or scout_y_m is None:
+        for robot in robots:
+            robot_x_m, robot_y_m = robot.number("x-m"), robot.number("y-m")
+            if x_m is None or y_m is None or robot_x_m is None or robot_y_m is None:
                 continue
-            east_m, north_m = scout_x_m - x_m, scout_y_m - y_m
+            east_m, north_m = robot_x_m - x_m, robot_y_m - y_m
             along_m = east_m * math.cos(heading_rad) + north_m * math.sin(heading_rad)
             across_m = north_m * math.cos(heading_rad) - east_m * math.sin(heading_rad)
             if _is_within(along_m, 0.0, ramp.number("length-m")) and _is_within(across_m, 0.0, ramp.number("width-m")):
                 report.fault(
-                    scout.place, f"scout {scout.text('name')} stands inside {ramp.text('name')}", "Move one of them"
+                    robot.place, f"robot {robot.text('name')} stands inside {ramp.text('name')}", "Move one of them"
                 )
 
 
@@ -183,44 +184,56 @@ def _check_path(target: Element, report: Report) -> None:
         )
 
 
-def _check_classes(world: Element, report: Report) -> None:
-    for scout in world.all("scout"):
-        class_path = scout.text("class")
+def _check_classes(world: Element, tables: Tables, report: Report) -> None:
+    for robot in world.all("robot"):
+        class_path = robot.text("class")
+        if not class_path:
+            _check_body(robot, tables, report)
+            continue
         wrong = class_path_fault(class_path) if CLASS_PATH.fullmatch(class_path) else None
         if wrong is not None:
             message, there = wrong
             report.fault(
-                scout.place_of("class"),
+                robot.place_of("class"),
                 f"{class_path}: {message}{report.hint(class_path.rpartition(':')[2], there)}",
-                "Write the class of the robot's body as package.module:Class, importable on this machine",
+                BODY,
             )
+
+
+def _check_body(robot: Element, tables: Tables, report: Report) -> None:
+    """Report a robot without a class whose type names no body; a name of no robot is reported elsewhere."""
+    kinds = {resource.text("name"): resource.text("type") for resource in tables.robots()}
+    kind = kinds.get(robot.text("name"), "")
+    facts = tables.facts_of(kind)
+    if facts is not None and not facts.abilities.body_class:
+        report.fault(robot.place, f"type {kind} of {robot.text('name')} names no body", BODY)
 
 
 def _check_carried(world: Element, report: Report) -> None:
     """Report robots whose carrier there is not, has no place left for them, or cannot reach where they belong."""
     carriers = {target.text("name"): target for target in world.all("target") if target.text("shape") == CARRIER}
     aboard = dict.fromkeys(carriers, 0)
-    for scout in world.all("scout"):
-        carrier = scout.text("carried-by")
-        if not carrier or not is_known(scout, "carried-by", "carrier", carriers, report) or carrier not in carriers:
+    for robot in world.all("robot"):
+        carrier = robot.text("carried-by")
+        if not carrier or not is_known(robot, "carried-by", "carrier", carriers, report) or carrier not in carriers:
             continue
         aboard[carrier] += 1
         if aboard[carrier] == CARRIER_PLACES + 1:
             report.fault(
-                scout.place_of("carried-by"), f"{carrier} has {CARRIER_PLACES} places", "Give it to another carrier"
+                robot.place_of("carried-by"), f"{carrier} has {CARRIER_PLACES} places", "Give it to another carrier"
             )
-        distance_m = _distance_to_path_m(scout, carriers[carrier])
+        distance_m = _distance_to_path_m(robot, carriers[carrier])
         if distance_m is not None and not NEAREST_SET_DOWN_M <= distance_m <= FARTHEST_SET_DOWN_M:
             report.fault(
-                scout.place_of("carried-by"),
-                f"{carrier} passes {scout.text('name')}'s place {distance_m:.2f} m away",
+                robot.place_of("carried-by"),
+                f"{carrier} passes {robot.text('name')}'s place {distance_m:.2f} m away",
                 f"Its arm reaches from {NEAREST_SET_DOWN_M} to {FARTHEST_SET_DOWN_M} m beside its path",
             )
 
 
-def _distance_to_path_m(scout: Element, target: Element) -> float | None:
+def _distance_to_path_m(robot: Element, target: Element) -> float | None:
     """Return how far a robot's place is from a target's path; None where a number is missing."""
-    x_m, y_m = scout.number("x-m"), scout.number("y-m")
+    x_m, y_m = robot.number("x-m"), robot.number("y-m")
     points = [(point.number("x-m"), point.number("y-m")) for point in target.all("point")]
     if x_m is None or y_m is None or len(points) < 2:
         return None

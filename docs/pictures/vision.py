@@ -17,7 +17,7 @@ from mission_control.vision.servo_law import HALT, STOP_M, Stage
 from mission_control.vision.skeleton_model import skeleton_px
 from mission_control.vision.visual_servo import VisualServo
 from scout_model.camera import Camera
-from scout_model.description import AS_THE_PAPERS, Landmark, ScoutPlace, Target, WorldDescription
+from scout_model.description import AS_THE_PAPERS, Landmark, RobotPlace, Target, WorldDescription
 from scout_model.radio_link import encode_drive
 from scout_model.scout import wheels_rad_s
 from scout_model.video_link import Receiver, Signal
@@ -39,7 +39,7 @@ VIEW_PX = (480, 480)
 
 def approach() -> tuple[Image, Image]:
     """Return one received picture with the target's models on it, and the way from above."""
-    world = World(WorldDescription(3.0, 3.0, 4, scouts=[ScoutPlace("scout", 1, 0.85, 2.55, -0.2)], landmarks=[BOARD]))
+    world = World(WorldDescription(3.0, 3.0, 4, robots=[RobotPlace("scout", 1, 0.85, 2.55, -0.2)], landmarks=[BOARD]))
     receiver, servo = Receiver(4, "A", AS_THE_PAPERS), VisualServo()
     sent = [HALT] * 2
     marked, way = np.zeros((240, 320, 3), np.uint8), np.full((*VIEW_PX, 3), 255, np.uint8)
@@ -75,9 +75,9 @@ def _above(x_m: float, y_m: float) -> tuple[int, int]:
 def motion() -> Image:
     """Return the stages of a judgment side by side: picture, average, changed, kept."""
     pioneer = Target("pioneer", "pioneer", [(2.6, 3.0), (8.0, 3.0)], 0.5)
-    places = [ScoutPlace("scout", 1, 4.0, 0.7, math.pi / 2)]
+    places = [RobotPlace("scout", 1, 4.0, 0.7, math.pi / 2)]
     world, receiver = (
-        World(WorldDescription(9.0, 6.0, 1, scouts=places, targets=[pioneer])),
+        World(WorldDescription(9.0, 6.0, 1, robots=places, targets=[pioneer])),
         Receiver(1, "A", AS_THE_PAPERS),
     )
     detector, best, torn = MotionDetector(), np.zeros((120, 640), np.uint8), -1

@@ -119,7 +119,7 @@ def plan(mission: Path, time_s: float) -> Image:
     description = described(mission)
     above, world = FromAbove(description), after(World(description), time_s)
     picture = above.draw(world)
-    for scout in description.scouts:
+    for scout in description.robots:
         x_m, y_m, heading_rad = world.pose(scout.name)
         eye = above.pixel(x_m, y_m)
         for side_rad in (-HORIZONTAL_VIEW_RAD / 2, HORIZONTAL_VIEW_RAD / 2):

@@ -31,6 +31,7 @@ class NotFinite(Refusal):
 class Scout(Robot[RobotParameters]):
     """Two wheels and a spring foot."""
 
+    body_class = "scout_model.scout:Scout"
     commands = Move | Drive | Halt | Jump | SwitchTransmitter
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {
         "forward_m_s": (-MOST_M_S, MOST_M_S),

@@ -174,7 +174,7 @@ def two_groups(folder: Path) -> Path:
             parameter.set("value", PLACES[double][2])
         resources.append(resource)
     world = root.find("world")
-    last = world.findall("scout")[-1]
+    last = world.findall("robot")[-1]
     for robot, (x_m, y_m, _network_id) in PLACES.items():
         scout = copy.deepcopy(last)
         for attribute, value in (("name", robot), ("x-m", x_m), ("y-m", y_m)):

@@ -22,7 +22,7 @@ from backbone.wire import Envelope
 from mission_control.messages import MotionSeen
 from resource_pool.drivers.world_messages import AskPose, Pose, WorldState
 from resource_pool.messages import Frame
-from scout_model.description import ScoutPlace, Target, WorldDescription
+from scout_model.description import RobotPlace, Target, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, HORIZONTAL_VIEW_RAD, PIONEER_RADIUS_M
 from scout_model.targets import where
 
@@ -75,7 +75,7 @@ def the_world() -> WorldDescription:
     return msgspec.convert(component.parameters["world"], WorldDescription)
 
 
-def is_in_view(scout: ScoutPlace, target: Target, world_s: float) -> bool:
+def is_in_view(scout: RobotPlace, target: Target, world_s: float) -> bool:
     """Return whether any part of the target could be in the Scout's picture, without regard to furniture."""
     at = where(target, world_s)
     distance_m = math.hypot(at.x_m - scout.x_m, at.y_m - scout.y_m)
@@ -86,7 +86,7 @@ def is_in_view(scout: ScoutPlace, target: Target, world_s: float) -> bool:
 
 def judge(seen: Seen, world: WorldDescription) -> None:
     """Each event has a target that moves in view, or did so a moment ago; no garbage was delivered."""
-    scouts, [target] = {scout.name: scout for scout in world.scouts}, world.targets
+    scouts, [target] = {scout.name: scout for scout in world.robots}, world.targets
     for event in seen.events:
         moments = [event.at_s - seen.world_began_s - back * 0.05 for back in range(int(AFTERIMAGE_S / 0.05))]
         assert any(

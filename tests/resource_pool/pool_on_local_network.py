@@ -38,12 +38,12 @@ from resource_pool.rcs.scout import Scout
 from resource_pool.rcs.skeleton import Lamp, Shine
 from resource_pool.rcs.video_frequency import VideoFrequency
 from resource_pool.simulated_world import SimulatedWorld
-from scout_model.description import ScoutPlace, WorldDescription
+from scout_model.description import RobotPlace, WorldDescription
 
 C = TypeVar("C", bound=Component[Any])
 
 WORLD = WorldDescription(
-    6.0, 6.0, scouts=[ScoutPlace("scout1", 1, 2.0, 2.0, 0.0), ScoutPlace("scout2", 2, 4.0, 4.0, 0.0)]
+    6.0, 6.0, robots=[RobotPlace("scout1", 1, 2.0, 2.0, 0.0), RobotPlace("scout2", 2, 4.0, 4.0, 0.0)]
 )
 HERE = "pool_on_local_network"
 HARDWARE = [

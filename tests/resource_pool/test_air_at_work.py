@@ -25,7 +25,7 @@ from resource_pool.drivers.world_messages import WorldState
 from resource_pool.messages import Applied
 from resource_pool.simulated_world import SimulatedWorld
 from scout_model import radio_link
-from scout_model.description import CLEAN_AIR, AirDescription, ScoutPlace, WorldDescription
+from scout_model.description import CLEAN_AIR, AirDescription, RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.video_link import SETTLING_S
 
@@ -33,7 +33,7 @@ ROOM = WorldDescription(
     8.0,
     8.0,
     seed=5,
-    scouts=[ScoutPlace("scout1", 1, 2.0, 2.0, 0.0), ScoutPlace("scout2", 2, 6.0, 6.0, 0.0)],
+    robots=[RobotPlace("scout1", 1, 2.0, 2.0, 0.0), RobotPlace("scout2", 2, 6.0, 6.0, 0.0)],
     air=CLEAN_AIR,
 )
 DRIVE, HALT = radio_link.encode_drive(10.0, 10.0), radio_link.encode_halt()

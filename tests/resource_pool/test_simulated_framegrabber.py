@@ -16,11 +16,11 @@ from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated_video import GrabberOptions, SimulatedFramegrabber
 from resource_pool.drivers.world_messages import AskWorld, WorldModel, WorldState
-from scout_model.description import ScoutPlace, WorldDescription
+from scout_model.description import RobotPlace, WorldDescription
 from scout_model.world import World
 
 WORLD = WorldDescription(
-    6.0, 6.0, scouts=[ScoutPlace("scout1", 1, 2.0, 2.0, 0.0), ScoutPlace("scout2", 2, 4.0, 4.0, 0.0)]
+    6.0, 6.0, robots=[RobotPlace("scout1", 1, 2.0, 2.0, 0.0), RobotPlace("scout2", 2, 4.0, 4.0, 0.0)]
 )
 
 

@@ -21,7 +21,7 @@ def main() -> None:
     import numpy as np
 
     from scout_model.camera import Camera
-    from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, ScoutPlace, Target, WorldDescription
+    from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, RobotPlace, Target, WorldDescription
     from scout_model.world import World
 
     pictures = {}
@@ -32,10 +32,10 @@ def main() -> None:
                 6.0,
                 seed=1,
                 furniture=[Furniture("table", 2.2, 5.0, 1.6, 0.7, 0.72)],
-                scouts=[
-                    ScoutPlace("scout1", 1, 0.72, 1.764, math.pi / 2),
-                    ScoutPlace("scout2", 2, 7.20, 0.527, math.pi / 2),
-                    ScoutPlace("scout3", 3, 4.5, 1.2, 2.4),
+                robots=[
+                    RobotPlace("scout1", 1, 0.72, 1.764, math.pi / 2),
+                    RobotPlace("scout2", 2, 7.20, 0.527, math.pi / 2),
+                    RobotPlace("scout3", 3, 4.5, 1.2, 2.4),
                 ],
                 targets=[
                     Target(f"pioneer{number}", "pioneer", [begin, (begin[0] + 0.01, 3.0)], 0.5, begin_s=100.0)
@@ -58,12 +58,12 @@ def main() -> None:
             ramps=[Ramp("ramp", 3.0, 3.9, 0.8, 0.6, 0.2, math.pi / 2)],
             landmarks=[Landmark("home", 2.0, 2.0, -0.6)],
             dark_places=[DarkPlace("corner", 8.5, 5.5, 1.0, 1.0, 0.6)],
-            scouts=[
-                ScoutPlace("scout1", 1, 3.0, 2.9, math.pi / 2),
-                ScoutPlace("scout2", 2, 4.0, 3.6, math.pi / 2),
-                ScoutPlace("scout3", 3, 2.8, 1.5, 2.6),
-                ScoutPlace("scout4", 4, 7.3, 4.3, math.pi / 4),
-                ScoutPlace("hidden", 5, 8.2, 5.2, 0.0),
+            robots=[
+                RobotPlace("scout1", 1, 3.0, 2.9, math.pi / 2),
+                RobotPlace("scout2", 2, 4.0, 3.6, math.pi / 2),
+                RobotPlace("scout3", 3, 2.8, 1.5, 2.6),
+                RobotPlace("scout4", 4, 7.3, 4.3, math.pi / 4),
+                RobotPlace("hidden", 5, 8.2, 5.2, 0.0),
             ],
             targets=[Target("carrier", "carrier", [(4.3, 4.4), (5.0, 4.4)], 0.5, begin_s=100.0)],
         )

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scout_model import dimensions, radio_link
-from scout_model.description import Furniture, Ramp, ScoutPlace, WorldDescription
+from scout_model.description import Furniture, Ramp, RobotPlace, WorldDescription
 from scout_model.errors import UnknownBody
 from scout_model.world import World
 
@@ -21,8 +21,8 @@ GRAVITY_M_S2 = 9.81
 
 
 def world(*furniture: Furniture, ramps: list[Ramp] | None = None, x_m: float = 2.0, heading_rad: float = 0.0) -> World:
-    place = ScoutPlace("scout1", 1, x_m, 3.0, heading_rad)
-    return World(WorldDescription(9.0, 6.0, furniture=list(furniture), scouts=[place], ramps=ramps or []))
+    place = RobotPlace("scout1", 1, x_m, 3.0, heading_rad)
+    return World(WorldDescription(9.0, 6.0, furniture=list(furniture), robots=[place], ramps=ramps or []))
 
 
 def drive(room: World, frames: int, left_rad_s: float, right_rad_s: float) -> None:

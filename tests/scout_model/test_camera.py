@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scout_model import gl_probe
 from scout_model.camera import Camera
-from scout_model.description import Furniture, ScoutPlace, Target, WorldDescription
+from scout_model.description import Furniture, RobotPlace, Target, WorldDescription
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
 from scout_model.gl_probe import FOUND_FILE, GlSupport, prepare, probe, probe_once
 from scout_model.world import World
@@ -24,7 +24,7 @@ NORTH = math.pi / 2
 
 def room(*targets: Target, furniture: list[Furniture] | None = None) -> World:
     """The room of the published experiments, with two Scouts watching the path at y = 3."""
-    places = [ScoutPlace("scout1", 1, 0.72, 1.764, NORTH), ScoutPlace("scout2", 2, 7.20, 0.527, NORTH)]
+    places = [RobotPlace("scout1", 1, 0.72, 1.764, NORTH), RobotPlace("scout2", 2, 7.20, 0.527, NORTH)]
     return World(WorldDescription(9.0, 6.0, 1, furniture or [], places, list(targets)))
 
 
@@ -91,10 +91,10 @@ def test_a_standing_scene_gives_the_same_picture_again() -> None:
 
 
 def test_turning_the_scout_turns_its_view() -> None:
-    places = [ScoutPlace("scout1", 1, 0.72, 1.764, NORTH + turn) for turn in (0.0, 0.1)]
+    places = [RobotPlace("scout1", 1, 0.72, 1.764, NORTH + turn) for turn in (0.0, 0.1)]
     pictures = []
     for place in places:
-        with Camera(World(WorldDescription(9.0, 6.0, 1, scouts=[place])).mjcf, "paint") as camera:
+        with Camera(World(WorldDescription(9.0, 6.0, 1, robots=[place])).mjcf, "paint") as camera:
             pictures.append(camera.picture("scout1"))
     assert changed(*pictures) > 1000
 
@@ -280,9 +280,9 @@ def test_who_is_beside_the_picture_does_not_change_it() -> None:
     """Five Scouts in a row before the camera, and one more behind its back or just beyond the picture's edge."""
     seen = []
     for beside in ((0.72, 1.2), (0.1, 1.9), (3.0, 2.2)):
-        row = [ScoutPlace(f"scout{n}", n, 0.4 + 0.12 * n, 2.2 + 0.05 * n, 0.0) for n in range(2, 7)]
-        places = [ScoutPlace("scout1", 1, 0.72, 1.764, NORTH), *row, ScoutPlace("scout9", 9, *beside, 0.7)]
-        with Camera(World(WorldDescription(9.0, 6.0, 1, scouts=places)).mjcf, "paint") as camera:
+        row = [RobotPlace(f"scout{n}", n, 0.4 + 0.12 * n, 2.2 + 0.05 * n, 0.0) for n in range(2, 7)]
+        places = [RobotPlace("scout1", 1, 0.72, 1.764, NORTH), *row, RobotPlace("scout9", 9, *beside, 0.7)]
+        with Camera(World(WorldDescription(9.0, 6.0, 1, robots=places)).mjcf, "paint") as camera:
             seen.append(camera.picture("scout1"))
     assert np.array_equal(seen[0], seen[1])
     assert np.array_equal(seen[0], seen[2])

@@ -8,20 +8,20 @@ from hypothesis import strategies as st
 
 from scout_model import dimensions, radio_link
 from scout_model.carrier import CarrierTrip
-from scout_model.description import ScoutPlace, Target, WorldDescription
+from scout_model.description import RobotPlace, Target, WorldDescription
 from scout_model.errors import InvalidWorld
 from scout_model.world import World
 
 CARRIER = Target("carrier", "carrier", [(0.5, 3.0), (6.5, 3.0)], 0.5, begin_s=1.0, rest_s=2.0, there_and_back=True)
-FIRST = ScoutPlace("scout1", 1, 2.5, 3.6, math.pi / 2, carried_by="carrier")
-SECOND = ScoutPlace("scout2", 2, 4.5, 2.3, -math.pi / 2, carried_by="carrier")
-THIRD = ScoutPlace("scout3", 3, 4.5, 3.8, 0.0, carried_by="carrier")
+FIRST = RobotPlace("scout1", 1, 2.5, 3.6, math.pi / 2, carried_by="carrier")
+SECOND = RobotPlace("scout2", 2, 4.5, 2.3, -math.pi / 2, carried_by="carrier")
+THIRD = RobotPlace("scout3", 3, 4.5, 3.8, 0.0, carried_by="carrier")
 PASSENGERS = [SECOND, FIRST, THIRD]
 STEP_S = 1 / dimensions.FRAMES_PER_S
 
 
-def world(*places: ScoutPlace, carrier: Target = CARRIER) -> World:
-    return World(WorldDescription(9.0, 6.0, scouts=list(places), targets=[carrier]))
+def world(*places: RobotPlace, carrier: Target = CARRIER) -> World:
+    return World(WorldDescription(9.0, 6.0, robots=list(places), targets=[carrier]))
 
 
 def wait_until(room: World, time_s: float) -> None:
@@ -107,12 +107,12 @@ def test_place_and_time_do_not_depend_on_how_fast_it_comes(speed_m_s: float, beg
 @pytest.mark.parametrize(
     ("places", "told"),
     [
-        ([ScoutPlace("a", 1, 2.5, 3.6, 0.0, carried_by="bus")], "no carrier"),
-        ([ScoutPlace("a", 1, 2.5, 3.1, 0.0, carried_by="carrier")], "0.10 m beside the path"),
-        ([ScoutPlace("a", 1, 2.5, 5.1, 0.0, carried_by="carrier")], "2.10 m beside the path"),
-        ([ScoutPlace(f"s{n}", n, 2.5, 3.6, 0.0, carried_by="carrier") for n in range(1, 9)], "places"),
+        ([RobotPlace("a", 1, 2.5, 3.6, 0.0, carried_by="bus")], "no carrier"),
+        ([RobotPlace("a", 1, 2.5, 3.1, 0.0, carried_by="carrier")], "0.10 m beside the path"),
+        ([RobotPlace("a", 1, 2.5, 5.1, 0.0, carried_by="carrier")], "2.10 m beside the path"),
+        ([RobotPlace(f"s{n}", n, 2.5, 3.6, 0.0, carried_by="carrier") for n in range(1, 9)], "places"),
     ],
 )
-def test_what_no_carrier_can_set_down_is_refused(places: list[ScoutPlace], told: str) -> None:
+def test_what_no_carrier_can_set_down_is_refused(places: list[RobotPlace], told: str) -> None:
     with pytest.raises(InvalidWorld, match=told):
         world(*places)

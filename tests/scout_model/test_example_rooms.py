@@ -29,7 +29,7 @@ def test_every_scout_stands_on_its_wheels_and_sees_something(mission: Path) -> N
         world.step_frame()
     with Camera(world.mjcf, "paint") as camera:
         camera.show(world.state())
-        for scout in described.scouts:
+        for scout in described.robots:
             assert world.is_upright(scout.name)
             if not scout.carried_by:
                 x_m, y_m, _ = world.pose(scout.name)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from scout_model import dimensions, radio_link
 from scout_model.battery import Battery
-from scout_model.description import ScoutPlace, WorldDescription
+from scout_model.description import RobotPlace, WorldDescription
 from scout_model.inclinometer import SMOOTHING_S, Inclinometer
 from scout_model.robot import AnsweringRobot, FeelingRobot, Robot
 from scout_model.scout import Scout, Spring
@@ -87,14 +87,14 @@ def told(room: World) -> radio_link.ScoutReply:
     return radio_link.decode_reply(room.reply(1))
 
 
-def scouts(*more: ScoutPlace) -> World:
-    return World(WorldDescription(9.0, 6.0, scouts=[ScoutPlace("scout1", 1, 2.0, 3.0, 0.0), *more]))
+def scouts(*more: RobotPlace) -> World:
+    return World(WorldDescription(9.0, 6.0, robots=[RobotPlace("scout1", 1, 2.0, 3.0, 0.0), *more]))
 
 
 # ---------------------------------------------------------------------- the world's side
 def feelers() -> World:
-    places = [ScoutPlace("a", 1, 5.0, 3.0, 0.0), ScoutPlace("b", 2, 3.0, 3.0, 0.0, f"{__name__}:Feeler")]
-    return World(WorldDescription(9.0, 6.0, scouts=places))
+    places = [RobotPlace("a", 1, 5.0, 3.0, 0.0), RobotPlace("b", 2, 3.0, 3.0, 0.0, f"{__name__}:Feeler")]
+    return World(WorldDescription(9.0, 6.0, robots=places))
 
 
 def test_a_robot_feels_the_sensors_of_its_own_body_by_their_names_there() -> None:
@@ -126,7 +126,7 @@ def test_who_feels_changes_no_motion() -> None:
     """Sensors are computed once a frame or not at all; physics must not know."""
     states = []
     for kind in ("rover:Rover", f"{__name__}:Feeler"):
-        room = scouts(ScoutPlace("far", 2, 8.0, 5.0, 0.0, kind))
+        room = scouts(RobotPlace("far", 2, 8.0, 5.0, 0.0, kind))
         wait(room, 3.0, radio_link.encode_drive(9.0, 7.0))
         states.append((room.position_m("scout1"), room.pose("scout1")))
     assert states[0] == states[1]
@@ -137,7 +137,7 @@ def test_only_robots_with_the_methods_feel_and_answer() -> None:
     assert isinstance(Scout(), AnsweringRobot)
     assert isinstance(Feeler(), Robot)
     assert not isinstance(Feeler(), AnsweringRobot)
-    room = scouts(ScoutPlace("rover1", 2, 8.0, 5.0, 0.0, "rover:Rover"))
+    room = scouts(RobotPlace("rover1", 2, 8.0, 5.0, 0.0, "rover:Rover"))
     room.hear(2, radio_link.encode_halt())
     assert room.reply(2) == b""
     assert room.reply(77) == b""
@@ -170,7 +170,7 @@ def test_its_motors_work_hard_against_a_wall_and_hardly_when_it_rolls() -> None:
     room, drive = scouts(), radio_link.encode_drive(10.0, 10.0)
     wait(room, 2.0, drive)
     rolling = told(room).load
-    room = World(WorldDescription(9.0, 6.0, scouts=[ScoutPlace("scout1", 1, 8.9, 3.0, 0.0)]))
+    room = World(WorldDescription(9.0, 6.0, robots=[RobotPlace("scout1", 1, 8.9, 3.0, 0.0)]))
     wait(room, 2.0, drive)
     assert told(room).load > 3 * rolling
     wait(room, 2.0)

@@ -10,7 +10,7 @@ import pytest
 from backbone.mission.reader import read_mission
 from scout_model import radio_link
 from scout_model.camera import Camera
-from scout_model.description import SCOUT, ScoutPlace, WorldDescription
+from scout_model.description import SCOUT, RobotPlace, WorldDescription
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.robot import Robot, robot_class
 from scout_model.scout import Scout, Spring
@@ -26,11 +26,11 @@ def _robots_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def world(kind: str = "rover:Rover") -> World:
     places = [
-        ScoutPlace("rover1", 1, 3.0, 3.0, 0.0, kind),
-        ScoutPlace("scout1", 2, 5.0, 3.0, 0.0),
-        ScoutPlace("rover2", 3, 3.0, 4.0, 0.0, kind),
+        RobotPlace("rover1", 1, 3.0, 3.0, 0.0, kind),
+        RobotPlace("scout1", 2, 5.0, 3.0, 0.0),
+        RobotPlace("rover2", 3, 3.0, 4.0, 0.0, kind),
     ]
-    return World(WorldDescription(9.0, 6.0, scouts=places))
+    return World(WorldDescription(9.0, 6.0, robots=places))
 
 
 def test_the_scout_is_one_kind_among_others() -> None:
@@ -73,7 +73,7 @@ def test_a_rovers_transmitter_and_camera_are_the_worlds() -> None:
 def test_in_a_mission_file_it_is_one_attribute(tmp_path: Path) -> None:
     small = Path(__file__).parents[1] / "backbone" / "mission" / "small.xml"
     mission = tmp_path / "mission.xml"
-    mission.write_text(small.read_text().replace('<scout name="scout1"', '<scout name="scout1" class="rover:Rover"', 1))
+    mission.write_text(small.read_text().replace('<robot name="scout1"', '<robot name="scout1" class="rover:Rover"', 1))
     [component] = read_mission(mission).components
     room = World(msgspec.convert(component.parameters["world"], WorldDescription))
     before = room.pose("scout1")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scout_model import dimensions, radio_link
 from scout_model.camera import Camera
-from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, ScoutPlace, Target, WorldDescription
+from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, RobotPlace, Target, WorldDescription
 from scout_model.errors import InvalidWorld
 from scout_model.world import World
 
@@ -38,8 +38,8 @@ OWN_ROOM = """
 """
 
 
-def scout(x_m: float, y_m: float, heading_rad: float = NORTH, name: str = "scout1", network_id: int = 1) -> ScoutPlace:
-    return ScoutPlace(name, network_id, x_m, y_m, heading_rad)
+def scout(x_m: float, y_m: float, heading_rad: float = NORTH, name: str = "scout1", network_id: int = 1) -> RobotPlace:
+    return RobotPlace(name, network_id, x_m, y_m, heading_rad)
 
 
 def view(world: World, robot: str = "scout1") -> Picture:
@@ -49,7 +49,7 @@ def view(world: World, robot: str = "scout1") -> Picture:
 
 
 def described(**parts: object) -> WorldDescription:
-    parts.setdefault("scouts", [scout(4.0, 2.0)])
+    parts.setdefault("robots", [scout(4.0, 2.0)])
     return WorldDescription(9.0, 6.0, **parts)  # type: ignore[arg-type]
 
 
@@ -63,22 +63,22 @@ def drive(world: World, frames: int, speed_rad_s: float = 10.0) -> None:
 # ---------------------------------------------------------------------- tables and darkness
 def test_under_a_table_it_is_darker_than_under_the_sky() -> None:
     table = Furniture("desk", 4.0, 5.4, 1.6, 1.2, 0.4, "table")
-    lit = view(World(described(scouts=[scout(4.0, 5.3)])))
-    dark = view(World(described(scouts=[scout(4.0, 5.3)], furniture=[table])))
+    lit = view(World(described(robots=[scout(4.0, 5.3)])))
+    dark = view(World(described(robots=[scout(4.0, 5.3)], furniture=[table])))
     assert dark.mean() < 0.4 * lit.mean()
 
 
 def test_the_way_to_a_table_gets_darker_step_by_step() -> None:
     table = Furniture("desk", 4.0, 5.2, 1.6, 1.5, 0.4, "table")
-    seen = [view(World(described(scouts=[scout(4.0, y_m)], furniture=[table]))).mean() for y_m in (2.0, 3.0, 4.0, 4.8)]
+    seen = [view(World(described(robots=[scout(4.0, y_m)], furniture=[table]))).mean() for y_m in (2.0, 3.0, 4.0, 4.8)]
     assert seen == sorted(seen, reverse=True)
-    away = view(World(described(scouts=[scout(4.0, 3.0, -NORTH)], furniture=[table]))).mean()
+    away = view(World(described(robots=[scout(4.0, 3.0, -NORTH)], furniture=[table]))).mean()
     assert seen[1] < away
 
 
 def test_a_scout_drives_under_a_table_and_not_through_its_legs() -> None:
     table = Furniture("desk", 4.0, 3.0, 1.0, 0.6, 0.4, "table")
-    free, blocked = World(described(furniture=[table])), World(described(furniture=[table], scouts=[scout(3.52, 2.0)]))
+    free, blocked = World(described(furniture=[table])), World(described(furniture=[table], robots=[scout(3.52, 2.0)]))
     drive(free, 240)
     drive(blocked, 240)
     assert free.position_m("scout1")[1] > 3.4
@@ -88,8 +88,8 @@ def test_a_scout_drives_under_a_table_and_not_through_its_legs() -> None:
 def test_a_robot_in_a_dark_place_is_seen_darker_and_lit_again_outside() -> None:
     dark = DarkPlace("corner", 4.0, 4.0, 1.0, 1.0, 0.5)
     watcher, other = scout(4.0, 3.3), scout(4.0, 3.6, 0.0, "scout2", 2)
-    world = World(described(scouts=[watcher, other], dark_places=[dark]))
-    shadowless = World(described(scouts=[watcher, other]))
+    world = World(described(robots=[watcher, other], dark_places=[dark]))
+    shadowless = World(described(robots=[watcher, other]))
     wheel = slice(150, 175), slice(150, 170)
     assert view(world)[wheel].mean() == pytest.approx(dimensions.DARKNESS * view(shadowless)[wheel].mean(), rel=0.2)
     with Camera(world.mjcf, "paint") as camera, Camera(shadowless.mjcf, "paint") as lit:
@@ -241,7 +241,7 @@ def test_a_target_passes_the_same_places_at_the_same_times_in_every_world(shape:
     ways = []
     for others in ([], [scout(2.0, 3.05, 0.0)]):
         target = Target("target", shape, [(0.5, 3.0), (8.5, 3.0)], 0.5, begin_s=0.5)
-        world, way = World(described(scouts=others, targets=[target])), []
+        world, way = World(described(robots=others, targets=[target])), []
         for _ in range(150):
             world.step_frame()
             way.append(world.pose("target"))
@@ -262,7 +262,7 @@ def rooms(draw: st.DrawFn) -> WorldDescription:
     places = iter(draw(st.lists(places_m, min_size=6, max_size=6)))
     shapes = draw(st.lists(st.sampled_from(["box", "table"]), min_size=2, max_size=2))
     return described(
-        scouts=[scout(*next(places), draw(turns_rad))],
+        robots=[scout(*next(places), draw(turns_rad))],
         furniture=[
             Furniture(f"f{number}", *next(places), draw(sizes_m), draw(sizes_m), draw(sizes_m), shape)
             for number, shape in enumerate(shapes)

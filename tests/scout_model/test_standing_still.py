@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scout_model import radio_link
-from scout_model.description import ScoutPlace, Target, WorldDescription
+from scout_model.description import RobotPlace, Target, WorldDescription
 from scout_model.world import World
 
-PLACES = [ScoutPlace(f"scout{number}", number, 1.0 + 0.5 * number, 2.0, 0.3 * number) for number in range(1, 5)]
+PLACES = [RobotPlace(f"scout{number}", number, 1.0 + 0.5 * number, 2.0, 0.3 * number) for number in range(1, 5)]
 SETTLED_S = 3
 
 
 def settled(*targets: Target) -> World:
-    world = World(WorldDescription(9.0, 6.0, scouts=PLACES, targets=list(targets)))
+    world = World(WorldDescription(9.0, 6.0, robots=PLACES, targets=list(targets)))
     for _ in range(30 * SETTLED_S):
         world.step_frame()
     return world
@@ -86,7 +86,7 @@ packets = st.one_of(
 def test_the_same_packets_at_the_same_frames_give_the_same_state(heard: list[tuple[int, int, bytes]]) -> None:
     states = []
     for _ in range(2):
-        world = World(WorldDescription(9.0, 6.0, scouts=PLACES))
+        world = World(WorldDescription(9.0, 6.0, robots=PLACES))
         for pause, network_id, payload in heard:
             for _ in range(pause):
                 world.step_frame()

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from scout_model import dimensions, radio_link
-from scout_model.description import Furniture, ScoutPlace, Target, WorldDescription
+from scout_model.description import Furniture, RobotPlace, Target, WorldDescription
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.scout import Spring
 from scout_model.world import World
 
 NORTH = math.pi / 2
 EMPTY = WorldDescription(
-    9.0, 6.0, scouts=[ScoutPlace("scout1", 1, 2.0, 1.5, NORTH), ScoutPlace("scout2", 2, 7.0, 1.5, 0)]
+    9.0, 6.0, robots=[RobotPlace("scout1", 1, 2.0, 1.5, NORTH), RobotPlace("scout2", 2, 7.0, 1.5, 0)]
 )
 
 
@@ -154,7 +154,7 @@ def test_it_jumps_over_thirty_centimetres_and_lands_on_its_wheels() -> None:
 def test_after_a_jump_it_is_on_the_other_side_of_the_box() -> None:
     """A box 30 cm high, 8 cm deep, 20 cm before the axle: the Scout is beyond it afterwards."""
     box = Furniture("box", x_m=2.0, y_m=1.74, width_m=0.6, depth_m=0.08, height_m=0.30)
-    world = World(WorldDescription(9.0, 6.0, furniture=[box], scouts=EMPTY.scouts))
+    world = World(WorldDescription(9.0, 6.0, furniture=[box], robots=EMPTY.robots))
     wait(world, 0.5)
     world.hear(1, radio_link.encode_jump())
     for _ in range(60):
@@ -167,7 +167,7 @@ def test_after_a_jump_it_is_on_the_other_side_of_the_box() -> None:
 
 def test_walls_and_furniture_stop_it() -> None:
     crate = Furniture("crate", x_m=2.0, y_m=2.0, width_m=0.4, depth_m=0.4, height_m=0.3)
-    world = World(WorldDescription(9.0, 6.0, furniture=[crate], scouts=EMPTY.scouts))
+    world = World(WorldDescription(9.0, 6.0, furniture=[crate], robots=EMPTY.robots))
     drive(world, 4.0, 10.0, 10.0)
     assert world.pose("scout1")[1] < 1.80
 
@@ -228,11 +228,11 @@ def test_an_unknown_body_is_refused_by_name(question: str) -> None:
     "description",
     [
         WorldDescription(0.0, 6.0),
-        WorldDescription(9.0, 6.0, scouts=[ScoutPlace("a", 1, 20.0, 1.0, 0.0)]),
-        WorldDescription(9.0, 6.0, scouts=[ScoutPlace("a", 0, 1.0, 1.0, 0.0)]),
-        WorldDescription(9.0, 6.0, scouts=[ScoutPlace("a", 1, 1.0, 1.0, 0.0), ScoutPlace("b", 1, 2.0, 1.0, 0.0)]),
-        WorldDescription(9.0, 6.0, scouts=[ScoutPlace("a", 1, 1.0, 1.0, 0.0), ScoutPlace("a", 2, 2.0, 1.0, 0.0)]),
-        WorldDescription(9.0, 6.0, scouts=[ScoutPlace("a/b", 1, 1.0, 1.0, 0.0)]),
+        WorldDescription(9.0, 6.0, robots=[RobotPlace("a", 1, 20.0, 1.0, 0.0)]),
+        WorldDescription(9.0, 6.0, robots=[RobotPlace("a", 0, 1.0, 1.0, 0.0)]),
+        WorldDescription(9.0, 6.0, robots=[RobotPlace("a", 1, 1.0, 1.0, 0.0), RobotPlace("b", 1, 2.0, 1.0, 0.0)]),
+        WorldDescription(9.0, 6.0, robots=[RobotPlace("a", 1, 1.0, 1.0, 0.0), RobotPlace("a", 2, 2.0, 1.0, 0.0)]),
+        WorldDescription(9.0, 6.0, robots=[RobotPlace("a/b", 1, 1.0, 1.0, 0.0)]),
         WorldDescription(9.0, 6.0, furniture=[Furniture("t", 1.0, 1.0, 0.0, 1.0, 1.0)]),
         WorldDescription(9.0, 6.0, targets=[Target("t", "elephant", [(0.0, 1.0), (1.0, 1.0)], 1.0)]),
         WorldDescription(9.0, 6.0, targets=[Target("t", "pioneer", [(0.0, 1.0), (0.0, 1.0)], 1.0)]),

@@ -212,7 +212,7 @@ def _with_bodies(text: bytes, only: str = "") -> bytes:
     section = outline(text).first("resources")
     if world is None or section is None:
         return text
-    bodies = [body.text("name") for body in world.all("scout")]
+    bodies = [body.text("name") for body in world.all("robot")]
     room = world.first("room")
     depth_m = _number(room.text("depth-m") if room is not None else "", 2.0)
     width_m = _number(room.text("width-m") if room is not None else "", 2.0)
@@ -223,7 +223,7 @@ def _with_bodies(text: bytes, only: str = "") -> bytes:
             continue
         x_m = (BODY_STEP_M * (len(bodies) + 1)) % width_m or width_m / 2
         place = {"name": name, "x-m": f"{x_m:g}", "y-m": f"{min(BODY_STEP_M, depth_m) / 2:g}", "heading-deg": "90"}
-        text = add(text, world.path, NewElement("scout", place))
+        text = add(text, world.path, NewElement("robot", place))
         bodies.append(name)
     return text
 
@@ -254,7 +254,7 @@ def _remove(text: bytes, path: Path) -> TextState:
     if node.tag == "resource":
         world = outline(text).first("world")
         bodies = (
-            [] if world is None else [body for body in world.all("scout") if body.text("name") == node.text("name")]
+            [] if world is None else [body for body in world.all("robot") if body.text("name") == node.text("name")]
         )
         marked = _Marked(text, path[:-1])
         for body in bodies[:1]:
@@ -324,7 +324,7 @@ def _rename(text: bytes, path: Path, name: str) -> TextState:
         return TextState(text, path)
     if node.tag in ("wish", "uses", "parameter"):
         return TextState(set_attribute(text, path, "name", name), path)
-    if node.tag == "scout" and old:
+    if node.tag == "robot" and old:
         owner = next((one for one in root if one.tag == "resource" and one.text("name") == old), None)
         node = owner or node
     _free(root, node.tag, name)
@@ -357,7 +357,7 @@ def _of_type(_node: Node, other: Node) -> list[str]:
 
 
 def _of_resource(node: Node, other: Node) -> list[str]:
-    if other.tag == "scout":
+    if other.tag == "robot":
         return ["name"]
     is_mention = other.tag in ("wish", "uses") and other.text("type") == node.text("type")
     return ["name"] if is_mention else []
@@ -372,5 +372,5 @@ _MENTIONS: dict[str, Callable[[Node, Node], list[str]]] = {
     "type": _of_type,
     "resource": _of_resource,
     "world": _of_world,
-    "target": lambda _node, other: ["carried-by"] if other.tag == "scout" else [],
+    "target": lambda _node, other: ["carried-by"] if other.tag == "robot" else [],
 }

@@ -16,7 +16,7 @@ from ui_console.design.catalogue import Role, entries
 from ui_console.design.commands import Command, Rename, SetValue, WriteParameter
 
 HAVE_PARAMETERS = ("behavior", "resource", "world")
-WITH_NAMES = ("host", "type", "resource", "world", "behavior", "target", "scout")
+WITH_NAMES = ("host", "type", "resource", "world", "behavior", "target", "robot")
 """Tags whose names other elements refer to; to set one is to rename."""
 
 
@@ -94,7 +94,7 @@ def choices(mission: Node, node: Node, attribute: str, words: tuple[str, ...] = 
             resources = mission.first("resources")
             there = [] if resources is None else resources.all("resource")
             return tuple(one.text("name") for one in there if one.text("type") == node.text("type"))
-        case ("scout", "carried-by"):
+        case ("robot", "carried-by"):
             world = mission.first("world")
             targets = [] if world is None else world.all("target")
             return tuple(one.text("name") for one in targets if one.text("shape") == "carrier")

@@ -132,7 +132,7 @@ class DarkElement(Declared):
     height_m: Extent = Field(description="Height above the floor in meters, above 0; what is above that is lit.")
 
 
-class ScoutElement(Declared):
+class RobotElement(Declared):
     """The body of a robot, and where it begins; its network id is the resource's."""
 
     name: Name = Field(description="Name of the robot's resource.")
@@ -142,9 +142,9 @@ class ScoutElement(Declared):
         default=0.0, description="Where its camera looks, -360 to 360 degrees: 0 along x, 90 along y."
     )
     class_path: ClassPath = Field(
-        default="scout_model.scout:Scout",
+        default="",
         alias="class",
-        description="The Python class of its body, written package.module:Class; a robot of another kind has its own.",
+        description="The Python class of its body, written package.module:Class; left out: its type's.",
     )
     carried_by: Name = Field(
         default="",
@@ -204,5 +204,5 @@ class WorldElement(Declared):
     ramp: tuple[RampElement, ...] = ()
     landmark: tuple[LandmarkElement, ...] = ()
     dark: tuple[DarkElement, ...] = ()
-    scout: tuple[ScoutElement, ...] = ()
+    robot: tuple[RobotElement, ...] = ()
     target: tuple[TargetElement, ...] = ()

@@ -106,7 +106,7 @@ def _world(condition: Condition) -> Iterator[str]:
     yield f'    <air noise="{condition.noise:g}"/>'
     places = (*WATCHERS[: condition.active], *EXTRAS[: condition.extra])
     for robot, (x_m, y_m) in zip(condition.robots, places, strict=True):
-        yield f'    <scout name="{robot}" x-m="{x_m:g}" y-m="{y_m:g}" heading-deg="90"/>'
+        yield f'    <robot name="{robot}" x-m="{x_m:g}" y-m="{y_m:g}" heading-deg="90"/>'
     target: dict[str, object] = {
         "name": "target",
         "shape": passage.shape,

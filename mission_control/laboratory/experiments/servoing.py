@@ -58,7 +58,7 @@ _MISSION = f"""<?xml version="1.0" encoding="UTF-8"?>
   <world name="{WORLD}" type="simulated_world" host="base">
     <room width-m="{ROOM_M[0]:g}" depth-m="{ROOM_M[1]:g}"/>
     <landmark name="board" x-m="{BOARD_M[0]:g}" y-m="{BOARD_M[1]:g}" heading-deg="180"/>
-    <scout name="{ROBOT}" x-m="3" y-m="4" heading-deg="0"/>
+    <robot name="{ROBOT}" x-m="3" y-m="4" heading-deg="0"/>
   </world>
   <behaviors>
     <behavior type="servo_to_target" name="{SERVO}" priority="1">
@@ -249,7 +249,7 @@ def _mission_from(start: TrialStart, noise: float) -> MissionDescription:
     (world,) = mission.components
     content = dict(world.parameters[WORLD])
     content |= {"seed": start.world_seed, "air": {"noise": noise}}
-    (scout,) = content["scouts"]
-    content["scouts"] = [{**scout, "x_m": start.x_m, "y_m": start.y_m, "heading_rad": start.heading_rad}]
+    (scout,) = content["robots"]
+    content["robots"] = [{**scout, "x_m": start.x_m, "y_m": start.y_m, "heading_rad": start.heading_rad}]
     there = world.model_copy(update={"parameters": {**world.parameters, WORLD: content}})
     return mission.model_copy(update={"components": (there,)})

@@ -412,12 +412,12 @@ def test_the_projects_world_is_one_the_scout_model_understands() -> None:
     assert (world.type, world.name, world.host) == ("simulated_world", "world", "base")
     described = msgspec.convert(world.parameters["world"], WorldDescription)
     assert msgspec.json.decode(msgspec.json.encode(described)) == world.parameters["world"]
-    assert [(scout.name, scout.network_id) for scout in described.scouts] == [
+    assert [(scout.name, scout.network_id) for scout in described.robots] == [
         ("scout1", 1),
         ("scout2", 2),
         ("scout3", 3),
     ]
-    assert described.scouts[0].heading_rad == pytest.approx(math.pi / 2)
+    assert described.robots[0].heading_rad == pytest.approx(math.pi / 2)
     assert described.targets[0].path == [(0.0, 3.0), (9.0, 3.0)]
 
 
@@ -425,7 +425,7 @@ def test_the_projects_target_rests_where_no_watching_scout_sees_it() -> None:
     [world] = read_mission(MISSION_XML).components
     described = msgspec.convert(world.parameters["world"], WorldDescription)
     half_view_rad, radius_m = math.radians(20.0), 0.2
-    for scout in described.scouts[:2]:
+    for scout in described.robots[:2]:
         for x_m, y_m in described.targets[0].path:
             distance_m = math.hypot(x_m - scout.x_m, y_m - scout.y_m)
             off_rad = abs(math.atan2(y_m - scout.y_m, x_m - scout.x_m) - scout.heading_rad)

@@ -211,5 +211,5 @@ def test_the_reference_of_behaviors_has_the_parameters_of_their_classes_with_the
 def test_the_only_robot_of_a_mission_needs_its_network_id_too(tmp_path: Path) -> None:
     smallest = (ROOT / "docs" / "examples" / "smallest.xml").read_text()
     without = re.sub(r" *<parameter .*\n", "", smallest).replace('name="scout1">', 'name="scout1" driver="serial">')
-    faults = faults_in(tmp_path, re.sub(r" *<scout .*\n", "", without))
+    faults = faults_in(tmp_path, re.sub(r" *<robot .*\n", "", without))
     assert [fault.message for fault in faults] == ["scout scout1 lacks parameter network_id"]

@@ -58,13 +58,26 @@ def test_every_thing_of_the_file_is_in_the_world(tmp_path: Path) -> None:
 
 def test_a_carried_scout_says_who_brings_it(tmp_path: Path) -> None:
     mission = with_content(CONTENT)
-    begin = mission.index("<scout")
+    begin = mission.index("<robot")
     end = mission.index("/>", begin)
-    carried = f'{mission[:begin]}<scout name="scout1" x-m="3" y-m="4.7" carried-by="carrier"{mission[end:]}'
+    carried = f'{mission[:begin]}<robot name="scout1" x-m="3" y-m="4.7" carried-by="carrier"{mission[end:]}'
     described = world_of(tmp_path, carried)
-    [scout1] = [scout for scout in described.scouts if scout.name == "scout1"]
+    [scout1] = [scout for scout in described.robots if scout.name == "scout1"]
     assert (scout1.carried_by, scout1.kind) == ("carrier", "scout_model.scout:Scout")
     assert World(described).is_carried("scout1")
+
+
+def test_the_body_of_a_robot_is_that_of_its_type_unless_the_world_names_another(tmp_path: Path) -> None:
+    other = SMALL.replace('<robot name="scout1"', '<robot name="scout1" class="scout_model.scout:Firmware"', 1)
+    assert [robot.kind for robot in world_of(tmp_path, other).robots][:2] == [
+        "scout_model.scout:Firmware",
+        "scout_model.scout:Scout",
+    ]
+
+
+def test_a_file_from_before_other_robots_is_still_read(tmp_path: Path) -> None:
+    former = SMALL.replace("<robot ", "<scout ")
+    assert world_of(tmp_path, former) == world_of(tmp_path, SMALL)
 
 
 def test_a_room_of_ones_own_travels_with_the_mission(tmp_path: Path) -> None:

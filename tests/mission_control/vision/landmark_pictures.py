@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scout_model.camera import Camera
-from scout_model.description import Landmark, ScoutPlace, WorldDescription
+from scout_model.description import Landmark, RobotPlace, WorldDescription
 from scout_model.world import World
 
 Picture = NDArray[np.uint8]
@@ -18,8 +18,8 @@ BOARD = Landmark("home", 5.5, 4.0, math.pi)
 
 def world_with_landmark(ahead_m: float, left_m: float, heading_rad: float) -> World:
     """A Scout at this pose before the board, frame as in ``target_pose``."""
-    place = ScoutPlace("scout", 1, BOARD.x_m - ahead_m, BOARD.y_m + left_m, heading_rad)
-    return World(WorldDescription(6.0, 8.0, seed=1, scouts=[place], landmarks=[BOARD]))
+    place = RobotPlace("scout", 1, BOARD.x_m - ahead_m, BOARD.y_m + left_m, heading_rad)
+    return World(WorldDescription(6.0, 8.0, seed=1, robots=[place], landmarks=[BOARD]))
 
 
 @lru_cache(maxsize=256)

@@ -12,7 +12,7 @@ from landmark_pictures import noisy, polar, shifted, view
 from mission_control.vision.target_acquisition import acquire
 from mission_control.vision.target_pose import discs_in_picture
 from scout_model.camera import Camera
-from scout_model.description import Furniture, ScoutPlace, WorldDescription
+from scout_model.description import Furniture, RobotPlace, WorldDescription
 from scout_model.video_link import Receiver
 from scout_model.world import World
 
@@ -53,7 +53,7 @@ def test_a_moved_picture_has_its_landmark_moved_as_far(columns: int, rows: int) 
 def test_a_furnished_room_without_a_landmark_has_none(heading_rad: float) -> None:
     table = Furniture("table", 2.0, 2.0, 1.2, 0.8, 0.7)
     world = World(
-        WorldDescription(5.0, 5.0, 3, furniture=[table], scouts=[ScoutPlace("scout", 1, 3.5, 3.0, heading_rad)])
+        WorldDescription(5.0, 5.0, 3, furniture=[table], robots=[RobotPlace("scout", 1, 3.5, 3.0, heading_rad)])
     )
     with Camera(world.mjcf, "paint") as camera:
         assert acquire(camera.picture("scout")) is None

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from resource_pool.robots.rover import body, link
 from resource_pool.robots.rover.link import Bumpers, GripPacket, MovePacket, RoverReply
 from scout_model import radio_link
-from scout_model.description import Furniture, ScoutPlace, Target, WorldDescription
+from scout_model.description import Furniture, RobotPlace, Target, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.radio_link import HaltPacket, TransmitterOff, TransmitterOn
 from scout_model.world import STATE, World
@@ -29,9 +29,9 @@ LOAD_ON_THE_DECK = (
 
 
 def world(*furniture: Furniture, x_m: float = 2.0, heading_rad: float = 0.0, thing: str = "") -> World:
-    places = [ScoutPlace("rover1", 1, x_m, 3.0, heading_rad, ROVER), ScoutPlace("scout1", 2, 7.0, 5.0, 0.0)]
+    places = [RobotPlace("rover1", 1, x_m, 3.0, heading_rad, ROVER), RobotPlace("scout1", 2, 7.0, 5.0, 0.0)]
     room = f'<mujoco><worldbody><geom type="plane" size="0 0 1"/>{thing}</worldbody></mujoco>' if thing else ""
-    return World(WorldDescription(9.0, 6.0, furniture=list(furniture), scouts=places, mjcf=room))
+    return World(WorldDescription(9.0, 6.0, furniture=list(furniture), robots=places, mjcf=room))
 
 
 def go(room: World, seconds: float, *packets: link.Packet) -> None:
@@ -161,7 +161,7 @@ def test_asleep_it_sees_who_comes_and_goes() -> None:
     description = WorldDescription(
         9.0,
         6.0,
-        scouts=[ScoutPlace("rover1", 1, 2.0, 3.0, 0.0, ROVER)],
+        robots=[RobotPlace("rover1", 1, 2.0, 3.0, 0.0, ROVER)],
         targets=[Target("pioneer", "pioneer", [(4.0, 0.5), (4.0, 5.5)], 0.5, begin_s=2.0)],
     )
     room, nearest_cm = World(description), []

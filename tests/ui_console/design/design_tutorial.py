@@ -28,7 +28,7 @@ def tutorial_draft(source: str = "guard.xml") -> Draft:
         draft = draft.do(AddResource(kind, name))
     for name in ("scout1", "scout2"):
         draft = draft.do(AddResource("scout", name))
-    draft = draft.do(SetValue(path_of("scout", "scout2"), "x-m", "7.2"))
+    draft = draft.do(SetValue(path_of("robot", "scout2"), "x-m", "7.2"))
     draft = draft.do(AddBehavior((), "surveillance", "surveillance", 5))
     for robot in ("scout1", "scout2"):
         draft = draft.do(AddBehavior(path_of("behavior", "surveillance"), "watch_for_motion", f"watch-{robot}"))

@@ -231,7 +231,7 @@ def test_a_robot_gets_what_it_is_tied_to_the_next_network_id_and_a_body() -> Non
         ("video_frequency", "video1"),
     ]
     assert [one.text("value") for one in robot.all("parameter")] == ["3"]
-    assert only(draft, "scout", "scout3").attributes["x-m"] == "3"
+    assert only(draft, "robot", "scout3").attributes["x-m"] == "3"
     assert draft.problems == ()
     assert draft.do(Remove(robot.path)).text != draft.text
     assert draft.do(Remove(robot.path)).problems == ()
@@ -239,10 +239,10 @@ def test_a_robot_gets_what_it_is_tied_to_the_next_network_id_and_a_body() -> Non
 
 def test_a_body_that_was_removed_stays_away() -> None:
     draft = watchers()
-    draft = draft.do(Remove(only(draft, "scout", "scout1").path)).do(AddResource("scout", "scout3"))
+    draft = draft.do(Remove(only(draft, "robot", "scout1").path)).do(AddResource("scout", "scout3"))
     world = draft.mission.first("world")
     assert world is not None
-    assert [body.text("name") for body in world.all("scout")] == ["scout2", "scout3"]
+    assert [body.text("name") for body in world.all("robot")] == ["scout2", "scout3"]
 
 
 def test_to_rename_a_robot_renames_what_speaks_of_it() -> None:
@@ -250,7 +250,7 @@ def test_to_rename_a_robot_renames_what_speaks_of_it() -> None:
     draft = draft.do(Rename(only(draft, "resource", "scout1").path, "spy"))
     assert draft.problems == ()
     assert b"scout1" not in draft.text.replace(b"watch-scout1", b"")
-    draft = draft.do(Rename(only(draft, "scout", "spy").path, "scout1"))
+    draft = draft.do(Rename(only(draft, "robot", "spy").path, "scout1"))
     assert draft.text == watchers().text
 
 

@@ -67,9 +67,9 @@ def test_what_is_written_twice_is_told_apart_by_what_it_stands_in() -> None:
 
 
 def test_a_renamed_element_is_the_same_one_and_a_removed_one_leads_to_what_held_it() -> None:
-    scout = element(BUILT, "scout", "scout2")
+    scout = element(BUILT, "robot", "scout2")
     renamed = BUILT.do(Rename(scout.path, "spy"))
-    assert follower(BUILT, renamed)(scout.path) == element(renamed, "scout", "spy").path
+    assert follower(BUILT, renamed)(scout.path) == element(renamed, "robot", "spy").path
     behavior = element(BUILT, "behavior", "watch-scout2")
     gone = BUILT.do(Remove(behavior.path))
     assert follower(BUILT, gone)(behavior.children[0].path) == behavior.path[:-1]

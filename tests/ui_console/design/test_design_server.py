@@ -62,7 +62,7 @@ async def test_a_cursor_stays_on_its_element_when_somebody_else_removes_one_befo
 async def test_a_change_meant_for_an_older_draft_is_refused_with_who_changed_it(file: Path) -> None:
     async with serving(file) as served, served.page() as anna, served.page(BEN) as ben:
         revision = ben.view["status"]["revision"]
-        await anna.change(do="remove", path=anna.path("scout scout3"))
+        await anna.change(do="remove", path=anna.path("robot scout3"))
         before = served.room.draft.text
         await ben.say(do="remove", path=[0], revision=revision)
         await ben.wait(lambda: ben.answers, "refused")

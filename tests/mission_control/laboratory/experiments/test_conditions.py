@@ -44,7 +44,7 @@ def test_each_condition_is_a_mission_without_faults() -> None:
 
 def test_all_conditions_of_one_table_share_their_geometry() -> None:
     def watchers(condition: Condition) -> list[str]:
-        return [line for line in mission_text(condition).splitlines() if "<scout name=" in line][: condition.active]
+        return [line for line in mission_text(condition).splitlines() if "<robot name=" in line][: condition.active]
 
     assert len({tuple(watchers(condition)) for condition in EVERYTHING}) == 1
 

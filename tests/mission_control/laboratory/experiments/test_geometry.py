@@ -22,7 +22,7 @@ def test_it_is_that_of_the_shipped_mission() -> None:
     (world,) = mission.components
     content = world.parameters["world"]
     assert (content["width_m"], content["depth_m"]) == geometry.ROOM_M
-    placed = {scout["name"]: (scout["x_m"], scout["y_m"]) for scout in content["scouts"]}
+    placed = {scout["name"]: (scout["x_m"], scout["y_m"]) for scout in content["robots"]}
     assert (placed["scout1"], placed["scout2"], placed["scout3"]) == (*WATCHERS[:2], geometry.EXTRAS[0])
     (target,) = content["targets"]
     assert [tuple(point) for point in target["path"]] == list(geometry.PATH)
