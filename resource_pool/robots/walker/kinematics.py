@@ -3,17 +3,20 @@
 The body's MJCF is the only source of the legs' geometry and of the joints' ranges. A foot out of reach gets the
 nearest legal posture.
 
+Why mink in the loop, and no closed form: one step at 50 Hz takes 0.3 ms of a processor on average and 1.8 ms at worst,
+a fiftieth and a tenth of the time there is. It loads scipy, qpsolvers and daqp besides MuJoCo: 0.4 s and 80 MB in all,
+which the motion control's own process can afford.
+
 Source: https://github.com/kevinzakka/mink, differential inverse kinematics as a quadratic program.
 """
 
 from __future__ import annotations
 
-from importlib import resources
-
 import mink
 import mujoco
 import numpy as np
 
+from resource_pool.robots.walker.body import Walker
 from resource_pool.robots.walker.gait import LEGS, Feet
 from resource_pool.robots.walker.link import JOINTS, Angles
 
@@ -23,16 +26,11 @@ _DAMPING = 1e-8  # chosen: far below the tasks' costs; keeps a stretched leg's s
 _ROUND_S = 1.0  # any: rounds are displacements
 
 
-def body_mjcf() -> str:
-    """Return the walker's body as MJCF."""
-    return resources.files("resource_pool.robots.walker").joinpath("body.xml").read_text(encoding="utf-8")
-
-
 class Kinematics:
     """The legs of a walker whose trunk is held; begins in the standing posture."""
 
     def __init__(self) -> None:
-        spec = mujoco.MjSpec.from_string(body_mjcf())
+        spec = mujoco.MjSpec.from_string(Walker.body_mjcf())
         spec.delete(spec.joint("free"))
         spec.body("body").sleep = mujoco.mjtSleepPolicy.mjSLEEP_AUTO  # a body without a free joint cannot sleep
         model = spec.compile()

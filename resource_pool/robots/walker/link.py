@@ -5,8 +5,9 @@ A packet is one byte that says which command it is, then the command's values in
 * ``Q`` pose: time in which the joints shall arrive, one byte in units of 4 ms; twelve 16-bit joint angles in units of
   1e-4 rad, in the order of ``JOINTS``
 * ``H`` halt (stand still), ``S`` safe, ``V`` and ``X`` transmitter on and off: as ``scout_model.radio_link``
-* ``T`` status, the walker's reply: battery, one byte in units of 1/255; roll and pitch, twelve joint angles as above;
-  one byte with a bit for each foot on the floor, in the order of ``LEGS``, the first is the lowest
+* ``T`` status, the walker's reply: battery, one byte in units of 1/255; roll, pitch and twelve joint angles as above;
+  turning speed, 16 bits in units of 1e-3 rad/s; one byte with a bit for each foot on the floor, in the order of
+  ``LEGS``, the first is the lowest
 
 Network id and check sum are the radio's business and stand outside of the payload.
 """
@@ -29,11 +30,12 @@ Angles = tuple[float, ...]
 """One angle for each of ``JOINTS``, rad."""
 
 ANGLE_RAD = 1e-4  # chosen: a hundredth of what a servo resolves; 16 bits then reach 187 degrees
+TURN_RAD_S = 1e-3  # chosen: 16 bits then reach five turns a second
 TICK_S = 0.004  # chosen: one byte then reaches a second, twice the watchdog's time
 LONGEST_S = 255 * TICK_S
 
 _POSE = struct.Struct("!B12h")
-_STATUS = struct.Struct("!B14hB")
+_STATUS = struct.Struct("!B15hB")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,7 @@ class Status:
         battery: Share of its charge that is left, 0 to 1.
         roll_rad: Tilt to the right.
         pitch_rad: Tilt forward, nose down.
+        turn_rad_s: Measured turning speed, left is positive; the link clips it at five turns a second.
         joints_rad: Measured angles.
         on_floor: Whether each foot of ``LEGS`` carries weight.
     """
@@ -59,6 +62,7 @@ class Status:
     battery: float
     roll_rad: float
     pitch_rad: float
+    turn_rad_s: float
     joints_rad: Angles
     on_floor: tuple[bool, ...]
 
@@ -89,7 +93,10 @@ def encode_status(status: Status) -> bytes:
         raise MalformedPacket(f"{len(status.on_floor)} feet, not {len(LEGS)}")
     tilt = [_unit(status.roll_rad), _unit(status.pitch_rad)]
     feet = sum(1 << leg for leg, on_floor in enumerate(status.on_floor) if on_floor)
-    return b"T" + _STATUS.pack(round(status.battery * 255), *tilt, *_units(status.joints_rad), feet)
+    if not math.isfinite(status.turn_rad_s):
+        raise MalformedPacket(f"a turning speed of {status.turn_rad_s} rad/s")
+    turn = max(-0x8000, min(0x7FFF, round(status.turn_rad_s / TURN_RAD_S)))
+    return b"T" + _STATUS.pack(round(status.battery * 255), *tilt, *_units(status.joints_rad), turn, feet)
 
 
 def decode(payload: bytes) -> Packet:
@@ -115,11 +122,12 @@ def decode_status(payload: bytes) -> Status:
     """
     if payload[:1] != b"T":
         raise MalformedPacket(f"no status begins with {payload[:1]!r}")
-    battery, roll, pitch, *units, feet = _unpack(_STATUS, payload)
+    battery, roll, pitch, *units, turn, feet = _unpack(_STATUS, payload)
     if feet >> len(LEGS):
         raise MalformedPacket(f"feet {feet:#x} of a robot with {len(LEGS)}")
     on_floor = tuple(bool(feet >> leg & 1) for leg in range(len(LEGS)))
-    return Status(battery / 255, roll * ANGLE_RAD, pitch * ANGLE_RAD, _angles(units), on_floor)
+    tilt_rad = roll * ANGLE_RAD, pitch * ANGLE_RAD
+    return Status(battery / 255, *tilt_rad, turn * TURN_RAD_S, _angles(units), on_floor)
 
 
 def _unpack(layout: struct.Struct, payload: bytes) -> tuple[int, ...]:
