@@ -3,9 +3,9 @@
 The body's MJCF is the only source of the legs' geometry and of the joints' ranges. A foot out of reach gets the
 nearest legal posture.
 
-Why mink in the loop, and no closed form: one step at 50 Hz takes 0.3 ms of a processor on average and 1.8 ms at worst,
-a fiftieth and a tenth of the time there is. It loads scipy, qpsolvers and daqp besides MuJoCo: 0.4 s and 80 MB in all,
-which the motion control's own process can afford.
+Why mink in the loop, and no closed form: of the 20 ms between two steps at 50 Hz it takes 0.3 ms of a processor on
+average, 0.6 ms in 99 of 100 steps, 3 ms at worst, and nothing while the walker stands. It loads scipy, qpsolvers and
+daqp besides MuJoCo: 0.4 s and 80 MB in all, which the motion control's own process can afford.
 
 Source: https://github.com/kevinzakka/mink, differential inverse kinematics as a quadratic program.
 """

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
+from statistics import fmean
 
 import pytest
 from hypothesis import given
@@ -20,6 +22,7 @@ from resource_pool.robots.walker.gait import (
     TURN_ACCELERATION_RAD_S2,
     WALK,
     Feet,
+    Foot,
     Gait,
     GaitParameters,
     ImpossibleGait,
@@ -29,6 +32,7 @@ from resource_pool.robots.walker.gait import (
 )
 
 DT_S = 0.01
+FINE_DT_S = 0.001
 moves = st.builds(Move, st.floats(-0.5, 0.5), st.floats(-3.0, 3.0))
 some_gaits = st.sampled_from([TROT, WALK]) | st.builds(
     GaitParameters,
@@ -39,30 +43,45 @@ scripts = st.lists(st.tuples(moves, st.integers(1, 60)), min_size=1, max_size=6)
 
 
 def fastest_foot_m_s(gait: GaitParameters) -> float:
-    """Return a bound: way in the air, lift, rise into the gait, and change of the speed, each at its worst at once."""
+    """Return a bound: way in the air, lift, sway, rise into the gait, change of speed, each at its worst at once."""
     swing_s = (1.0 - gait.duty) * gait.period_s
     along = 2.0 * gait.longest_stride_m / swing_s + math.pi * gait.lift_m / swing_s
     home_m = math.dist((gait.half_length_m, gait.half_width_m, gait.height_m), (0.085, 0.08, 0.12))
     radius_m = math.hypot(gait.half_length_m, gait.half_width_m)
     ahead_s = 0.5 * gait.duty * gait.period_s + gait.lead_s
     change = (ACCELERATION_M_S2 + TURN_ACCELERATION_RAD_S2 * radius_m) * ahead_s
-    return along + (home_m + gait.lift_m) / RISE_S + change
+    sway = math.tau * gait.sway_m / gait.period_s
+    return along + sway + (home_m + gait.lift_m + gait.sway_m) / RISE_S + change
 
 
-def run(gait: Gait, script: list[tuple[Move, int]]) -> list[Feet]:
+def run(gait: Gait, script: list[tuple[Move, int]], dt_s: float = DT_S) -> list[Feet]:
     feet = []
     for move, steps in script:
         gait.request(move)
-        feet += [gait.advance(DT_S) for _ in range(steps)]
+        feet += [gait.advance(dt_s) for _ in range(steps)]
     return feet
 
 
-@given(some_gaits, scripts)
+@given(some_gaits, st.lists(st.tuples(moves, st.integers(1, 400)), min_size=1, max_size=4))
 def test_no_request_makes_a_foot_jump(parameters: GaitParameters, script: list[tuple[Move, int]]) -> None:
-    bound_m = 1.1 * fastest_foot_m_s(parameters) * DT_S
-    steps = [STANDING, *run(Gait(parameters), script), *run(Gait(parameters), [])]
-    for before, after in pairwise(steps):
+    bound_m = 1.1 * fastest_foot_m_s(parameters) * FINE_DT_S
+    for before, after in pairwise([STANDING, *run(Gait(parameters), script, FINE_DT_S)]):
         assert max(math.dist(one, other) for one, other in zip(before, after, strict=True)) <= bound_m
+
+
+@pytest.mark.parametrize("parameters", [TROT, WALK])
+def test_no_foot_of_a_shipped_gait_is_faster_than_two_and_a_half_metres_a_second(parameters: GaitParameters) -> None:
+    assert fastest_foot_m_s(parameters) < 2.5
+
+
+@pytest.mark.parametrize("parameters", [TROT, WALK])
+def test_a_foot_lifts_off_and_touches_down_with_the_floors_speed(parameters: GaitParameters) -> None:
+    gait, dt_s = Gait(parameters), 1e-4
+    run(gait, [(Move(0.3, 0.5), 100)])
+    places = [gait.advance(dt_s) for _ in range(int(parameters.period_s / dt_s))]
+    for leg in range(len(LEGS)):
+        ways = [[b - a for a, b in zip(one[leg], other[leg], strict=True)] for one, other in pairwise(places)]
+        assert max(math.dist(one, other) for one, other in pairwise(ways)) / dt_s < 0.02
 
 
 @given(some_gaits, scripts)
@@ -78,7 +97,8 @@ def test_a_gait_that_is_stopped_ends_in_the_standing_posture(
 
 @given(some_gaits, moves)
 def test_a_foot_on_the_floor_has_the_floors_speed(parameters: GaitParameters, move: Move) -> None:
-    """Seen from the trunk, the floor moves against the trunk's motion."""
+    """Seen from the trunk, the floor moves against the trunk's motion, to which a sway would be added."""
+    parameters = replace(parameters, sway_m=0.0)
     gait = Gait(parameters)
     run(gait, [(move, 150)])
     before, phase = gait.advance(DT_S / 100), gait.phase
@@ -131,6 +151,30 @@ def test_the_expected_motion_changes_no_faster_than_it_may(
             gait.advance(DT_S)
             assert abs(gait.expected.forward_m_s - before.forward_m_s) <= ACCELERATION_M_S2 * DT_S + 1e-12
             assert abs(gait.expected.turn_rad_s - before.turn_rad_s) <= TURN_ACCELERATION_RAD_S2 * DT_S + 1e-12
+
+
+def margin_m(feet: list[Foot]) -> float:
+    """Return how far the trunk's middle is inside the polygon of these feet, given in the order round it."""
+    sides = zip(feet, [*feet[1:], feet[0]], strict=True)
+    return min((ax * by - ay * bx) / math.dist((ax, ay), (bx, by)) for (ax, ay, _), (bx, by, _) in sides)
+
+
+@pytest.mark.parametrize("move", [Move(0.1), Move(-0.1), Move(0.0, 0.7), Move(0.05, -0.4)])
+def test_the_walk_swings_the_trunk_over_the_three_feet_on_the_floor(move: Move) -> None:
+    with_sway_m, without_m = (mean_margin_m(one, move) for one in (WALK, replace(WALK, sway_m=0.0)))
+    assert with_sway_m > 0.0
+    assert with_sway_m > without_m + 0.4 * WALK.sway_m
+
+
+def mean_margin_m(parameters: GaitParameters, move: Move) -> float:
+    """Return how far the trunk's middle is inside the triangle of the feet on the floor, on average."""
+    round_the_trunk = [LEGS.index(leg) for leg in ("front_right", "front_left", "hind_left", "hind_right")]
+    margins_m = []
+    for feet in run(Gait(parameters), [(move, 300)])[60:]:
+        on_floor = [feet[leg] for leg in round_the_trunk if feet[leg][2] <= -parameters.height_m + 1e-9]
+        if len(on_floor) == 3:
+            margins_m.append(margin_m(on_floor))
+    return fmean(margins_m)
 
 
 def test_the_trot_lifts_diagonal_feet_together_and_the_walk_one_at_a_time() -> None:

@@ -22,10 +22,10 @@ SEEDS = [*ONE_SEED, *TWENTY_SEEDS]
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_it_walks_a_straight_line(seed: int) -> None:
-    walked = walk(Move(0.3), 6.0, seed)
+    walked = walk(Move(0.3), 6.5, seed)
     assert not walked.fell
     assert walked.forward_m > 1.5
-    assert abs(walked.aside_rad) < math.radians(12.0)
+    assert abs(walked.aside_rad) < math.radians(15.0)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -47,10 +47,10 @@ def test_it_turns_on_the_spot(seed: int, turn_rad_s: float) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_it_walks_with_one_foot_in_the_air(seed: int) -> None:
+def test_it_walks_steadily_with_one_foot_in_the_air(seed: int) -> None:
     walked = walk(Move(0.1), 5.0, seed, WALK)
-    assert not walked.fell
-    assert walked.forward_m > 0.35
+    assert walked.tilt_rad < math.radians(6.0)
+    assert walked.forward_m > 0.45
 
 
 @pytest.mark.parametrize("seed", TWENTY_SEEDS)
