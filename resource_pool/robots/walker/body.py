@@ -20,7 +20,7 @@ from typing import assert_never
 
 from resource_pool.robots.walker import link
 from resource_pool.robots.walker.gait import LEGS
-from resource_pool.robots.walker.link import JOINTS, Angles, Pose, Status
+from resource_pool.robots.walker.link import JOINTS, Angles, JointTargets, Status
 from scout_model.dimensions import COMMAND_TIMEOUT_S, FRAMES_PER_S
 from scout_model.errors import MalformedPacket
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOff, TransmitterOn
@@ -82,7 +82,7 @@ class Walker:
         self._heard += 1
         self._heard_s = now_s
         match packet:
-            case Pose(targets_rad, within_s):
+            case JointTargets(targets_rad, within_s):
                 self._aim(targets_rad, now_s + within_s)
             case HaltPacket():
                 self._stand(now_s)

@@ -55,7 +55,7 @@ class ImpossibleMove(Refusal):
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class TrunkSpeed:
     """A wanted or expected motion of the trunk; turning left is positive."""
 
     forward_m_s: float = 0.0
@@ -142,15 +142,15 @@ STANDING: Feet = (
 """The feet of a robot that stands: all joint angles are 0."""
 
 
-def clip(move: Move, gait: GaitParameters) -> Move:
+def clip(move: TrunkSpeed, gait: GaitParameters) -> TrunkSpeed:
     """Return the motion the gait really makes of a request: the same curve, slower where it would be too fast.
 
     Raises:
         ImpossibleMove: A speed is not finite.
 
     Example:
-        >>> clip(Move(1.0, 0.0), TROT)
-        Move(forward_m_s=0.3, turn_rad_s=0.0)
+        >>> clip(TrunkSpeed(1.0, 0.0), TROT)
+        TrunkSpeed(forward_m_s=0.3, turn_rad_s=0.0)
     """
     if not (math.isfinite(move.forward_m_s) and math.isfinite(move.turn_rad_s)):
         raise ImpossibleMove(f"a request of {move.forward_m_s} m/s and {move.turn_rad_s} rad/s")
@@ -159,7 +159,7 @@ def clip(move: Move, gait: GaitParameters) -> Move:
     outer_m_s = math.hypot(abs(forward_m_s) + abs(turn_rad_s) * gait.half_width_m, turn_rad_s * gait.half_length_m)
     fastest_m_s = gait.longest_stride_m / (gait.duty * gait.period_s)
     share = min(1.0, fastest_m_s / outer_m_s) if outer_m_s > 0.0 else 1.0
-    return Move(forward_m_s * share, turn_rad_s * share)
+    return TrunkSpeed(forward_m_s * share, turn_rad_s * share)
 
 
 class Gait:
@@ -167,9 +167,9 @@ class Gait:
 
     def __init__(self, parameters: GaitParameters = TROT) -> None:
         self.parameters = parameters
-        self.commanded = Move()
+        self.commanded = TrunkSpeed()
         """The last request, clipped."""
-        self.expected = Move()
+        self.expected = TrunkSpeed()
         """The motion that the feet now make."""
         self.phase = 0.0
         """Where in its round the gait is, 0 to 1."""
@@ -178,9 +178,9 @@ class Gait:
     @property
     def is_resting(self) -> bool:
         """Whether the feet stand still."""
-        return self._rise == 0.0 and self.commanded == Move()
+        return self._rise == 0.0 and self.commanded == TrunkSpeed()
 
-    def request(self, move: Move) -> None:
+    def request(self, move: TrunkSpeed) -> None:
         """Approach this motion from now on.
 
         Raises:
@@ -194,11 +194,11 @@ class Gait:
         Args:
             elapsed_s: Time since the last call, not negative.
         """
-        self.expected = Move(
+        self.expected = TrunkSpeed(
             _approach(self.expected.forward_m_s, self.commanded.forward_m_s, ACCELERATION_M_S2 * elapsed_s),
             _approach(self.expected.turn_rad_s, self.commanded.turn_rad_s, TURN_ACCELERATION_RAD_S2 * elapsed_s),
         )
-        is_moving = self.commanded != Move() or self.expected != Move()
+        is_moving = self.commanded != TrunkSpeed() or self.expected != TrunkSpeed()
         self._rise = _approach(self._rise, float(is_moving), elapsed_s / RISE_S)
         self.phase = (self.phase + elapsed_s / self.parameters.period_s) % 1.0 if self._rise > 0.0 else 0.0
         return self._feet()

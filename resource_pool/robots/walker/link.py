@@ -2,8 +2,8 @@
 
 A packet is one byte that says which command it is, then the command's values in network byte order:
 
-* ``Q`` pose: time in which the joints shall arrive, one byte in units of 4 ms; twelve 16-bit joint angles in units of
-  1e-4 rad, in the order of ``JOINTS``
+* ``Q`` joint targets: time in which the joints shall arrive, one byte in units of 4 ms; twelve 16-bit joint angles in
+  units of 1e-4 rad, in the order of ``JOINTS``
 * ``H`` halt (stand still), ``S`` safe, ``V`` and ``X`` transmitter on and off: as ``scout_model.radio_link``
 * ``T`` status, the walker's reply: battery, one byte in units of 1/255; roll, pitch and twelve joint angles as above;
   turning speed, 16 bits in units of 1e-3 rad/s; one byte with a bit for each foot on the floor, in the order of
@@ -34,12 +34,12 @@ TURN_RAD_S = 1e-3  # chosen: 16 bits then reach five turns a second
 TICK_S = 0.004  # chosen: one byte then reaches a second, twice the watchdog's time
 LONGEST_S = 255 * TICK_S
 
-_POSE = struct.Struct("!B12h")
+_TARGETS = struct.Struct("!B12h")
 _STATUS = struct.Struct("!B15hB")
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class JointTargets:
     """Move each joint evenly to its target and arrive after this time."""
 
     targets_rad: Angles
@@ -67,18 +67,18 @@ class Status:
     on_floor: tuple[bool, ...]
 
 
-Packet = Pose | HaltPacket | TransmitterOn | TransmitterOff | Safe
+Packet = JointTargets | HaltPacket | TransmitterOn | TransmitterOff | Safe
 
 
-def encode_pose(pose: Pose) -> bytes:
+def encode_joint_targets(targets: JointTargets) -> bytes:
     """Return the packet that moves the joints; its numbers are rounded to the link's units.
 
     Raises:
         MalformedPacket: There are not twelve targets, one is not finite or too large, or the time is too long.
     """
-    if not 0.0 <= pose.within_s <= LONGEST_S:
-        raise MalformedPacket(f"a pose within {pose.within_s} s, not 0 to {LONGEST_S:.2f} s")
-    return b"Q" + _POSE.pack(round(pose.within_s / TICK_S), *_units(pose.targets_rad))
+    if not 0.0 <= targets.within_s <= LONGEST_S:
+        raise MalformedPacket(f"joint targets within {targets.within_s} s, not 0 to {LONGEST_S:.2f} s")
+    return b"Q" + _TARGETS.pack(round(targets.within_s / TICK_S), *_units(targets.targets_rad))
 
 
 def encode_status(status: Status) -> bytes:
@@ -106,8 +106,8 @@ def decode(payload: bytes) -> Packet:
         MalformedPacket: The bytes are no packet, or one that a walker does not understand.
     """
     if payload[:1] == b"Q":
-        ticks, *units = _unpack(_POSE, payload)
-        return Pose(_angles(units), ticks * TICK_S)
+        ticks, *units = _unpack(_TARGETS, payload)
+        return JointTargets(_angles(units), ticks * TICK_S)
     packet = radio_link.decode(payload)
     if isinstance(packet, HaltPacket | TransmitterOn | TransmitterOff | Safe):
         return packet

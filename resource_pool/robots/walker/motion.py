@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from resource_pool.robots.walker.gait import TROT, Gait, GaitParameters, Move
+from resource_pool.robots.walker.gait import TROT, Gait, GaitParameters, TrunkSpeed
 from resource_pool.robots.walker.kinematics import Kinematics
 from resource_pool.robots.walker.link import Angles
 
@@ -37,8 +37,8 @@ class StateOfMotion:
 
     phase: float
     is_resting: bool
-    commanded: Move
-    expected: Move
+    commanded: TrunkSpeed
+    expected: TrunkSpeed
     x_m: float
     y_m: float
     heading_rad: float
@@ -55,7 +55,7 @@ class MotionControl:
         self._x_m = self._y_m = self._heading_rad = 0.0
         self._joints_rad: Angles = self._kinematics.joints(self._gait.advance(0.0))
 
-    def request(self, move: Move) -> None:
+    def request(self, move: TrunkSpeed) -> None:
         """Approach this motion from the next step on.
 
         Raises:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from resource_pool.robots.walker import link
 from resource_pool.robots.walker.body import SERVO_SPEED_LIMIT_RAD_S, Walker
 from resource_pool.robots.walker.gait import HIP_X_M, LEGS, STANDING_HEIGHT_M, TRACK_Y_M
-from resource_pool.robots.walker.link import JOINTS, Angles, Pose
+from resource_pool.robots.walker.link import JOINTS, Angles, JointTargets
 from scout_model import radio_link
 from scout_model.dimensions import COMMAND_TIMEOUT_S, FRAMES_PER_S
 from scout_model.robot import Robot, robot_class
@@ -60,7 +60,7 @@ def ticks(walker: Walker, first: int, count: int) -> list[Angles]:
 def test_no_packet_moves_a_servo_faster_than_it_can(script: list[tuple[Angles, float, int]]) -> None:
     walker, driven, tick = Walker(), [(0.0,) * 12], 0
     for targets_rad, within_s, count in script:
-        walker.hear(link.encode_pose(Pose(targets_rad, within_s)), tick / FRAMES_PER_S)
+        walker.hear(link.encode_joint_targets(JointTargets(targets_rad, within_s)), tick / FRAMES_PER_S)
         driven += ticks(walker, tick, count)
         tick += count
     most_rad = SERVO_SPEED_LIMIT_RAD_S / FRAMES_PER_S + 1e-9
@@ -72,7 +72,7 @@ def test_no_packet_moves_a_servo_faster_than_it_can(script: list[tuple[Angles, f
 @given(targets)
 def test_it_arrives_when_it_shall_evenly(targets_rad: Angles) -> None:
     walker = Walker()
-    walker.hear(link.encode_pose(Pose(targets_rad, 0.2)), 0.0)
+    walker.hear(link.encode_joint_targets(JointTargets(targets_rad, 0.2)), 0.0)
     driven = ticks(walker, 0, 6)
     assert driven[-1] == pytest.approx(targets_rad, abs=1e-4)
     assert driven[2] == pytest.approx([angle / 2 for angle in targets_rad], abs=1e-3)
@@ -81,7 +81,7 @@ def test_it_arrives_when_it_shall_evenly(targets_rad: Angles) -> None:
 @pytest.mark.parametrize("packet", [radio_link.encode_halt(), radio_link.encode_safe(), None])
 def test_halt_safe_and_silence_let_it_stand(packet: bytes | None) -> None:
     walker = Walker()
-    walker.hear(link.encode_pose(Pose(AWAY, 0.0)), 0.0)
+    walker.hear(link.encode_joint_targets(JointTargets(AWAY, 0.0)), 0.0)
     assert ticks(walker, 0, 3)[-1] == pytest.approx(AWAY)
     assert walker.counts() == {"heard": 1, "malformed": 0, "timeouts": 0}
     silent = int(COMMAND_TIMEOUT_S * FRAMES_PER_S)
@@ -96,7 +96,7 @@ def test_halt_safe_and_silence_let_it_stand(packet: bytes | None) -> None:
 
 def test_it_holds_its_targets_until_silence_is_long_enough() -> None:
     walker = Walker()
-    walker.hear(link.encode_pose(Pose(AWAY, 0.0)), 0.0)
+    walker.hear(link.encode_joint_targets(JointTargets(AWAY, 0.0)), 0.0)
     assert ticks(walker, 0, int(COMMAND_TIMEOUT_S * FRAMES_PER_S))[-1] == pytest.approx(AWAY)
 
 
@@ -117,7 +117,7 @@ def test_its_transmitter_obeys_and_goes_off_with_safe_and_silence() -> None:
 
 def test_malformed_packets_are_counted_and_do_not_feed_the_watchdog() -> None:
     walker = Walker()
-    walker.hear(link.encode_pose(Pose(AWAY, 0.0)), 0.0)
+    walker.hear(link.encode_joint_targets(JointTargets(AWAY, 0.0)), 0.0)
     for tick in range(30):
         walker.hear(b"noise", tick / FRAMES_PER_S)
         walker.controls(tick / FRAMES_PER_S)
@@ -166,7 +166,7 @@ def test_its_battery_empties_faster_when_it_moves() -> None:
     for tick in range(20 * 60 * FRAMES_PER_S):
         now_s = tick / FRAMES_PER_S
         if tick % 3 == 0:
-            moving.hear(link.encode_pose(Pose(AWAY if tick % 2 else (0.0,) * 12, 0.1)), now_s)
+            moving.hear(link.encode_joint_targets(JointTargets(AWAY if tick % 2 else (0.0,) * 12, 0.1)), now_s)
         for walker in (standing, moving):
             walker.controls(now_s)
     for walker in (standing, moving):

@@ -27,13 +27,13 @@ from resource_pool.robots.walker.gait import (
     GaitParameters,
     ImpossibleGait,
     ImpossibleMove,
-    Move,
+    TrunkSpeed,
     clip,
 )
 
 DT_S = 0.01
 FINE_DT_S = 0.001
-moves = st.builds(Move, st.floats(-0.5, 0.5), st.floats(-3.0, 3.0))
+moves = st.builds(TrunkSpeed, st.floats(-0.5, 0.5), st.floats(-3.0, 3.0))
 some_gaits = st.sampled_from([TROT, WALK]) | st.builds(
     GaitParameters,
     **{name: st.floats(*limits) for name, limits in GaitParameters.RANGES.items()},
@@ -54,7 +54,7 @@ def fastest_foot_m_s(gait: GaitParameters) -> float:
     return along + sway + (home_m + gait.lift_m + gait.sway_m) / RISE_S + change
 
 
-def run(gait: Gait, script: list[tuple[Move, int]], dt_s: float = DT_S) -> list[Feet]:
+def run(gait: Gait, script: list[tuple[TrunkSpeed, int]], dt_s: float = DT_S) -> list[Feet]:
     feet = []
     for move, steps in script:
         gait.request(move)
@@ -63,7 +63,7 @@ def run(gait: Gait, script: list[tuple[Move, int]], dt_s: float = DT_S) -> list[
 
 
 @given(some_gaits, st.lists(st.tuples(moves, st.integers(1, 400)), min_size=1, max_size=4))
-def test_no_request_makes_a_foot_jump(parameters: GaitParameters, script: list[tuple[Move, int]]) -> None:
+def test_no_request_makes_a_foot_jump(parameters: GaitParameters, script: list[tuple[TrunkSpeed, int]]) -> None:
     bound_m = 1.1 * fastest_foot_m_s(parameters) * FINE_DT_S
     for before, after in pairwise([STANDING, *run(Gait(parameters), script, FINE_DT_S)]):
         assert max(math.dist(one, other) for one, other in zip(before, after, strict=True)) <= bound_m
@@ -77,7 +77,7 @@ def test_no_foot_of_a_shipped_gait_is_faster_than_two_and_a_half_metres_a_second
 @pytest.mark.parametrize("parameters", [TROT, WALK])
 def test_a_foot_lifts_off_and_touches_down_with_the_floors_speed(parameters: GaitParameters) -> None:
     gait, dt_s = Gait(parameters), 1e-4
-    run(gait, [(Move(0.3, 0.5), 100)])
+    run(gait, [(TrunkSpeed(0.3, 0.5), 100)])
     places = [gait.advance(dt_s) for _ in range(int(parameters.period_s / dt_s))]
     for leg in range(len(LEGS)):
         ways = [[b - a for a, b in zip(one[leg], other[leg], strict=True)] for one, other in pairwise(places)]
@@ -86,17 +86,17 @@ def test_a_foot_lifts_off_and_touches_down_with_the_floors_speed(parameters: Gai
 
 @given(some_gaits, scripts)
 def test_a_gait_that_is_stopped_ends_in_the_standing_posture(
-    parameters: GaitParameters, script: list[tuple[Move, int]]
+    parameters: GaitParameters, script: list[tuple[TrunkSpeed, int]]
 ) -> None:
     gait = Gait(parameters)
-    feet = run(gait, [*script, (Move(), 120)])
+    feet = run(gait, [*script, (TrunkSpeed(), 120)])
     assert feet[-1] == STANDING
     assert gait.is_resting
-    assert gait.expected == Move()
+    assert gait.expected == TrunkSpeed()
 
 
 @given(some_gaits, moves)
-def test_a_foot_on_the_floor_has_the_floors_speed(parameters: GaitParameters, move: Move) -> None:
+def test_a_foot_on_the_floor_has_the_floors_speed(parameters: GaitParameters, move: TrunkSpeed) -> None:
     """Seen from the trunk, the floor moves against the trunk's motion, to which a sway would be added."""
     parameters = replace(parameters, sway_m=0.0)
     gait = Gait(parameters)
@@ -115,9 +115,9 @@ def test_a_foot_on_the_floor_has_the_floors_speed(parameters: GaitParameters, mo
 
 
 @given(some_gaits, moves)
-def test_as_many_feet_are_on_the_floor_as_the_duty_says(parameters: GaitParameters, move: Move) -> None:
+def test_as_many_feet_are_on_the_floor_as_the_duty_says(parameters: GaitParameters, move: TrunkSpeed) -> None:
     gait = Gait(parameters)
-    gait.request(Move(0.05, 0.1) if clip(move, parameters) == Move() else move)
+    gait.request(TrunkSpeed(0.05, 0.1) if clip(move, parameters) == TrunkSpeed() else move)
     run_in = [gait.advance(DT_S) for _ in range(60)]
     assert run_in
     rounds = [gait.advance(parameters.period_s / 200) for _ in range(200)]
@@ -127,12 +127,12 @@ def test_as_many_feet_are_on_the_floor_as_the_duty_says(parameters: GaitParamete
 
 
 @given(moves, some_gaits)
-def test_a_request_that_is_too_fast_keeps_its_curve(move: Move, parameters: GaitParameters) -> None:
+def test_a_request_that_is_too_fast_keeps_its_curve(move: TrunkSpeed, parameters: GaitParameters) -> None:
     given_up = clip(move, parameters)
     assert abs(given_up.forward_m_s) <= MAX_FORWARD_M_S
     assert abs(given_up.turn_rad_s) <= MAX_TURN_RAD_S
     assert clip(given_up, parameters).forward_m_s == pytest.approx(given_up.forward_m_s)
-    bounded = Move(
+    bounded = TrunkSpeed(
         max(-MAX_FORWARD_M_S, min(MAX_FORWARD_M_S, move.forward_m_s)),
         max(-MAX_TURN_RAD_S, min(MAX_TURN_RAD_S, move.turn_rad_s)),
     )
@@ -141,7 +141,7 @@ def test_a_request_that_is_too_fast_keeps_its_curve(move: Move, parameters: Gait
 
 @given(some_gaits, scripts)
 def test_the_expected_motion_changes_no_faster_than_it_may(
-    parameters: GaitParameters, script: list[tuple[Move, int]]
+    parameters: GaitParameters, script: list[tuple[TrunkSpeed, int]]
 ) -> None:
     gait = Gait(parameters)
     for move, steps in script:
@@ -159,14 +159,14 @@ def margin_m(feet: list[Foot]) -> float:
     return min((ax * by - ay * bx) / math.dist((ax, ay), (bx, by)) for (ax, ay, _), (bx, by, _) in sides)
 
 
-@pytest.mark.parametrize("move", [Move(0.1), Move(-0.1), Move(0.0, 0.7), Move(0.05, -0.4)])
-def test_the_walk_swings_the_trunk_over_the_three_feet_on_the_floor(move: Move) -> None:
+@pytest.mark.parametrize("move", [TrunkSpeed(0.1), TrunkSpeed(-0.1), TrunkSpeed(0.0, 0.7), TrunkSpeed(0.05, -0.4)])
+def test_the_walk_swings_the_trunk_over_the_three_feet_on_the_floor(move: TrunkSpeed) -> None:
     with_sway_m, without_m = (mean_margin_m(one, move) for one in (WALK, replace(WALK, sway_m=0.0)))
     assert with_sway_m > 0.0
     assert with_sway_m > without_m + 0.4 * WALK.sway_m
 
 
-def mean_margin_m(parameters: GaitParameters, move: Move) -> float:
+def mean_margin_m(parameters: GaitParameters, move: TrunkSpeed) -> float:
     """Return how far the trunk's middle is inside the triangle of the feet on the floor, on average."""
     round_the_trunk = [LEGS.index(leg) for leg in ("front_right", "front_left", "hind_left", "hind_right")]
     margins_m = []
@@ -180,7 +180,7 @@ def mean_margin_m(parameters: GaitParameters, move: Move) -> float:
 def test_the_trot_lifts_diagonal_feet_together_and_the_walk_one_at_a_time() -> None:
     for parameters, most in ((TROT, 2), (WALK, 1)):
         gait = Gait(parameters)
-        for feet in run(gait, [(Move(0.1), 300)])[60:]:
+        for feet in run(gait, [(TrunkSpeed(0.1), 300)])[60:]:
             lifted = [leg for leg, foot in zip(LEGS, feet, strict=True) if foot[2] > -parameters.height_m]
             assert len(lifted) <= most
             assert set(lifted) <= {"front_left", "hind_right"} or set(lifted) <= {"front_right", "hind_left"}
@@ -199,10 +199,10 @@ def test_a_phase_outside_its_range_is_refused() -> None:
         GaitParameters(phases=(0.0, 0.5, 1.0, 0.0))
 
 
-@pytest.mark.parametrize("move", [Move(float("nan")), Move(0.0, float("inf"))])
-def test_a_request_that_is_no_number_is_refused_and_changes_nothing(move: Move) -> None:
+@pytest.mark.parametrize("move", [TrunkSpeed(float("nan")), TrunkSpeed(0.0, float("inf"))])
+def test_a_request_that_is_no_number_is_refused_and_changes_nothing(move: TrunkSpeed) -> None:
     gait = Gait()
-    gait.request(Move(0.1))
+    gait.request(TrunkSpeed(0.1))
     with pytest.raises(ImpossibleMove):
         gait.request(move)
-    assert gait.commanded == Move(0.1)
+    assert gait.commanded == TrunkSpeed(0.1)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resource_pool.robots.walker import link
-from resource_pool.robots.walker.link import ANGLE_RAD, JOINTS, LONGEST_S, TICK_S, TURN_RAD_S, Pose, Status
+from resource_pool.robots.walker.link import ANGLE_RAD, JOINTS, LONGEST_S, TICK_S, TURN_RAD_S, JointTargets, Status
 from scout_model import radio_link
 from scout_model.errors import MalformedPacket
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOff, TransmitterOn
@@ -26,11 +26,11 @@ statuses = st.builds(
 
 
 @given(twelve, st.floats(0.0, LONGEST_S))
-def test_a_pose_says_what_was_put_in(targets_rad: tuple[float, ...], within_s: float) -> None:
-    pose = link.decode(link.encode_pose(Pose(targets_rad, within_s)))
-    assert isinstance(pose, Pose)
-    assert pose.targets_rad == pytest.approx(targets_rad, abs=0.51 * ANGLE_RAD)
-    assert pose.within_s == pytest.approx(within_s, abs=0.51 * TICK_S)
+def test_a_packet_of_joint_targets_says_what_was_put_in(targets_rad: tuple[float, ...], within_s: float) -> None:
+    packet = link.decode(link.encode_joint_targets(JointTargets(targets_rad, within_s)))
+    assert isinstance(packet, JointTargets)
+    assert packet.targets_rad == pytest.approx(targets_rad, abs=0.51 * ANGLE_RAD)
+    assert packet.within_s == pytest.approx(within_s, abs=0.51 * TICK_S)
 
 
 @given(statuses)
@@ -50,8 +50,8 @@ def test_any_bytes_are_a_packet_that_encodes_to_the_same_bytes_or_are_refused(pa
         packet = link.decode(payload)
     except MalformedPacket:
         return
-    if isinstance(packet, Pose):
-        assert link.encode_pose(packet) == payload
+    if isinstance(packet, JointTargets):
+        assert link.encode_joint_targets(packet) == payload
     else:
         assert packet == radio_link.decode(payload)
 
@@ -104,9 +104,9 @@ def test_what_is_no_status_is_refused(payload: bytes) -> None:
         ((0.0,) * 12, float("nan")),
     ],
 )
-def test_an_impossible_pose_is_never_sent(targets_rad: tuple[float, ...], within_s: float) -> None:
+def test_impossible_joint_targets_are_never_sent(targets_rad: tuple[float, ...], within_s: float) -> None:
     with pytest.raises(MalformedPacket):
-        link.encode_pose(Pose(targets_rad, within_s))
+        link.encode_joint_targets(JointTargets(targets_rad, within_s))
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_a_turn_that_is_too_fast_for_the_link_is_clipped() -> None:
     assert link.decode_status(spun).turn_rad_s == pytest.approx(-32.768)
 
 
-def test_a_pose_takes_less_than_three_milliseconds_of_the_air() -> None:
+def test_a_packet_of_joint_targets_takes_less_than_three_milliseconds_of_the_air() -> None:
     """At 115.2 kbit/s."""
-    pose = link.encode_pose(Pose((0.0,) * len(JOINTS), 0.05))
-    assert radio_link.packet_bits(pose) / 115_200 < 0.003
+    packet = link.encode_joint_targets(JointTargets((0.0,) * len(JOINTS), 0.05))
+    assert radio_link.packet_bits(packet) / 115_200 < 0.003

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from resource_pool.robots.walker.gait import LEGS, STANDING, TROT, WALK, Feet, Foot, Gait, GaitParameters, Move
+from resource_pool.robots.walker.gait import LEGS, STANDING, TROT, WALK, Feet, Foot, Gait, GaitParameters, TrunkSpeed
 from resource_pool.robots.walker.kinematics import TOLERANCE_M, Kinematics
 from resource_pool.robots.walker.link import JOINTS, Angles
 from resource_pool.robots.walker.motion import LONGEST_STEP_S, STEP_S, MotionControl
 
 RANGES_RAD = (0.6, 1.1, 1.1)  # body.xml: abduction, hip, knee
-moves = st.builds(Move, st.floats(-0.5, 0.5), st.floats(-3.0, 3.0))
+moves = st.builds(TrunkSpeed, st.floats(-0.5, 0.5), st.floats(-3.0, 3.0))
 gaits = st.sampled_from([TROT, WALK]) | st.builds(
     GaitParameters,
     **{name: st.floats(*limits) for name, limits in GaitParameters.RANGES.items()},
@@ -56,7 +56,7 @@ def test_standing_is_all_joints_at_zero() -> None:
 @settings(max_examples=15)
 @given(gaits, st.lists(moves, min_size=1, max_size=3))
 def test_the_joints_bring_the_feet_of_every_gait_where_they_shall_be(
-    parameters: GaitParameters, asked: list[Move]
+    parameters: GaitParameters, asked: list[TrunkSpeed]
 ) -> None:
     gait, kinematics = Gait(parameters), Kinematics()
     for move in asked:
@@ -85,7 +85,7 @@ def test_the_same_requests_give_the_same_targets() -> None:
         found = []
         for step in range(200):
             if step % 40 == 0:
-                control.request(Move(0.3 - 0.002 * step, 0.01 * step))
+                control.request(TrunkSpeed(0.3 - 0.002 * step, 0.01 * step))
             found.append(control.step(step * STEP_S))
         return found
 
@@ -96,13 +96,13 @@ def test_its_state_says_what_it_does() -> None:
     control = MotionControl()
     state = control.state()
     assert state.is_resting
-    assert (state.commanded, state.expected) == (Move(), Move())
-    control.request(Move(1.0, 0.0))
+    assert (state.commanded, state.expected) == (TrunkSpeed(), TrunkSpeed())
+    control.request(TrunkSpeed(1.0, 0.0))
     for step in range(101):
         joints_rad = control.step(10.0 + step * STEP_S)
     state = control.state()
     assert not state.is_resting
-    assert state.commanded == state.expected == Move(0.3, 0.0)
+    assert state.commanded == state.expected == TrunkSpeed(0.3, 0.0)
     assert state.joints_rad == joints_rad
     # Two seconds at 0.3 m/s, less half of the 0.375 s in which it gathers speed.
     assert state.x_m == pytest.approx(0.3 * (2.0 - 0.375 / 2), abs=0.01)
@@ -112,7 +112,7 @@ def test_its_state_says_what_it_does() -> None:
 
 def test_dead_reckoning_of_a_full_turn_ends_where_it_began() -> None:
     control = MotionControl()
-    control.request(Move(0.2, 1.0))
+    control.request(TrunkSpeed(0.2, 1.0))
     began_s = control_until(control, 0.0, 1.0)
     before = control.state()
     control_until(control, began_s, began_s + math.tau)
@@ -131,7 +131,7 @@ def control_until(control: MotionControl, now_s: float, end_s: float) -> float:
 def test_a_control_that_was_held_up_does_not_leap() -> None:
     held_up, on_time = MotionControl(), MotionControl()
     for control in (held_up, on_time):
-        control.request(Move(0.3))
+        control.request(TrunkSpeed(0.3))
         control_until(control, 0.0, 1.0)
     assert held_up.step(61.0) == pytest.approx(on_time.step(1.0 + LONGEST_STEP_S), abs=1e-9)
 

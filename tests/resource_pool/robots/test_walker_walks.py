@@ -8,7 +8,7 @@ import pytest
 from walker_trials import WALKER, Pilot, Trial, walk
 
 from resource_pool.robots.walker import link
-from resource_pool.robots.walker.gait import WALK, Move
+from resource_pool.robots.walker.gait import WALK, TrunkSpeed
 from scout_model import radio_link
 from scout_model.camera import Camera
 from scout_model.description import ScoutPlace, WorldDescription
@@ -22,7 +22,7 @@ SEEDS = [*ONE_SEED, *TWENTY_SEEDS]
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_it_walks_a_straight_line(seed: int) -> None:
-    walked = walk(Move(0.3), 6.5, seed)
+    walked = walk(TrunkSpeed(0.3), 6.5, seed)
     assert not walked.fell
     assert walked.forward_m > 1.5
     assert abs(walked.aside_rad) < math.radians(15.0)
@@ -31,7 +31,7 @@ def test_it_walks_a_straight_line(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_it_walks_a_curve(seed: int) -> None:
     """Half a circle of a third of a metre: it ends two radii to the left."""
-    walked = walk(Move(0.2, 0.6), math.pi / 0.6, seed)
+    walked = walk(TrunkSpeed(0.2, 0.6), math.pi / 0.6, seed)
     assert not walked.fell
     assert walked.turned_rad == pytest.approx(math.pi, rel=0.15)
     assert (walked.forward_m, walked.left_m) == pytest.approx((0.0, 2 * 0.2 / 0.6), abs=0.2)
@@ -40,7 +40,7 @@ def test_it_walks_a_curve(seed: int) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("turn_rad_s", [1.2, -1.2])
 def test_it_turns_on_the_spot(seed: int, turn_rad_s: float) -> None:
-    walked = walk(Move(0.0, turn_rad_s), 3.0, seed)
+    walked = walk(TrunkSpeed(0.0, turn_rad_s), 3.0, seed)
     assert not walked.fell
     assert math.copysign(walked.turned_rad, walked.turned_rad * turn_rad_s) > math.pi
     assert math.hypot(walked.forward_m, walked.left_m) < 0.1
@@ -48,7 +48,7 @@ def test_it_turns_on_the_spot(seed: int, turn_rad_s: float) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_it_walks_steadily_with_one_foot_in_the_air(seed: int) -> None:
-    walked = walk(Move(0.1), 5.0, seed, WALK)
+    walked = walk(TrunkSpeed(0.1), 5.0, seed, WALK)
     assert walked.tilt_rad < math.radians(6.0)
     assert walked.forward_m > 0.45
 
@@ -58,13 +58,13 @@ def test_no_change_of_the_request_makes_it_fall(seed: int) -> None:
     trial, pilot = Trial(seed), Pilot()
     for step in range(20):
         forward_m_s, turn_rad_s = (0.3, -0.3, 0.0, 0.15, 0.0)[(seed + step) % 5], (0.0, 1.8, -1.8)[step % 3]
-        pilot.control.request(Move(forward_m_s, turn_rad_s))
+        pilot.control.request(TrunkSpeed(forward_m_s, turn_rad_s))
         assert not trial.walk(pilot, 0.7).fell
 
 
 def test_without_disturbance_it_goes_where_its_odometry_says() -> None:
     trial, pilot = Trial(), Pilot()
-    pilot.control.request(Move(0.3, 0.3))
+    pilot.control.request(TrunkSpeed(0.3, 0.3))
     walked, state = trial.walk(pilot, 4.0), pilot.control.state()
     assert (walked.forward_m, walked.left_m) == pytest.approx((state.x_m, state.y_m), abs=0.15)
     assert walked.turned_rad == pytest.approx(state.heading_rad, abs=0.3)
@@ -72,7 +72,7 @@ def test_without_disturbance_it_goes_where_its_odometry_says() -> None:
 
 def test_its_replies_say_how_it_stands() -> None:
     trial, pilot = Trial(7), Pilot()
-    pilot.control.request(Move(0.3))
+    pilot.control.request(TrunkSpeed(0.3))
     walked = trial.walk(pilot, 4.0)
     assert walked.felt_wrong_rad < 2 * link.ANGLE_RAD
     assert max(abs(status.pitch_rad) for status in walked.statuses) > math.radians(0.5)
@@ -91,7 +91,7 @@ def test_its_replies_say_how_it_stands() -> None:
 def test_silence_in_the_middle_of_a_stride_lets_it_stand() -> None:
     """The pilot of the second part sends nothing: the board stands the walker up and it stays upright."""
     trial, pilot = Trial(), Pilot()
-    pilot.control.request(Move(0.3, 0.5))
+    pilot.control.request(TrunkSpeed(0.3, 0.5))
     trial.walk(pilot, 1.9)
     silent = Pilot()
     silent.packets = lambda now_s: []  # type: ignore[method-assign]
@@ -107,7 +107,7 @@ def test_silence_in_the_middle_of_a_stride_lets_it_stand() -> None:
 def test_in_a_world_it_walks_beside_a_scout_and_sleeps_when_it_stands() -> None:
     places = [ScoutPlace("walker1", 1, 3.0, 3.0, 0.0, WALKER), ScoutPlace("scout1", 2, 3.0, 4.0, 0.0)]
     room, pilot = World(WorldDescription(9.0, 6.0, scouts=places)), Pilot()
-    pilot.control.request(Move(0.3))
+    pilot.control.request(TrunkSpeed(0.3))
     room.hear(1, radio_link.encode_transmitter_on("video1"))
     for frame in range(3 * FRAMES_PER_S):
         for packet in pilot.packets(room.time_s):

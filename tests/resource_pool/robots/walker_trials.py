@@ -10,8 +10,8 @@ import mujoco
 
 from resource_pool.robots.walker import link
 from resource_pool.robots.walker.body import Walker
-from resource_pool.robots.walker.gait import LEGS, TROT, GaitParameters, Move
-from resource_pool.robots.walker.link import JOINTS, Pose
+from resource_pool.robots.walker.gait import LEGS, TROT, GaitParameters, TrunkSpeed
+from resource_pool.robots.walker.link import JOINTS, JointTargets
 from resource_pool.robots.walker.motion import STEP_S, MotionControl
 from scout_model.composition import compose
 from scout_model.description import ScoutPlace, WorldDescription
@@ -40,7 +40,7 @@ class Pilot:
         if self._packets * PACKET_S > now_s + 1e-9:
             return []
         self._packets += 1
-        return [link.encode_pose(Pose(self._targets_rad, PACKET_S))]
+        return [link.encode_joint_targets(JointTargets(self._targets_rad, PACKET_S))]
 
 
 @dataclass
@@ -158,7 +158,7 @@ class Trial:
         return math.atan2(rotation[3], rotation[0])
 
 
-def walk(move: Move, seconds: float, seed: int | None = None, parameters: GaitParameters = TROT) -> Walked:
+def walk(move: TrunkSpeed, seconds: float, seed: int | None = None, parameters: GaitParameters = TROT) -> Walked:
     """Return what becomes of a walker whose motion control is asked for this motion from the beginning."""
     pilot = Pilot(parameters)
     pilot.control.request(move)
