@@ -37,6 +37,7 @@ PLANTED = [
     ("zenoh", "backbone/bus/planted.py", "import zenoh"),
     ("zenoh", "resource_pool/planted.py", "from zenoh.handlers import Callback"),
     ("mujoco", "resource_pool/planted.py", "import mujoco"),
+    ("mujoco", "resource_pool/robots/walker/planted.py", "import mink"),
     ("cv2", "mission_control/planted.py", "import cv2"),
     ("cv2", "ui_console/planted.py", "import cv2"),
     ("pydantic", "backbone/placer/planted.py", "import pydantic"),

@@ -17,6 +17,7 @@ LIGHT = [
     "resource_pool.drivers.simulated",
     "resource_pool.arcs.capture",
     "resource_pool.arc_client",
+    "resource_pool.robots.walker.body",
 ]
 
 
