@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
@@ -325,15 +325,17 @@ class Pool:
 
 
 @asynccontextmanager
-async def a_pool(mission: Any, rcs: list[str], *, manager: bool = True) -> AsyncIterator[Pool]:
-    """Give a pool with these RCs running."""
+async def a_pool(
+    mission: Any, rcs: list[str], *, manager: bool = True, more: Sequence[Resource] = ()
+) -> AsyncIterator[Pool]:
+    """Give a pool with these RCs running, and with more hardware than ``HARDWARE``."""
     clock = VirtualClock()
     WiretappedRadio.built.clear()
     HandOperatedGrabber.built.clear()
     async with mission(clock=clock) as network, AsyncExitStack() as stack:
-        pool = Pool(network, clock, HARDWARE)
+        pool = Pool(network, clock, [*HARDWARE, *more])
         stack.push_async_callback(pool.close)
-        resources = [msgspec.to_builtins(resource) for resource in HARDWARE if resource.name in rcs]
+        resources = [msgspec.to_builtins(resource) for resource in pool.hardware if resource.name in rcs]
         await pool.start(DependencyDatabase, "dependency_database", {"resources": resources}, Subsystem.BACKBONE)
         await pool.start(SimulatedWorld, "world", {"world": msgspec.to_builtins(WORLD)})
         for name in rcs:
