@@ -18,7 +18,7 @@ from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_order
 from backbone.placer.messages import Ended, NoHost, StopComponent
 from mission_control.behavior import Behavior, NotAChild
-from mission_control.behavior_tree import Decision
+from mission_control.children import Decision
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
 from resource_pool.arc_client import EmergencyStopped, Frame, Noted, NotMyArc, Resumed, StopState
 from resource_pool.stop_latch import StopLatch
