@@ -82,14 +82,15 @@ B = TypeVar("B", bound=BehaviorParameters)
 class Behavior(Component[B], BehaviorHooks, Generic[B]):
     """A running node of the behavior tree.
 
-    Derive and override the hooks of ``BehaviorHooks`` that you need. Class variables to set: ``parameters_type``, and
-    ``children_together`` (False: one after the other).
+    Derive and override the hooks of ``BehaviorHooks`` that you need. Class variables to set: ``parameters_type``,
+    ``children_together`` (False: one after the other), and ``children_allowed`` (fewest and most in a mission file).
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
     accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior
     children_together: ClassVar[bool] = True
+    children_allowed: ClassVar[tuple[int, int] | None] = None
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

@@ -73,12 +73,13 @@ class ChildrenLoop:
         self._orders: deque[Instruction] = deque()
         self._working: asyncio.Task[None] | None = None
         self._waking: asyncio.Task[None] | None = None
-        self._wakes_at_s = self._woke_at_s = math.inf
+        self._wakes_at_s, self._woke_at_s = math.inf, -math.inf
+        self._latest_s = -math.inf
 
     # ------------------------------------------------------------------ for the behavior
     def begin(self) -> None:
         """Start the children that run first; end those of an earlier life that do not."""
-        self._carry_out(self.rules.begin(self._clock.now_s()))
+        self._carry_out(self.rules.begin(self._now_s()))
         self._begin(
             self._keeper.stop_those_of_an_earlier_life(lambda name: name in self.rules.status),
             "children of an earlier life",
@@ -92,11 +93,11 @@ class ChildrenLoop:
             self._note(name, f"finished: {status}")
             self._begin(self._decide(name, status, payload), f"decide on {name}")
         elif not status.is_final:
-            self._carry_out(self.rules.suspended(name, suspended_because, self._clock.now_s()))
+            self._carry_out(self.rules.suspended(name, suspended_because, self._now_s()))
 
     def look_again(self) -> None:
-        """Apply the rules now: their settings or the time have changed."""
-        self._carry_out(self.rules.time_passed(self._clock.now_s()))
+        """Apply the rules now, after a change of their settings."""
+        self._carry_out(self.rules.time_passed(self._now_s()))
 
     async def end(self) -> None:
         """Return when all started children have ended; no other is started."""
@@ -118,14 +119,14 @@ class ChildrenLoop:
 
     # ------------------------------------------------------------------ within
     def _child_left(self, name: str) -> None:
-        self._carry_out(self.rules.left(name, self._clock.now_s()))
+        self._carry_out(self.rules.left(name, self._now_s()))
 
     async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         decision = await self._hooks.child_finished(name, status, payload)
         self._note(name, f"{decision} after {status}")
         if decision is Decision.ABORT or (decision is Decision.NEXT and not self.rules.expects_failures):
             self.give_up(name, payload)
-        self._carry_out(self.rules.decided(name, decision, self._clock.now_s()))
+        self._carry_out(self.rules.decided(name, decision, self._now_s()))
 
     def _carry_out(self, instructions: Sequence[Instruction]) -> None:
         """Carry the instructions out after those under way, so that no child starts before it has stopped."""
@@ -169,4 +170,9 @@ class ChildrenLoop:
     async def _wake(self, at_s: float) -> None:
         await self._clock.sleep_until_s(at_s)
         self._waking, self._wakes_at_s, self._woke_at_s = None, math.inf, at_s
-        self.look_again()
+        self._carry_out(self.rules.time_passed(self._now_s(at_s)))
+
+    def _now_s(self, at_least_s: float = -math.inf) -> float:
+        """Return a time that never runs backwards; a sleep may end a rounding error early."""
+        self._latest_s = max(self._latest_s, at_least_s, self._clock.now_s())
+        return self._latest_s
