@@ -56,6 +56,8 @@ class FinishParent:
 
 
 Instruction = StartChild | StopChild | FinishParent
+BRANCH = "branch"
+"""Key in the payload of a report: node → its state, for the nodes below the child."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,8 +197,12 @@ class Children:
         return ""
 
     def remarks(self) -> dict[str, str]:
-        """Return child → its state, for the drawing of the branch."""
-        return {name: self._remark(name) for name in self.status}
+        """Return node → its state, for the drawing of the branch."""
+        remarks = {name: self._remark(name) for name in self.status}
+        for name, status in self.status.items():
+            below = {} if status.is_final else self.payload.get(name, {}).get(BRANCH)
+            remarks |= below if isinstance(below, dict) else {}
+        return remarks
 
     def why_failed(self, name: str) -> str:
         """Return the failure of a child as part of a sentence.

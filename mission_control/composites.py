@@ -51,7 +51,7 @@ class Composite(Children):
         return runs + self._because()
 
     def remarks(self) -> dict[str, str]:
-        """Return child → its state, also of children that are not started; see ``Children.remarks``."""
+        """Return node → its state, also of children that are not started; see ``Children.remarks``."""
         return dict.fromkeys(self._names, "not started") | super().remarks()
 
     def _remark(self, name: str) -> str:

@@ -14,6 +14,7 @@ import msgspec
 
 from backbone.ranges import A_DAY_S
 from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.children import BRANCH
 from mission_control.composites import ENDLESS
 
 MOST_CHILDREN = 256  # chosen: as many as a path may have steps; a mission has a dozen
@@ -30,12 +31,15 @@ P = TypeVar("P", bound=BehaviorParameters)
 
 
 class Composed(Behavior[P]):
-    """A parent that decides by rule, and reports which branch runs and why."""
+    """A parent that decides by rule, and reports which branch runs and why: to people, and to its own parent."""
 
     children_allowed = (1, MOST_CHILDREN)
 
     def children_arranged(self) -> None:
         """Report which children run, and why."""
-        sentence = self._children.rules.sentence
-        if sentence and sentence != self.feedback:
-            self.report(sentence)
+        rules = self._children.rules
+        if rules.sentence and rules.sentence != self.feedback:
+            self.report(rules.sentence)
+        told = {BRANCH: rules.remarks()}
+        if told != self.payload:
+            self.tell_parent(told)

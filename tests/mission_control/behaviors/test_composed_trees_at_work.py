@@ -114,6 +114,12 @@ def is_running(placer: FakePlacer, *names: str) -> bool:
     return set(placer.components) == set(names)
 
 
+async def tree_of(placer: FakePlacer, name: str) -> list[str]:
+    """Return the drawing of a branch."""
+    state = await placer.bus.ask(f"mission_control/{name}", AskBehavior(), BehaviorState, within_s=1.0)
+    return state.tree.splitlines()
+
+
 async def set_parameter(placer: FakePlacer, name: str, parameter: str, value: object) -> None:
     await placer.bus.ask(f"mission_control/{name}", SetParameter(parameter, value, "anna"), Parameters, within_s=1.0)
 
@@ -126,11 +132,11 @@ def test_a_late_patrol_is_followed_by_the_way_home_and_that_by_hiding(placer_wor
         await granted(placer, "patrol")
         await placer.clock.sleep_s(55.0)
         assert is_running(placer, "day", "one-minute", "patrol")
+        assert (await tree_of(placer, "day"))[2] == "│  └─ patrol (leaf, priority 3): running"
         await placer.wait(lambda: is_running(placer, "day", "go-home"), within_s=10.0)
         why = "because one-minute failed: patrol was not done within 60 s"
         assert top.feedback == f"runs go-home, 2 of 3, {why}"
-        state = await placer.bus.ask("mission_control/day", AskBehavior(), BehaviorState, within_s=1.0)
-        assert state.tree.splitlines() == [
+        assert await tree_of(placer, "day") == [
             f"day (fallback, priority 3): running; runs go-home, 2 of 3, {why}",
             "├─ one-minute (timeout, priority 3): failed: patrol was not done within 60 s",
             "│  └─ patrol (leaf, priority 3)",
@@ -158,6 +164,9 @@ def test_while_a_person_has_the_robot_the_minute_stands_still_through_all_levels
         await arc.suspend("higher", "console-1")
         await placer.clock.sleep_s(500.0)
         assert top.suspended_because == "steps: again: patrol: higher by console-1"
+        assert (await tree_of(placer, "one-minute"))[-1].endswith(
+            "patrol (leaf, priority 3): suspended: higher by console-1"
+        )
         assert top.status is BehaviorStatus.RUNNING
         await arc.grant()
         await placer.clock.sleep_s(25.0)
