@@ -83,7 +83,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     """A running node of the behavior tree.
 
     Derive and override the hooks of ``BehaviorHooks`` that you need. Class variables to set: ``parameters_type``,
-    ``children_together`` (False: one after the other), and ``children_allowed`` (fewest and most in a mission file).
+    ``children_together`` (False: one after the other), ``children_allowed`` (fewest, most), ``may_claim`` (an ARC).
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
@@ -91,6 +91,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior
     children_together: ClassVar[bool] = True
     children_allowed: ClassVar[tuple[int, int] | None] = None
+    may_claim: ClassVar[bool] = True
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -155,10 +156,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if self.status.is_final:
             return ""
         return self._arc_suspended_because if self.arc is not None else self._children.rules.suspended_because
-
-    def apply_rules(self) -> None:
-        """Apply the rules for children now, after a change of their settings."""
-        self._children.look_again()
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""

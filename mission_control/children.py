@@ -138,8 +138,9 @@ class Children:
             return []
         match decision:
             case Decision.RETRY:
-                self.status[name] = BehaviorStatus.RUNNING
-                return [StopChild(name), StartChild(name)]
+                self._running.remove(name)
+                del self.status[name]
+                return [StopChild(name), *self._arrange(now_s)]
             case Decision.ABORT:
                 return self._finish(FinishParent(BehaviorStatus.FAILURE, {"child": name, **self.payload[name]}))
             case Decision.NEXT:
@@ -162,7 +163,7 @@ class Children:
 
     def time_passed(self, now_s: float) -> list[Instruction]:
         """Return the instructions that are due now."""
-        return self._arrange(now_s) if self._running else []
+        return self._arrange(now_s) if self._open else []
 
     def left(self, name: str, now_s: float) -> list[Instruction]:
         """Return the instructions after another component ended a child, which counts as if there were none such."""

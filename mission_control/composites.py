@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from typing import ClassVar
 
 from mission_control.children import Children, Decision, FinishParent, Instruction
 from mission_control.messages import BehaviorStatus
@@ -191,52 +192,76 @@ class InParallel(Composite):
         return f", {len(succeeded)} of {needed} needed successes{because}"
 
 
-class WithRetries(Composite):
-    """Its child again while it fails: success as soon as the child succeeds, failure after ``num_attempts``."""
+class Again(Composite):
+    """Its child again and again: how often, and after which end, is for derived classes.
 
-    def __init__(self, names: Sequence[str], *, num_attempts: int) -> None:
+    Args:
+        names: Name of the child.
+        most: Number of starts; -1: without end.
+        pause_s: Time from an end of the child to its next start.
+    """
+
+    again_after: ClassVar[BehaviorStatus]
+
+    def __init__(self, names: Sequence[str], *, most: int, pause_s: float = 0.0) -> None:
         super().__init__(names, together=False)
-        self.num_attempts, self._failures = num_attempts, 0
+        self.most, self.pause_s = most, pause_s
+        self._ends, self._starts_at_s = 0, -math.inf
 
     def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
-        """Record a report; count failures."""
+        """Record a report; count the ends."""
         has_finished = super().reported(name, status, payload)
-        self._failures += has_finished and status is BehaviorStatus.FAILURE
+        self._ends += has_finished
         return has_finished
 
     def decision(self, name: str) -> Decision:
-        """Return retry while attempts are left."""
-        if self.status[name] is BehaviorStatus.SUCCESS:
-            return Decision.NEXT
-        return Decision.RETRY if self.num_attempts < 0 or self._failures < self.num_attempts else Decision.ABORT
+        """Return retry while starts are left."""
+        if self.status[name] is self.again_after and (self.most < 0 or self._ends < self.most):
+            return Decision.RETRY
+        return super().decision(name)
+
+    def decided(self, name: str, decision: Decision, now_s: float) -> list[Instruction]:
+        """Begin the pause; see ``Children.decided``."""
+        if decision is Decision.RETRY:
+            self._starts_at_s = now_s + self.pause_s
+        return super().decided(name, decision, now_s)
+
+    def wanted(self, now_s: float) -> list[str]:
+        """Return the child, but none during the pause."""
+        return self._open if now_s >= self._starts_at_s else []
+
+    @property
+    def wakes_at_s(self) -> float:
+        """When the pause is over."""
+        return math.inf if self.has_finished or self._running else self._starts_at_s
+
+    @property
+    def sentence(self) -> str:
+        """Whether the child runs, or when it starts again."""
+        if self.has_finished or self._running:
+            return super().sentence
+        return f"starts {self._open[0]} again at {self._starts_at_s:.1f} s of mission time{self._because()}"
 
     def _because(self) -> str:
-        of = "" if self.num_attempts < 0 else f" of {self.num_attempts}"
-        because = f", because {self.why_failed(self._running[0])}" if self._failures else ""
-        return f", attempt {self._failures + 1}{of}{because}"
+        turn = f", {self._turn} {self._ends + 1}" + ("" if self.most < 0 else f" of {self.most}")
+        failed = self._ends and self.again_after is BehaviorStatus.FAILURE
+        return turn + (f", because {self.why_failed(self._open[0])}" if failed else "")
+
+    @property
+    def _turn(self) -> str:
+        return "attempt" if self.again_after is BehaviorStatus.FAILURE else "cycle"
 
 
-class WithRepeats(Composite):
-    """Its child again while it succeeds: success after ``num_cycles``, failure as soon as the child fails."""
+class WithRetries(Again):
+    """Its child again while it fails: success as soon as the child succeeds, failure after ``most`` attempts."""
 
-    def __init__(self, names: Sequence[str], *, num_cycles: int) -> None:
-        super().__init__(names, together=False)
-        self.num_cycles, self._cycles = num_cycles, 0
+    again_after = BehaviorStatus.FAILURE
 
-    def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
-        """Record a report; count cycles."""
-        has_finished = super().reported(name, status, payload)
-        self._cycles += has_finished and status is BehaviorStatus.SUCCESS
-        return has_finished
 
-    def decision(self, name: str) -> Decision:
-        """Return retry while cycles are left."""
-        if self.status[name] is BehaviorStatus.FAILURE:
-            return Decision.ABORT
-        return Decision.RETRY if self.num_cycles < 0 or self._cycles < self.num_cycles else Decision.NEXT
+class WithRepeats(Again):
+    """Its child again while it succeeds: success after ``most`` cycles, failure as soon as the child fails."""
 
-    def _because(self) -> str:
-        return f", cycle {self._cycles + 1}" + ("" if self.num_cycles < 0 else f" of {self.num_cycles}")
+    again_after = BehaviorStatus.SUCCESS
 
 
 class Stopwatch:
@@ -301,7 +326,7 @@ class WithTimeout(Composite):
         return f", {self.seconds - self._watch.sum_s:.1f} s left"
 
 
-class Waiting(Composite):
+class WithDelay(Composite):
     """No child: success after ``seconds``."""
 
     def __init__(self, names: Sequence[str], *, seconds: float) -> None:

@@ -36,7 +36,7 @@ def check_behaviors(tables: Tables, report: Report) -> None:
             )
         check_parameters(behavior, TREE_PARAMETERS, report)
         check_class_parameters(behavior, TREE_PARAMETERS, tables, report)
-        _check_children(behavior, tables, report)
+        _check_inside(behavior, tables, report)
     sets = _Sets(tables)
     arc_kinds = [name for name in tables.types if tables.needs(name)]
     for behavior, arc in tables.claims():
@@ -63,9 +63,14 @@ def _check_multiplicity(
         )
 
 
-def _check_children(behavior: Element, tables: Tables, report: Report) -> None:
+def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
+    """Report children and an ARC that the behavior's class does not allow."""
     facts = tables.facts_of(behavior.text("type"))
-    if facts is None or facts.children is None:
+    if facts is None:
+        return
+    if not facts.may_claim and (arc := behavior.first("arc")) is not None:
+        report.fault(arc.place, f"{behavior.text('type')} {behavior.text('name')} needs no ARC", "Remove it")
+    if facts.children is None:
         return
     (fewest, most), given = facts.children, behavior.all("behavior")
     if fewest <= len(given) <= most:

@@ -18,10 +18,13 @@ from mission_control.children import BRANCH
 from mission_control.composites import ENDLESS
 
 MOST_CHILDREN = 256  # chosen: as many as a path may have steps; a mission has a dozen
+PAUSE_S = 1.0  # chosen: ten times the start of a process, so that a child that fails at once costs little
 MOST_TIMES = 100_000  # chosen: once a minute for ten weeks
 
 Seconds = Annotated[float, msgspec.Meta(gt=0, le=A_DAY_S)]
 """A mission time that is over at some time."""
+Pause = Annotated[float, msgspec.Meta(ge=0, le=A_DAY_S)]
+"""A mission time that may be none."""
 Times = Annotated[int, msgspec.Meta(ge=ENDLESS, le=MOST_TIMES)]
 """How often, or without end."""
 Threshold = Annotated[int, msgspec.Meta(ge=-MOST_CHILDREN, le=MOST_CHILDREN)]
@@ -34,6 +37,7 @@ class Composed(Behavior[P]):
     """A parent that decides by rule, and reports which branch runs and why: to people, and to its own parent."""
 
     children_allowed = (1, MOST_CHILDREN)
+    may_claim = False
 
     def children_arranged(self) -> None:
         """Report which children run, and why."""

@@ -98,8 +98,8 @@ class Comparison:
         return value
 
 
-class ConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
-    """Parameters of ``Condition``.
+class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``MessageCondition``.
 
     Attributes:
         source: The component: its name, or its address; '*' for any.
@@ -131,11 +131,12 @@ class ConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
             raise ValueError(f"source is {ANY}: name the behavior whose report is asked for")
 
 
-class Condition(Behavior[ConditionParameters]):
+class MessageCondition(Behavior[MessageConditionParameters]):
     """Succeeds if an event or a report is as stated; ``check`` fails if it is not, ``wait`` goes on waiting."""
 
-    parameters_type = ConditionParameters
+    parameters_type = MessageConditionParameters
     children_allowed = (0, 0)
+    may_claim = False
 
     async def start(self) -> None:
         """Subscribe, or begin to ask."""

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Literal
 
-import msgspec
-
-from backbone.ranges import A_DAY_S
 from mission_control.behavior import BehaviorParameters
-from mission_control.behaviors.composed import Composed
+from mission_control.behaviors.composed import Composed, Pause
 from mission_control.composites import InFallback, WhileSuspended
 
 
@@ -23,7 +20,7 @@ class FallbackParameters(BehaviorParameters, frozen=True, kw_only=True):
     """
 
     while_suspended: Literal["wait", "next"] = "wait"
-    patience_s: Annotated[float, msgspec.Meta(ge=0, le=A_DAY_S)] = 10.0  # chosen: two of the papers' slices
+    patience_s: Pause = 10.0  # chosen: two of the papers' slices
 
 
 class Fallback(Composed[FallbackParameters]):
@@ -40,7 +37,7 @@ class Fallback(Composed[FallbackParameters]):
     def parameters_changed(self) -> None:
         """Apply them from now on."""
         self._set_rules()
-        self.apply_rules()
+        self._children.look_again()
 
     def _set_rules(self) -> None:
         self._rules.while_suspended = WhileSuspended(self.parameters.while_suspended)

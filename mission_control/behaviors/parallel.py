@@ -41,7 +41,7 @@ class Parallel(Composed[ParallelParameters]):
     def parameters_changed(self) -> None:
         """Apply them from now on."""
         self._set_rules()
-        self.apply_rules()
+        self._children.look_again()
 
     def _set_rules(self) -> None:
         self._rules.success_count = self.parameters.success_count

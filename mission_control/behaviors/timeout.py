@@ -37,7 +37,7 @@ class Timeout(Composed[TimeoutParameters]):
     def parameters_changed(self) -> None:
         """Apply them from now on, to the time that has already passed too."""
         self._set_rules()
-        self.apply_rules()
+        self._children.look_again()
 
     def _set_rules(self) -> None:
         self._rules.seconds = self.parameters.seconds

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from mission_control.behavior import BehaviorParameters
 from mission_control.behaviors.composed import Composed, Seconds
-from mission_control.composites import Waiting
+from mission_control.composites import WithDelay
 
 
 class WaitParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -25,12 +25,12 @@ class Wait(Composed[WaitParameters]):
     parameters_type = WaitParameters
     children_allowed = (0, 0)
 
-    def rules(self, children: Sequence[str]) -> Waiting:
+    def rules(self, children: Sequence[str]) -> WithDelay:
         """Return the rule of a wait."""
-        self._rules = Waiting(children, seconds=self.parameters.seconds)
+        self._rules = WithDelay(children, seconds=self.parameters.seconds)
         return self._rules
 
     def parameters_changed(self) -> None:
         """Apply them from now on, to the time that has already passed too."""
         self._rules.seconds = self.parameters.seconds
-        self.apply_rules()
+        self._children.look_again()

@@ -18,8 +18,8 @@ from mission_control.composites import (
     InFallback,
     InParallel,
     InSequence,
-    Waiting,
     WhileSuspended,
+    WithDelay,
     WithRepeats,
     WithRetries,
     WithTimeout,
@@ -49,7 +49,7 @@ RULES: dict[str, type[Children]] = {
     "retry": WithRetries,
     "repeat": WithRepeats,
     "timeout": WithTimeout,
-    "wait": Waiting,
+    "wait": WithDelay,
 }
 Result = tuple[BehaviorStatus, int] | None
 """Final status and its tick; None: still running after the longest time."""
@@ -76,10 +76,8 @@ def trees(draw: st.DrawFn, depth: int = 4, name: str = "n") -> Plan:
         case "parallel":
             thresholds = st.integers(1, count) | st.integers(-count, -1)
             settings = {"success_count": draw(thresholds), "failure_count": draw(thresholds)}
-        case "retry":
-            settings = {"num_attempts": draw(st.sampled_from([-1, 1, 2, 3]))}
-        case "repeat":
-            settings = {"num_cycles": draw(st.sampled_from([-1, 1, 2, 3]))}
+        case "retry" | "repeat":
+            settings = {"most": draw(st.sampled_from([-1, 1, 2, 3])), "pause_s": draw(st.integers(0, 3))}
         case "timeout":
             how = draw(st.sampled_from([WhileSuspended.WAIT, WhileSuspended.COUNT]))
             settings = {"seconds": draw(st.integers(1, 30)), "while_suspended": how}
@@ -345,19 +343,19 @@ class TickAgain(Tick):
     """Retry and repeat."""
 
     def reset(self, now: int) -> None:
-        self.count = 0
+        self.count, self.rests_until = 0, now
 
     def go_on(self, now: int) -> BehaviorStatus:
-        is_retry = self.plan.kind == "retry"
-        again = FAILURE if is_retry else SUCCESS
-        most = self.plan.settings["num_attempts" if is_retry else "num_cycles"]
-        while True:
+        again = FAILURE if self.plan.kind == "retry" else SUCCESS
+        while now >= self.rests_until:
             status = self.children[0].tick(now)
             if status is not again:
                 return status
             self.count += 1
-            if self.count == most:
+            if self.count == self.plan.settings["most"]:
                 return status
+            self.rests_until = now + self.plan.settings["pause_s"]
+        return RUNNING
 
 
 class TickTimeout(Tick):

@@ -14,8 +14,8 @@ from mission_control.composites import (
     InFallback,
     InParallel,
     InSequence,
-    Waiting,
     WhileSuspended,
+    WithDelay,
     WithRepeats,
     WithRetries,
     WithTimeout,
@@ -42,11 +42,12 @@ MAKERS: dict[str, Callable[[], Children]] = {
     "parallel-all": lambda: InParallel(NAMES),
     "parallel-any": lambda: InParallel(NAMES, success_count=1, failure_count=-1),
     "parallel-two": lambda: InParallel(NAMES, success_count=2, failure_count=-1),
-    "retry": lambda: WithRetries(["a"], num_attempts=3),
-    "repeat": lambda: WithRepeats(["a"], num_cycles=3),
+    "retry": lambda: WithRetries(["a"], most=3),
+    "retry-later": lambda: WithRetries(["a"], most=-1, pause_s=2.0),
+    "repeat": lambda: WithRepeats(["a"], most=3),
     "timeout": lambda: WithTimeout(["a"], seconds=7.0),
     "timeout-count": lambda: WithTimeout(["a"], seconds=7.0, while_suspended=WhileSuspended.COUNT),
-    "wait": lambda: Waiting([], seconds=7.0),
+    "wait": lambda: WithDelay([], seconds=7.0),
 }
 _events = st.lists(
     st.tuples(
@@ -207,7 +208,7 @@ def test_a_parallel_of_too_few_children_fails_before_it_starts_any() -> None:
         (InFallback(["a"]), FAILURE),
         (InParallel(["a"]), SUCCESS),
         (InParallel(["a"], success_count=1), FAILURE),
-        (WithRetries(["a"], num_attempts=3), SUCCESS),
+        (WithRetries(["a"], most=3), SUCCESS),
         (WithTimeout(["a"], seconds=3.0), SUCCESS),
     ],
 )
@@ -226,12 +227,21 @@ def test_a_setting_can_be_changed_on_the_way() -> None:
 
 
 def test_retry_and_repeat_say_which_turn_it_is() -> None:
-    retry = begun(WithRetries(["a"], num_attempts=3))
+    retry = begun(WithRetries(["a"], most=3))
     end(retry, "a", FAILURE, detail="no path")
     assert retry.sentence == "runs a, attempt 2 of 3, because a failed: no path"
-    repeat = begun(WithRepeats(["a"], num_cycles=-1))
+    repeat = begun(WithRepeats(["a"], most=-1))
     end(repeat, "a", SUCCESS)
     assert repeat.sentence == "runs a, cycle 2"
+
+
+def test_a_retry_pauses_before_the_next_attempt() -> None:
+    retry = begun(WithRetries(["a"], most=-1, pause_s=2.0))
+    assert end(retry, "a", FAILURE, 10.0, detail="no path") == [StopChild("a")]
+    assert retry.sentence == "starts a again at 12.0 s of mission time, attempt 2, because a failed: no path"
+    assert retry.wakes_at_s == 12.0
+    assert retry.remarks() == {"a": "not started"}
+    assert retry.time_passed(12.0) == [StartChild("a")]
 
 
 def test_a_sequence_says_what_came_before() -> None:

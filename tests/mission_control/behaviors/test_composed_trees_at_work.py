@@ -17,7 +17,7 @@ from backbone.mission.behavior_orders import behavior_order
 from backbone.placer.messages import Ended, NoHost, StopComponent
 from backbone.wire import Message
 from mission_control.behavior import Behavior
-from mission_control.behaviors.condition import Comparison, Condition, ConditionParameters
+from mission_control.behaviors.condition import Comparison, MessageCondition, MessageConditionParameters
 from mission_control.behaviors.fallback import Fallback
 from mission_control.behaviors.parallel import Parallel
 from mission_control.behaviors.repeat import Repeat
@@ -58,7 +58,7 @@ CLASSES: dict[str, type[Component[Any]]] = {
     "repeat": Repeat,
     "timeout": Timeout,
     "wait": Wait,
-    "condition": Condition,
+    "condition": MessageCondition,
 }
 
 
@@ -429,4 +429,4 @@ def test_a_comparison_reads_one_field(comparison: Comparison, holds: bool) -> No
 )
 def test_a_condition_that_cannot_be_is_refused(parameters: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
-        ConditionParameters(**parameters)
+        MessageConditionParameters(**parameters)
