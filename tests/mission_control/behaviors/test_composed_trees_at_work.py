@@ -327,6 +327,43 @@ def test_a_composite_that_is_restarted_goes_on_with_the_child_it_finds(placer_wo
     placer_world(scene)
 
 
+def test_a_start_waits_for_the_stop_before_it(placer_world: Run) -> None:
+    """The robot comes and goes while a stop is under way, which must not end the child that is wanted again."""
+
+    async def scene(placer: FakePlacer) -> None:
+        first, second = node("leaf", "first", arc=ARC), node("leaf", "second")
+        await root(placer, node("fallback", "watch", first, second, while_suspended="next", patience_s=0.0))
+        arc = await granted(placer, "first")
+        await arc.suspend()
+        await placer.wait(lambda: "second" in placer.components)
+        await placer.clock.sleep_s(1.0)
+        stood_in = placer.components["second"]
+        placer.stop_takes_s = 3.0
+        await arc.grant()
+        await placer.clock.sleep_s(1.0)
+        await arc.suspend()
+        await placer.wait(lambda: placer.components.get("second") not in (None, stood_in), within_s=10.0)
+        await placer.clock.sleep_s(20.0)
+        assert is_running(placer, "watch", "first", "second")
+
+    placer_world(scene)
+
+
+def test_a_parent_that_finishes_while_it_waits_for_a_stop_starts_no_other_child(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        top = await root(placer, node("sequence", "steps", node("leaf", "a"), node("leaf", "b")))
+        await placer.wait(lambda: "a" in placer.components)
+        placer.silence()
+        placer.components["a"].finish(SUCCESS)
+        await placer.clock.sleep_s(2.0)
+        top.finish(FAILURE)
+        placer.speak()
+        await placer.clock.sleep_s(20.0)
+        assert (is_running(placer, "steps"), placer.started) == (True, ["steps", "a"])
+
+    placer_world(scene)
+
+
 # ---------------------------------------------------------------------- conditions
 def test_a_condition_waits_for_an_event_that_is_as_stated(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
