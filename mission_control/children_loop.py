@@ -1,11 +1,16 @@
-"""ChildrenLoop: carries out what the rules for a behavior's children order, one instruction after the other."""
+"""ChildrenLoop: carries out what the rules for a behavior's children order.
+
+Rule of this file: an order waits for those before it in the same answer of the rules, and for those before it about the
+same child; the end of the parent waits for all. So no child starts before it has stopped, and a child whose stop takes
+long, because its host does not answer, holds up no other answer.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import math
-from collections import deque
 from collections.abc import Callable, Coroutine, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import assert_never
 
 from backbone.bus.interface import Bus, Clock
@@ -18,8 +23,17 @@ from mission_control.children import Children, Decision, FinishParent, Instructi
 from mission_control.messages import BehaviorStatus
 
 
+@dataclass(frozen=True, slots=True)
+class Order:
+    """An instruction, and the orders about the same child that go before it."""
+
+    instruction: Instruction
+    after: Sequence[asyncio.Event]
+    is_done: asyncio.Event = field(default_factory=asyncio.Event)
+
+
 class ChildrenLoop:
-    """Feeds the events of children, and the time, to the rules, and carries out the answers in order."""
+    """Feeds the events of children, and the time, to the rules, and carries out the answers."""
 
     def __init__(
         self,
@@ -70,8 +84,7 @@ class ChildrenLoop:
             changed=changed,
         )
         self._given_up: dict[str, Absence] = {}
-        self._orders: deque[Instruction] = deque()
-        self._working: asyncio.Task[None] | None = None
+        self._last_orders: dict[str, asyncio.Event] = {}
         self._waking: asyncio.Task[None] | None = None
         self._wakes_at_s, self._woke_at_s = math.inf, -math.inf
         self._latest_s = -math.inf
@@ -129,19 +142,25 @@ class ChildrenLoop:
         self._carry_out(self.rules.decided(name, decision, self._now_s()))
 
     def _carry_out(self, instructions: Sequence[Instruction]) -> None:
-        """Carry the instructions out after those under way, so that no child starts before it has stopped."""
-        self._orders.extend(instructions)
-        if self._orders and self._working is None:
-            self._working = self._begin(self._work(), "children")
+        if instructions:
+            self._begin(self._obey_in_order([self._order(each) for each in instructions]), "children")
         self._arm()
         self._arranged()
 
-    async def _work(self) -> None:
-        try:
-            while self._orders:
-                await self._obey(self._orders.popleft())
-        finally:
-            self._working = None
+    def _order(self, instruction: Instruction) -> Order:
+        if isinstance(instruction, FinishParent):
+            return Order(instruction, list(self._last_orders.values()))
+        before = self._last_orders.get(instruction.name)
+        order = Order(instruction, [] if before is None else [before])
+        self._last_orders[instruction.name] = order.is_done
+        return order
+
+    async def _obey_in_order(self, orders: Sequence[Order]) -> None:
+        for order in orders:
+            for earlier in order.after:
+                await earlier.wait()
+            await self._obey(order.instruction)
+            order.is_done.set()
 
     async def _obey(self, instruction: Instruction) -> None:
         match instruction:

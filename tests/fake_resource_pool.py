@@ -148,7 +148,7 @@ class FakePlacer:
         self.placed: dict[str, Start] = {}
         self.requesters: dict[str, str] = {}
         self.stopped: set[str] = set()
-        self.stop_takes_s = 0.0
+        self.stop_takes_s: dict[str, float] = {}
         self.on_arc: Callable[[FakeArc], None] = lambda arc: None
         self._lives: dict[str, asyncio.Task[None]] = {}
         self.bus = network.join(PLACER, clock)
@@ -257,7 +257,7 @@ class FakePlacer:
                 subsystem = Subsystem.MISSION_CONTROL if order.type in self.classes else Subsystem.RESOURCE_POOL
                 return Started(address(subsystem, order.name), "local", 1, [])
             case StopComponent(name=name):
-                await self.clock.sleep_s(self.stop_takes_s)
+                await self.clock.sleep_s(self.stop_takes_s.get(name, 0.0))
                 return await self._stop(name)
             case AskPlacement(name=name):
                 if name not in self.placed:

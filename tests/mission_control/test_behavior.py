@@ -502,6 +502,24 @@ def test_a_finished_child_is_retried_when_its_parent_decides_so(placer_world: Ru
     placer_world(scene)
 
 
+def test_a_child_whose_stop_takes_long_holds_up_no_other(placer_world: Run) -> None:
+    """The host of one child does not answer; the parent starts the other one again meanwhile."""
+
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.RETRY, Decision.RETRY]
+        await root(placer, node("top", "parent", 5, children=[node("a"), node("b")]))
+        await placer.wait(lambda: {"a", "b"} <= set(placer.components))
+        placer.stop_takes_s["a"] = 20.0
+        placer.components["a"].finish(BehaviorStatus.FAILURE)
+        await placer.clock.sleep_s(1.0)
+        first = placer.components["b"]
+        first.finish(BehaviorStatus.FAILURE)
+        await placer.wait(lambda: placer.components.get("b") not in (None, first), within_s=3.0)
+        await placer.wait(lambda: placer.started.count("a") == 2, within_s=30.0)
+
+    placer_world(scene)
+
+
 def test_children_in_order_run_one_after_the_other(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         Parent.decisions = [Decision.NEXT, Decision.NEXT]

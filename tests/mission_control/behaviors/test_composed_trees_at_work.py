@@ -338,7 +338,7 @@ def test_a_start_waits_for_the_stop_before_it(placer_world: Run) -> None:
         await placer.wait(lambda: "second" in placer.components)
         await placer.clock.sleep_s(1.0)
         stood_in = placer.components["second"]
-        placer.stop_takes_s = 3.0
+        placer.stop_takes_s["second"] = 3.0
         await arc.grant()
         await placer.clock.sleep_s(1.0)
         await arc.suspend()
