@@ -116,7 +116,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             changed=self.changed,
             arranged=self._children_arranged,
         )
-        self._arc_suspended_because = self._reported_because = ""
+        self._suspended_because = self._reported_because = ""
         self._is_wound_up = False
         self._parent: ParentReports | None = None
         self._keeping: asyncio.Task[None] | None = None
@@ -155,7 +155,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Why it is not at work, see ``BehaviorState``."""
         if self.status.is_final:
             return ""
-        return self._arc_suspended_because if self.arc is not None else self._children.rules.suspended_because
+        return self._suspended_because if self.arc is not None else self._children.rules.suspended_because
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
@@ -188,7 +188,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if need is not None and not self.status.is_final:
             self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self, self.not_now)
             self.arc.frames(self._saw)
-            self._arc_suspended_because = NO_GRANT_YET
+            self._suspended_because = NO_GRANT_YET
             self._keeping = self._begin(self._keep(self.arc, need), "arc")
         self._reported_because = self.suspended_because
         self._send_report()  # it takes the place of an earlier life's
@@ -250,7 +250,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     # ------------------------------------------------------------------ the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
         """Call the hooks; see ``ArcListener``."""
-        self.rcs, self._arc_suspended_because = notice.rcs, ""
+        self.rcs, self._suspended_because = notice.rcs, ""
         self.times_resumed += 1
         held = ", ".join(f"{kind} {name}" for kind, name in notice.rcs.items())
         self.story.note(self.name, f"resumed with {held}")
@@ -268,10 +268,10 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     async def arc_suspended(self, notice: Suspended) -> None:
         """Call the hooks; see ``ArcListener``."""
-        self.rcs, self._arc_suspended_because = {}, suspended_because(notice.reason, notice.by)
+        self.rcs, self._suspended_because = {}, suspended_because(notice.reason, notice.by)
         self.times_suspended += 1
-        self.story.note(self.name, f"suspended: {self._arc_suspended_because}")
-        self.report(f"suspended: {self._arc_suspended_because}")
+        self.story.note(self.name, f"suspended: {self._suspended_because}")
+        self.report(f"suspended: {self._suspended_because}")
         self._send_report_if_suspension_changed()
         await self._stop_acting()
         await self.suspended(notice.reason, notice.by)

@@ -69,7 +69,7 @@ class ChildrenLoop:
         """
         self.rules = rules
         """The state of the children."""
-        self._clock, self._hooks, self._owner = clock, hooks, owner
+        self._clock, self._hooks, self._owner, self._has_children = clock, hooks, owner, bool(nodes)
         self._begin, self._note, self._changed, self._arranged = begin, note, changed, arranged
         self._keeper = ChildKeeper(
             bus,
@@ -93,10 +93,11 @@ class ChildrenLoop:
     def begin(self) -> None:
         """Start the children that run first; end those of an earlier life that do not."""
         self._carry_out(self.rules.begin(self._now_s()))
-        self._begin(
-            self._keeper.stop_those_of_an_earlier_life(lambda name: name in self.rules.status),
-            "children of an earlier life",
-        )
+        if self._has_children:
+            self._begin(
+                self._keeper.stop_those_of_an_earlier_life(lambda name: name in self.rules.status),
+                "children of an earlier life",
+            )
 
     def reported(
         self, name: str, status: BehaviorStatus, payload: Mapping[str, object], suspended_because: str = ""
