@@ -82,7 +82,7 @@ class Children:
     """
 
     expects_failures: ClassVar[bool] = False
-    """True: a child that failed is part of the plan, and no alarm, while the parent goes on."""
+    """True: a child that failed is part of the plan, and no alarm; only a root that failed is one."""
     in_file_order: ClassVar[bool] = False
     """True: the drawing of the branch shows the children in the order of the mission file."""
 
@@ -201,7 +201,7 @@ class Children:
         """Return node → its state, for the drawing of the branch."""
         remarks = {name: self._remark(name) for name in self.status}
         for name, status in self.status.items():
-            below = {} if status.is_final else self.payload.get(name, {}).get(BRANCH)
+            below = {} if status.is_final or self.has_finished else self.payload.get(name, {}).get(BRANCH)
             remarks |= below if isinstance(below, dict) else {}
         return remarks
 
@@ -224,7 +224,8 @@ class Children:
     def _remark(self, name: str) -> str:
         if name in self.suspensions:
             return f"suspended: {self.suspensions[name].because}"
-        return str(self.status[name])
+        is_ended = self.has_finished and not self.status[name].is_final
+        return "ended" if is_ended else str(self.status[name])
 
     def _with_status(self, status: BehaviorStatus) -> list[str]:
         return [name for name in self._names if self.status.get(name) is status]

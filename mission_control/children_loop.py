@@ -138,7 +138,7 @@ class ChildrenLoop:
     async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         decision = await self._hooks.child_finished(name, status, payload)
         self._note(name, f"{decision} after {status}")
-        if decision is Decision.ABORT or (decision is Decision.NEXT and not self.rules.expects_failures):
+        if decision is not Decision.RETRY and not self.rules.expects_failures:
             self.give_up(name, payload)
         self._carry_out(self.rules.decided(name, decision, self._now_s()))
 

@@ -36,6 +36,7 @@ class WhileSuspended(StrEnum):
 class Composite(Children):
     """A parent that decides by rule alone. Without children it has finished at once."""
 
+    expects_failures = True
     in_file_order = True
 
     def begin(self, now_s: float) -> list[Instruction]:
@@ -87,8 +88,6 @@ class InFallback(Composite):
     start from their beginning when they are needed again. A child that failed is not tried again. If no other child
     is left, the parent waits for the suspended ones.
     """
-
-    expects_failures = True
 
     def __init__(
         self,
@@ -152,8 +151,6 @@ class InParallel(Composite):
         failure_count: So many failures are a failure; negative as above. It also fails as soon as too few children are
             left to succeed.
     """
-
-    expects_failures = True
 
     def __init__(self, names: Sequence[str], *, success_count: int = ENDLESS, failure_count: int = 1) -> None:
         super().__init__(names)

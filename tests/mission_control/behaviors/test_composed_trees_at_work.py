@@ -234,7 +234,8 @@ def test_the_first_of_two_to_succeed_ends_the_other(placer_world: Run) -> None:
         top = await root(placer, race)
         await placer.wait(lambda: top.status is SUCCESS, within_s=35.0)
         assert 30.0 <= placer.clock.now_s() < 31.0
-        assert is_running(placer, "race")
+        await placer.wait(lambda: is_running(placer, "race"))
+        assert [line.partition(": ")[2] for line in await tree_of(placer, "race")] == ["success", "ended", "success"]
 
     placer_world(scene)
 
@@ -258,6 +259,20 @@ def test_a_child_that_cannot_start_is_a_failure_like_others(placer_world: Run) -
         top = await root(placer, node("fallback", "day", node("leaf", "patrol", arc=ARC), node("leaf", "hide")))
         await placer.wait(lambda: is_running(placer, "day", "hide"), within_s=120.0)
         assert top.feedback == "runs hide, 2 of 2, because patrol failed: no host has tag radio"
+
+    placer_world(scene)
+
+
+def test_only_the_root_that_has_no_answer_left_is_an_alarm(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        top = await root(placer, node("sequence", "day", node("sequence", "steps", node("leaf", "a"))))
+        await placer.wait(lambda: "a" in placer.components)
+        steps = placer.components["steps"]
+        placer.components["a"].finish(FAILURE, {"code": "servo.lost", "detail": "no landmark"})
+        await placer.wait(lambda: top.status is FAILURE)
+        assert steps.absences() == []
+        assert [(absence.name, absence.cause) for absence in top.absences()] == [("day", "no landmark")]
+        assert (await tree_of(placer, "day"))[1].endswith("steps (sequence, priority 3): failed: no landmark")
 
     placer_world(scene)
 
