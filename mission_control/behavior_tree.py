@@ -77,7 +77,7 @@ def draw(
     Args:
         nodes: The roots.
         remarks: Name of a node → remark behind it.
-        in_file_order: Siblings stay in their order, whatever their priorities.
+        in_file_order: Siblings keep the order of the mission file; priorities do not matter.
 
     Example:
         >>> leaf = BehaviorNode("watch_for_motion", "watch1", 3)

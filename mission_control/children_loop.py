@@ -24,7 +24,7 @@ from mission_control.messages import BehaviorStatus
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class ChildOrder:
     """An instruction, and the orders about the same child that go before it."""
 
     instruction: Instruction
@@ -148,15 +148,15 @@ class ChildrenLoop:
         self._arm()
         self._arranged()
 
-    def _order(self, instruction: Instruction) -> Order:
+    def _order(self, instruction: Instruction) -> ChildOrder:
         if isinstance(instruction, FinishParent):
-            return Order(instruction, list(self._last_orders.values()))
+            return ChildOrder(instruction, list(self._last_orders.values()))
         before = self._last_orders.get(instruction.name)
-        order = Order(instruction, [] if before is None else [before])
+        order = ChildOrder(instruction, [] if before is None else [before])
         self._last_orders[instruction.name] = order.is_done
         return order
 
-    async def _obey_in_order(self, orders: Sequence[Order]) -> None:
+    async def _obey_in_order(self, orders: Sequence[ChildOrder]) -> None:
         for order in orders:
             for earlier in order.after:
                 await earlier.wait()

@@ -689,6 +689,7 @@ def test_parameters_that_do_not_fit_are_refused_before_anything_runs(placer_worl
 def test_a_behaviors_process_loads_neither_pydantic_nor_a_screen() -> None:
     check = (
         "import sys, mission_control.behaviors.watch_for_motion, mission_control.behaviors.surveillance;"
+        "import mission_control.behaviors.fallback, mission_control.behaviors.condition;"
         "sys.exit(', '.join({'pydantic', 'typer', 'textual', 'rich', 'mujoco', 'lxml'} & set(sys.modules)) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", check], check=False, capture_output=True, text=True)
