@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Coroutine, Mapping, Sequence
-from typing import Any, ClassVar, Generic, TypeVar, assert_never
+from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -22,25 +22,17 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
-from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_hooks import BehaviorHooks
-from mission_control.behavior_tree import (
-    ArcNeed,
-    BehaviorNode,
-    Children,
-    Decision,
-    FinishParent,
-    Instruction,
-    StartChild,
-    StopChild,
-    draw,
-)
-from mission_control.child_keeper import AGAIN_AFTER_S, REPLY_TIME_S, START_PATIENCE_S, ChildKeeper, end_task, why
+from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw
+from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_task, why
+from mission_control.children import Children, Decision
+from mission_control.children_loop import ChildrenLoop
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
+from mission_control.parent_reports import ParentReports
 from resource_pool.arc_client import (
     ArcClient,
     ArcNotice,
@@ -60,6 +52,7 @@ from resource_pool.arc_client import (
 log = logging.getLogger(__name__)
 
 DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before SIGTERM
+NO_GRANT_YET = "no grant yet"
 
 
 class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -89,14 +82,16 @@ B = TypeVar("B", bound=BehaviorParameters)
 class Behavior(Component[B], BehaviorHooks, Generic[B]):
     """A running node of the behavior tree.
 
-    Derive and override the hooks of ``BehaviorHooks`` that you need. Class variables to set: ``parameters_type``, and
-    ``children_together`` (False: one after the other).
+    Derive and override the hooks of ``BehaviorHooks`` that you need. Class variables to set: ``parameters_type``,
+    ``children_together`` (False: one after the other), ``children_allowed`` (fewest, most), ``may_claim`` (an ARC).
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
     accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior
     children_together: ClassVar[bool] = True
+    children_allowed: ClassVar[tuple[int, int] | None] = None
+    may_claim: ClassVar[bool] = True
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -109,22 +104,23 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """The client of its ARC; None without an ARC."""
         self.times_resumed = self.times_suspended = self.frames_seen = 0
         self._nodes = {node.name: node for node in self.parameters.children}
-        self._children = Children(list(self._nodes), together=self.children_together)
-        self._keeper = ChildKeeper(
+        self._children = ChildrenLoop(
             bus,
             clock,
             self._nodes,
             lambda: self.path,
-            reported=self._child_reported,
-            left=self._child_left,
+            self.rules(list(self._nodes)),
+            self,
+            owner=self.name,
             begin=self._begin,
             note=self.story.note,
             publish_event=self.publish_event,
             changed=self.changed,
+            arranged=self._children_arranged,
         )
-        self._abandoned: dict[str, Absence] = {}
-        self._suspended_because = ""
-        self._parent: PeerMonitor | None = None
+        self._suspended_because = self._reported_because = ""
+        self._is_wound_up = False
+        self._parent: ParentReports | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._acting: asyncio.Task[None] | None = None
 
@@ -132,6 +128,14 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     def need(self) -> ArcNeed | None:
         """Return the ARC of the tree; see ``BehaviorHooks``."""
         return self.parameters.arc
+
+    def rules(self, children: Sequence[str]) -> Children:
+        """Return the rules by which children are started and judged; see ``BehaviorHooks``."""
+        return Children(children, together=self.children_together)
+
+    async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:  # noqa: ARG002
+        """Decide as the rules do; see ``BehaviorHooks``."""
+        return self._children.rules.decision(child)
 
     async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         """Finish with the same status; see ``BehaviorHooks``."""
@@ -146,31 +150,38 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     @property
     def children(self) -> Mapping[str, BehaviorStatus]:
         """Status of each child that was started."""
-        return self._children.status
+        return self._children.rules.status
+
+    @property
+    def suspended_because(self) -> str:
+        """Why it is not at work, see ``BehaviorState``."""
+        if self.status.is_final:
+            return ""
+        return self._suspended_because if self.arc is not None else self._children.rules.suspended_because
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
         if self.status.is_final or not status.is_final:
             return
         self.status, self.payload = status, dict(payload or {})
-        if status is BehaviorStatus.FAILURE and self._parent is None and not self._abandoned:
-            self._abandon(self.name, self.payload)
+        if status is BehaviorStatus.FAILURE and self._parent is None and not self._children.absences(has_finished=True):
+            self._children.give_up(self.name, self.payload)
         failed = status is BehaviorStatus.FAILURE
         self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self._begin(self._wind_up(), "wind-up")
 
     def tell_parent(self, payload: Mapping[str, object]) -> None:
-        """Send a report of progress to the parent; it is lost if the parent cannot be reached."""
-        self.payload = dict(payload)
-        if self._parent is not None and not self.status.is_final:
-            self._begin(self._report_once(self._parent.address, self._report()), "report")
+        """Send a report of progress to the parent; while the parent cannot be reached, only the newest is kept."""
+        if not self.status.is_final:
+            self.payload = dict(payload)
+            self._send_report()
 
     # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
         """Watch the parent, if it is a behavior; the first step of a path is the mission."""
         if len(self.path) > 2:
             parent = address(Subsystem.MISSION_CONTROL, self.path[-2][0])
-            self._parent = PeerMonitor(self.bus, parent)
+            self._parent = ParentReports(self.bus, self.clock, parent, self._report, self._begin)
 
     async def serve(self) -> None:
         """Start, claim the ARC, start the children; then react to events."""
@@ -179,21 +190,19 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if need is not None and not self.status.is_final:
             self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self, self.not_now)
             self.arc.frames(self._saw)
+            self._suspended_because = NO_GRANT_YET
             self._keeping = self._begin(self._keep(self.arc, need), "arc")
-        self._carry_out(self._children.begin())
-        if self._nodes:
-            self._begin(
-                self._keeper.stop_those_of_an_earlier_life(lambda name: name in self._children.status),
-                "children of an earlier life",
-            )
+        self._reported_because = self.suspended_because
+        self._send_report()  # it takes the place of an earlier life's
+        self._children.begin()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC, the children, and ``AskBehavior``."""
         match asked.body:
-            case ChildReport(child=child, status=status, payload=payload):
+            case ChildReport(child=child) as report:
                 if child not in self._nodes or child != component_of(asked.source):
                     raise NotAChild(f"{asked.source} is no child of {self.name}", child=child)
-                self._child_reported(child, status, payload)
+                self._children.reported(child, report.status, report.payload, report.suspended_because)
                 return ReportNoted()
             case AskBehavior():
                 return self.behavior_state()
@@ -218,10 +227,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     def absences(self) -> list[Absence]:
         """Return the missing children and ARC, and the children that it has given up."""
-        if self.status.is_final:
-            return list(self._abandoned.values())
+        of_children = self._children.absences(has_finished=self.status.is_final)
         arc = self.arc.wish.absence() if self.arc is not None and self._keeping is not None else None
-        return [*self._keeper.absences(), *([arc] if arc is not None else []), *self._abandoned.values()]
+        return of_children if arc is None or self.status.is_final else [arc, *of_children]
 
     def statistics(self) -> dict[str, float]:
         """Return counts of grants and pictures."""
@@ -236,9 +244,10 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         node = BehaviorNode(
             self.launch.type, self.name, self.path[-1][1], arc=self.parameters.arc, children=self.parameters.children
         )
-        remarks = {name: str(status) for name, status in self.children.items()} | {self.name: str(self.status)}
-        tree = draw([node], remarks)
-        return BehaviorState(self.name, self.status, self.payload, dict(self.rcs), self._suspended_because, tree)
+        rules = self._children.rules
+        about_it = f"{self.status}; {rules.sentence}" if rules.sentence else str(self.status)
+        tree = draw([node], rules.remarks() | {self.name: about_it}, in_file_order=rules.in_file_order)
+        return BehaviorState(self.name, self.status, self.payload, dict(self.rcs), self.suspended_because, tree)
 
     # ------------------------------------------------------------------ the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
@@ -248,6 +257,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         held = ", ".join(f"{kind} {name}" for kind, name in notice.rcs.items())
         self.story.note(self.name, f"resumed with {held}")
         self.report(f"holds {held}")
+        self._send_report_if_suspension_changed()
         await self.resumed(notice.rcs)
         if self.rcs and not self.status.is_final:
             await self._stop_acting()
@@ -265,6 +275,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.times_suspended += 1
         self.story.note(self.name, f"suspended: {self._suspended_because}")
         self.report(f"suspended: {self._suspended_because}")
+        self._send_report_if_suspension_changed()
         await self._stop_acting()
         await self.suspended(notice.reason, notice.by)
 
@@ -343,76 +354,32 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 return None
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
 
-    # ------------------------------------------------------------------ the children
-    def _carry_out(self, instructions: Sequence[Instruction]) -> None:
-        if instructions:
-            self._begin(self._carry_out_in_order(instructions), "children")
+    # ------------------------------------------------------------------ the children and the parent
+    def _children_arranged(self) -> None:
+        self.children_arranged()
+        self._send_report_if_suspension_changed()
 
-    async def _carry_out_in_order(self, instructions: Sequence[Instruction]) -> None:
-        starting: list[Coroutine[object, None, None]] = []
-        for instruction in instructions:
-            match instruction:
-                case StartChild(name):
-                    self._abandoned.pop(name, None)
-                    starting.append(self._keeper.start(name))
-                case StopChild(name):
-                    await self._keeper.stop(name)
-                case FinishParent(status, payload):
-                    await self.children_finished(status, payload)
-                case _:
-                    assert_never(instruction)
-        await asyncio.gather(*starting)
-
-    def _abandon(self, name: str, payload: Mapping[str, object]) -> None:
-        """Report a child that could not work as a lasting absence; a finished child that failed is no absence."""
-        if "code" in payload:
-            remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"
-            cause = str(payload.get("detail", "it failed"))
-            self._abandoned[name] = Absence(name, self.clock.now_s(), cause, remedy=remedy)
-            self.changed()
-
-    def _child_left(self, name: str) -> None:
-        self._carry_out(self._children.left(name))
-
-    def _child_reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
-        if self._children.reported(name, status, payload):
-            self.story.note(name, f"finished: {status}")
-            self._begin(self._decide(name, status, payload), f"decide on {name}")
-
-    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
-        decision = await self.child_finished(name, status, payload)
-        self.story.note(name, f"{decision} after {status}")
-        if decision is not Decision.RETRY:
-            self._abandon(name, payload)
-        self._carry_out(self._children.decided(name, decision))
-
-    # ------------------------------------------------------------------ the parent
     async def _wind_up(self) -> None:
         """Give the ARC back, end the children, and repeat the report until the parent notes it."""
         await self._stop_acting()
-        stops = [i.name for i in self._children.end() if isinstance(i, StopChild)]
-        await asyncio.gather(self._release(), *(self._keeper.stop(name) for name in stops))
-        if self._parent is None:
-            return
-        while True:
-            await self._parent.wait_there()
-            if await self._report_once(self._parent.address, self._report()):
-                return
-            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
+        await asyncio.gather(self._release(), self._children.end())
+        if self._parent is not None:
+            self._is_wound_up = True
+            await self._parent.conclude()
 
-    async def _report_once(self, parent: str, report: ChildReport) -> bool:
-        """Send the report once; return True if the parent noted or refused it."""
-        try:
-            await self.bus.ask(parent, report, ReportNoted, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            log.info("%s did not get the report: %s", parent, error)
-            return False
-        except Refusal as refusal:
-            log.warning("%s refused the report: %s", parent, refusal)
-        return True
+    def _send_report_if_suspension_changed(self) -> None:
+        if self.suspended_because != self._reported_because:
+            self._reported_because = self.suspended_because
+            self._send_report()
+
+    def _send_report(self) -> None:
+        if self._parent is not None and not self.status.is_final:
+            self._parent.send()
 
     def _report(self) -> ChildReport:
-        return ChildReport(self.name, self.status, self.payload)
+        """Return the newest report; it has the final status only after the ARC and the children are given back."""
+        status = self.status if self._is_wound_up else BehaviorStatus.RUNNING
+        return ChildReport(self.name, status, self.payload, self.suspended_because)
 
     def _begin(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:
         """Run the coroutine as a task, unless the component is ending."""

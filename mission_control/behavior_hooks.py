@@ -5,9 +5,10 @@ Each hook documents when it is called, its purpose, and what it must not do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from mission_control.behavior_tree import ArcNeed, Decision
+from mission_control.behavior_tree import ArcNeed
+from mission_control.children import Children, Decision
 from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import Frame
 
@@ -92,18 +93,31 @@ class BehaviorHooks:
         What: detect, publish, ``report``. Not: take longer than a picture's period, because it blocks the event loop.
         """
 
-    async def child_finished(
-        self,
-        child: str,  # noqa: ARG002  for those who override
-        status: BehaviorStatus,
-        payload: Mapping[str, object],  # noqa: ARG002
-    ) -> Decision:
+    def rules(self, children: Sequence[str]) -> Children:
+        """Return the rules by which children are started and judged.
+
+        When: once, before ``start``; the parameters are known. What: by default, all run together or, with
+        ``children_together`` False, one after the other; see ``composites`` for others. Not: begin anything.
+
+        Args:
+            children: Their names, in the order of the mission file.
+        """
+        raise NotImplementedError
+
+    async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:
         """Decide what follows the end of a child.
 
         When: a child reported success or failure, was refused at its start, or fell too often.
-        What: return the decision; by default a failure aborts, a success continues. Not: start or stop children here.
+        What: return the decision; by default that of ``rules``: a failure aborts, a success continues. Not: start or
+        stop children here.
         """
-        return Decision.NEXT if status is BehaviorStatus.SUCCESS else Decision.ABORT
+        raise NotImplementedError
+
+    def children_arranged(self) -> None:
+        """Report which children run.
+
+        When: after each event of the children and each start and stop. What: by default, nothing.
+        """
 
     async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         """Conclude after the end of all children.

@@ -40,7 +40,7 @@ class ChildKeeper:
         nodes: Mapping[str, BehaviorNode],
         path: Callable[[], Sequence[PathStep]],
         *,
-        reported: Callable[[str, BehaviorStatus, Mapping[str, object]], None],
+        reported: Callable[[str, BehaviorStatus, Mapping[str, object], str], None],
         left: Callable[[str], None],
         begin: Callable[[Coroutine[object, None, None], str], asyncio.Task[None] | None],
         note: Callable[[str, str], object],
@@ -54,7 +54,7 @@ class ChildKeeper:
             clock: The mission's clock.
             nodes: Name of a child → its node.
             path: Names and priorities from the mission's root to the behavior, as they are now.
-            reported: A child finished, or cannot run.
+            reported: A child's status, payload, and why it is suspended: it finished, cannot run, or is adopted.
             left: An order stopped a child.
             begin: Runs work as a task, unless the behavior is ending.
             note: Subject, event → the story.
@@ -95,7 +95,7 @@ class ChildKeeper:
             )
         except Refusal as refusal:
             self._publish_event(name, f"could not be started: {refusal}", LogLevel.WARNING)
-            self._reported(name, BehaviorStatus.FAILURE, why(refusal))
+            self._reported(name, BehaviorStatus.FAILURE, why(refusal), "")
             return
         self._publish_event(name, f"is not wanted any more: {stopped}")
         del self._kept[name], self._wishes[name]
@@ -123,7 +123,7 @@ class ChildKeeper:
         except (LinkError, Refusal) as error:  # it is restarting and then runs from its beginning
             log.info("child %s does not report its progress: %s", name, error)
             return
-        self._reported(name, state.status, state.payload)
+        self._reported(name, state.status, state.payload, state.suspended_because)
 
     async def stop_those_of_an_earlier_life(self, started: Callable[[str], bool]) -> None:
         """Stop running children of an earlier life of the owner that this life does not start.
@@ -176,7 +176,7 @@ class ChildKeeper:
         fell = envelope.body
         if fell.name in self._nodes and fell.failing:
             fell_too_often = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
-            self._reported(fell.name, BehaviorStatus.FAILURE, fell_too_often)
+            self._reported(fell.name, BehaviorStatus.FAILURE, fell_too_often, "")
 
 
 async def end_task(task: asyncio.Task[None] | None) -> None:

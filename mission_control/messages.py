@@ -22,17 +22,19 @@ class BehaviorStatus(StrEnum):
         return self is not BehaviorStatus.RUNNING
 
 
-class ChildReport(Message, frozen=True):
-    """Progress of a child, sent to its parent.
+class ChildReport(Message, frozen=True, tag="ChildReport/2"):
+    """Progress of a child, sent to its parent on each change, and again until the parent notes it.
 
     Attributes:
         status: Its status; a final one is sent once and never changes.
         payload: Data for the parent's decision: plain values only.
+        suspended_because: As in ``BehaviorState``.
     """
 
     child: Mention
     status: BehaviorStatus
     payload: Values = {}
+    suspended_because: Text = ""
 
 
 class ReportNoted(Message, frozen=True):
@@ -49,7 +51,8 @@ class BehaviorState(Message, frozen=True):
     Attributes:
         payload: Payload of its last report to its parent.
         holds: Role → name of its granted RCs; empty while suspended or without an ARC.
-        suspended_because: Reason and cause of the suspension; empty unless suspended.
+        suspended_because: Why it is not at work: reason and cause of the suspension of its ARC or, without an ARC, of
+            all its running children; also before its first grant. Empty: it is at work, or has finished.
         tree: Its branch of the behavior tree as text, one line a node.
     """
 

@@ -63,7 +63,8 @@ class FakeArc:
         self.released = ""
         self.is_idle = self.stays = False  # stays: holds on to its RCs although it is told to rest
         self.wishes: list[Message] = []
-        self.rcs = {"scout": parameters["wish"].get(ROBOT, "scout3"), "framegrabber": "grabber1"}
+        wish = parameters["wish"]
+        self.rcs = {"scout": wish.get(ROBOT) or wish.get("scout", "scout3"), "framegrabber": "grabber1"}
         bus.serve(self.address, ArcQuestion | Drive | Halt | Jump | Stop, self._answer)
         bus.declare_alive(self.address)
 
@@ -148,6 +149,7 @@ class FakePlacer:
         self.placed: dict[str, Start] = {}
         self.requesters: dict[str, str] = {}
         self.stopped: set[str] = set()
+        self.stop_takes_s: dict[str, float] = {}
         self.on_arc: Callable[[FakeArc], None] = lambda arc: None
         self._lives: dict[str, asyncio.Task[None]] = {}
         self.bus = network.join(PLACER, clock)
@@ -256,6 +258,7 @@ class FakePlacer:
                 subsystem = Subsystem.MISSION_CONTROL if order.type in self.classes else Subsystem.RESOURCE_POOL
                 return Started(address(subsystem, order.name), "local", 1, [])
             case StopComponent(name=name):
+                await self.clock.sleep_s(self.stop_takes_s.get(name, 0.0))
                 return await self._stop(name)
             case AskPlacement(name=name):
                 if name not in self.placed:

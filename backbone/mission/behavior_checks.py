@@ -9,6 +9,7 @@ from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.report import Report, listed
 from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
+from backbone.spoken import counted
 
 TRIES_AT_MOST = 100_000  # chosen: a third of a second; a set that fits is found in the first few tries
 
@@ -35,6 +36,7 @@ def check_behaviors(tables: Tables, report: Report) -> None:
             )
         check_parameters(behavior, TREE_PARAMETERS, report)
         check_class_parameters(behavior, TREE_PARAMETERS, tables, report)
+        _check_inside(behavior, tables, report)
     sets = _Sets(tables)
     arc_kinds = [name for name in tables.types if tables.needs(name)]
     for behavior, arc in tables.claims():
@@ -59,6 +61,26 @@ def _check_multiplicity(
             f"a second {kind}, of which only one may run; the first is in line {before.place.line}",
             'Remove one, or write multiplicity="many" at the type',
         )
+
+
+def _check_inside(behavior: Element, tables: Tables, report: Report) -> None:
+    """Report children and an ARC that the behavior's class does not allow."""
+    facts = tables.facts_of(behavior.text("type"))
+    if facts is None:
+        return
+    if not facts.may_claim and (arc := behavior.first("arc")) is not None:
+        report.fault(arc.place, f"{behavior.text('type')} {behavior.text('name')} needs no ARC", "Remove it")
+    if facts.children is None:
+        return
+    (fewest, most), given = facts.children, behavior.all("behavior")
+    if fewest <= len(given) <= most:
+        return
+    wanted = "none" if most == 0 else "exactly one" if fewest == most == 1 else f"at least {fewest}"
+    report.fault(
+        given[most].place if len(given) > most else behavior.place,
+        f"{behavior.text('type')} {behavior.text('name')} has {counted(len(given), 'behavior')} inside",
+        f"Give it {wanted}",
+    )
 
 
 def _check_runtime(behavior: Element, arc: Element, report: Report) -> None:

@@ -94,6 +94,8 @@ class ClassFacts(msgspec.Struct, frozen=True):
         parameters: What it can be given in a mission file.
         options: Driver → what can be given besides, while this driver is used; None: the class uses no driver.
         has_rules: Whether it has rules for its parameters besides their types; only the class itself can judge by them.
+        children: Fewest and most children of a behavior; None: as many as one likes.
+        may_claim: False: a behavior that has no ARC.
         failure: Why the facts are unknown; empty: they are known.
         abilities: What its components can be commanded to do, and what they report.
     """
@@ -102,6 +104,8 @@ class ClassFacts(msgspec.Struct, frozen=True):
     parameters: tuple[ParameterFacts, ...] = ()
     options: dict[str, tuple[ParameterFacts, ...]] | None = None
     has_rules: bool = False
+    children: tuple[int, int] | None = None
+    may_claim: bool = True
     failure: str = ""
     abilities: Abilities = NO_ABILITIES
 

@@ -31,6 +31,8 @@ def facts_of(class_path: str) -> ClassFacts:
         own,
         None if options is None else {driver: _documented(struct) for driver, struct in options.items()},
         hasattr(found.parameters_type, "__post_init__"),
+        children=getattr(found, "children_allowed", None),
+        may_claim=getattr(found, "may_claim", True),
         abilities=found.abilities(),
     )
 

@@ -15,7 +15,8 @@ from backbone.keys import Conversation
 from backbone.spoken import counted
 from backbone.wire import Envelope
 from mission_control.behavior import Behavior, BehaviorParameters
-from mission_control.behavior_tree import Decision, walk
+from mission_control.behavior_tree import walk
+from mission_control.children import Decision
 from mission_control.messages import BehaviorStatus, MotionSeen
 
 

@@ -18,7 +18,7 @@ from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_order
 from backbone.placer.messages import Ended, NoHost, StopComponent
 from mission_control.behavior import Behavior, NotAChild
-from mission_control.behavior_tree import Decision
+from mission_control.children import Decision
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
 from resource_pool.arc_client import EmergencyStopped, Frame, Noted, NotMyArc, Resumed, StopState
 from resource_pool.stop_latch import StopLatch
@@ -502,6 +502,24 @@ def test_a_finished_child_is_retried_when_its_parent_decides_so(placer_world: Ru
     placer_world(scene)
 
 
+def test_a_child_whose_stop_takes_long_holds_up_no_other(placer_world: Run) -> None:
+    """The host of one child does not answer; the parent starts the other one again meanwhile."""
+
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.RETRY, Decision.RETRY]
+        await root(placer, node("top", "parent", 5, children=[node("a"), node("b")]))
+        await placer.wait(lambda: {"a", "b"} <= set(placer.components))
+        placer.stop_takes_s["a"] = 20.0
+        placer.components["a"].finish(BehaviorStatus.FAILURE)
+        await placer.clock.sleep_s(1.0)
+        first = placer.components["b"]
+        first.finish(BehaviorStatus.FAILURE)
+        await placer.wait(lambda: placer.components.get("b") not in (None, first), within_s=3.0)
+        await placer.wait(lambda: placer.started.count("a") == 2, within_s=30.0)
+
+    placer_world(scene)
+
+
 def test_children_in_order_run_one_after_the_other(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         Parent.decisions = [Decision.NEXT, Decision.NEXT]
@@ -671,6 +689,7 @@ def test_parameters_that_do_not_fit_are_refused_before_anything_runs(placer_worl
 def test_a_behaviors_process_loads_neither_pydantic_nor_a_screen() -> None:
     check = (
         "import sys, mission_control.behaviors.watch_for_motion, mission_control.behaviors.surveillance;"
+        "import mission_control.behaviors.fallback, mission_control.behaviors.condition;"
         "sys.exit(', '.join({'pydantic', 'typer', 'textual', 'rich', 'mujoco', 'lxml'} & set(sys.modules)) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", check], check=False, capture_output=True, text=True)

@@ -1,0 +1,200 @@
+"""Condition: whether an event or a report is as the mission file says, as a leaf of the tree.
+
+An *event* is a message that a component publishes when something happens: one of ``EVENTS``, or one of your own. A
+*report* is a behavior's progress; the condition asks for it.
+
+Source: BehaviorTree.CPP 4, "ScriptCondition"; ``wait`` is ours, because here nothing ticks a condition again and again.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import logging
+import operator
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from backbone.creator.messages import ProcessFell
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.nameserver.messages import Appeared, Disappeared
+from backbone.naming import Subsystem, address, is_component, is_legal
+from backbone.rc_manager.messages import TraceLine
+from backbone.spoken import value_text
+from backbone.wire import Envelope, Message, plain
+from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.child_keeper import why
+from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, MotionSeen, WaypointReached
+from resource_pool.arc_client import StopState
+
+log = logging.getLogger(__name__)
+
+EVENTS = (MotionSeen, WaypointReached, StopState, Appeared, Disappeared, ProcessFell, TraceLine)
+"""Every event that the project's own components publish."""
+NAMED: Mapping[str, type[Message]] = {kind.__name__: kind for kind in (*EVENTS, BehaviorState)}
+ANY = "*"
+ASK_AGAIN_S = 1.0  # chosen: mission time; a report changes with a way point or a turn, not faster
+REPLY_TIME_S = 1.0  # chosen: behaviors answer in milliseconds
+_ABSENT = object()
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What a message must be like. Pure.
+
+    Attributes:
+        field: Path to a field, names separated by dots; empty: every message will do.
+        above: Lower limit of a number, excluded.
+        below: Upper limit of a number, excluded.
+        equals: The value itself.
+    """
+
+    field: str = ""
+    above: float | None = None
+    below: float | None = None
+    equals: str | float | bool | None = None
+
+    def holds_for(self, message: Message) -> bool:
+        """Return whether the message is like that; a message without the field is not.
+
+        Example:
+            >>> seen = WaypointReached(12.0, "scout1", 3, 0)
+            >>> Comparison("number", above=2).holds_for(seen), Comparison("robot", equals="scout2").holds_for(seen)
+            (True, False)
+        """
+        value = self._value(message)
+        if value is _ABSENT:
+            return False
+        if self.equals is not None and not (
+            isinstance(value, bool) is isinstance(self.equals, bool) and value == self.equals
+        ):
+            return False
+        if self.above is None and self.below is None:
+            return True
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        return is_number and (self.above is None or value > self.above) and (self.below is None or value < self.below)
+
+    def finding(self, message: Message) -> str:
+        """Return the value that was judged, for people."""
+        value = self._value(message)
+        if not self.field:
+            return "it came"
+        return f"{self.field} is missing" if value is _ABSENT else f"{self.field} is {value_text(value)}"
+
+    def __str__(self) -> str:
+        limits = [f"above {self.above:g}"] if self.above is not None else []
+        limits += [f"below {self.below:g}"] if self.below is not None else []
+        limits += [value_text(self.equals)] if self.equals is not None else []
+        return f"{self.field} {' and '.join(limits) or 'present'}" if self.field else "any"
+
+    def _value(self, message: Message) -> Any:
+        value = plain(message)
+        for name in self.field.split(".") if self.field else ():
+            if not isinstance(value, dict) or name not in value:
+                return _ABSENT
+            value = value[name]
+        return value
+
+
+class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``MessageCondition``.
+
+    Attributes:
+        source: The component: its name, or its address; '*' for any.
+        message: The event, such as MotionSeen; BehaviorState for a behavior's report; or the class of an event of your
+            own, as package.module:Class.
+        field: Field of the message, such as region.width_px or payload.waypoints_reached; empty: every message will do.
+        above: The field must be a number above this.
+        below: The field must be a number below this.
+        equals: The field must be this.
+        mode: wait: success at the first message that is like that. check: the first message decides between success
+            and failure.
+    """
+
+    source: str = ANY
+    message: str
+    field: str = ""
+    above: float | None = None
+    below: float | None = None
+    equals: str | float | bool | None = None
+    mode: Literal["check", "wait"] = "wait"
+
+    def __post_init__(self) -> None:
+        if not (self.source == ANY or is_legal(self.source) or is_component(self.source)):
+            raise ValueError(f"source is {self.source!r}: write a component's name or address, or {ANY} for any")
+        message_class(self.message)
+        if not self.field and (self.above, self.below, self.equals) != (None, None, None):
+            raise ValueError("field is empty: name the field that is compared")
+        if self.message == BehaviorState.__name__ and self.source == ANY:
+            raise ValueError(f"source is {ANY}: name the behavior whose report is asked for")
+
+
+class MessageCondition(Behavior[MessageConditionParameters]):
+    """Succeeds if an event or a report is as stated; ``check`` fails if it is not, ``wait`` goes on waiting."""
+
+    parameters_type = MessageConditionParameters
+    children_allowed = (0, 0)
+    may_claim = False
+
+    async def start(self) -> None:
+        """Subscribe, or begin to ask."""
+        given = self.parameters
+        self._comparison = Comparison(given.field, given.above, given.below, given.equals)
+        self._kind = message_class(given.message)
+        self.report(f"waits for {given.message} of {given.source}: {self._comparison}")
+        if self._kind is BehaviorState:
+            self.start_task(self._ask(), "ask")
+            return
+        source = given.source if "/" in given.source else f"*/{given.source}"
+        known: Any = functools.reduce(operator.or_, dict.fromkeys((*EVENTS, self._kind)))
+        self.bus.subscribe(source, Conversation.EVENTS, known, self._heard)
+
+    def parameters_changed(self) -> None:
+        """Judge by the new comparison from now on; another source or message needs a new start."""
+        given = self.parameters
+        self._comparison = Comparison(given.field, given.above, given.below, given.equals)
+
+    async def _ask(self) -> None:
+        source = self.parameters.source
+        behavior = source if "/" in source else address(Subsystem.MISSION_CONTROL, source)
+        while not self.status.is_final:
+            try:
+                self._judge(await self.bus.ask(behavior, AskBehavior(), BehaviorState, within_s=REPLY_TIME_S))
+            except LinkError as error:
+                log.info("%s does not report: %s", behavior, error)
+            except Refusal as refusal:
+                self.finish(BehaviorStatus.FAILURE, why(refusal))
+            await self.clock.sleep_s(ASK_AGAIN_S)
+
+    def _heard(self, envelope: Envelope[Message]) -> None:
+        if isinstance(envelope.body, self._kind):
+            self._judge(envelope.body)
+
+    def _judge(self, message: Message) -> None:
+        finding = self._comparison.finding(message)
+        if self._comparison.holds_for(message):
+            self.finish(BehaviorStatus.SUCCESS, {"detail": finding})
+        elif self.parameters.mode == "check":
+            self.finish(BehaviorStatus.FAILURE, {"detail": f"{finding}, wanted: {self._comparison}"})
+
+
+def message_class(name: str) -> type[Message]:
+    """Return the message of this name, or of this class path.
+
+    Raises:
+        ValueError: There is none.
+    """
+    if name in NAMED:
+        return NAMED[name]
+    module, _, class_name = name.partition(":")
+    if not class_name:
+        raise ValueError(f"message is {name!r}: write one of {', '.join(sorted(NAMED))}, or package.module:Class")
+    try:
+        found = getattr(importlib.import_module(module), class_name)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"message is {name!r}: {error}") from error
+    if not (isinstance(found, type) and issubclass(found, Message)):
+        raise ValueError(f"message is {name!r}, which is no message")
+    return found

@@ -1,0 +1,48 @@
+"""Parallel: all children at the same time, until enough have succeeded or failed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mission_control.behavior import BehaviorParameters
+from mission_control.behaviors.composed import Composed, Threshold
+from mission_control.composites import ENDLESS, InParallel
+
+
+class ParallelParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``Parallel``.
+
+    Attributes:
+        success_count: Number of children that must succeed, 1 for any; -1: all, -2: all but one, and so on.
+        failure_count: Number of children that must fail for a failure; negative as above.
+    """
+
+    success_count: Threshold = ENDLESS
+    failure_count: Threshold = 1
+
+    def __post_init__(self) -> None:
+        if self.success_count == 0:
+            raise ValueError("success_count is 0: write how many must succeed, or -1 for all")
+        if self.failure_count == 0:
+            raise ValueError("failure_count is 0: write how many must fail, or -1 for all")
+
+
+class Parallel(Composed[ParallelParameters]):
+    """Runs its children at the same time; succeeds or fails as soon as enough of them have, and ends the others."""
+
+    parameters_type = ParallelParameters
+
+    def rules(self, children: Sequence[str]) -> InParallel:
+        """Return the rules of a parallel."""
+        self._rules = InParallel(children)
+        self._set_rules()
+        return self._rules
+
+    def parameters_changed(self) -> None:
+        """Apply them from now on."""
+        self._set_rules()
+        self._children.look_again()
+
+    def _set_rules(self) -> None:
+        self._rules.success_count = self.parameters.success_count
+        self._rules.failure_count = self.parameters.failure_count

@@ -1,0 +1,252 @@
+"""Children: the rules by which a parent starts, stops and judges its children. Pure.
+
+Events of children and the passing of time go in, instructions come out; the caller owns bus and clock.
+
+Rules of this file:
+
+* A child is *open* until it has finished and the parent has decided to leave it, or until another component ended it.
+* After each event the rules compare the children that shall run now (``wanted``) with those that run.
+* A child is stopped before it is started again; none is started after the parent has finished; the parent finishes at
+  most once, and by then everything that was started is stopped.
+
+Source: SMC 2000, "Mission Control": behaviors spawn children; a finished child returns its status
+to its parent, which decides what comes next.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import ClassVar
+
+from backbone.spoken import value_text
+from mission_control.messages import BehaviorStatus
+
+
+class Decision(StrEnum):
+    """A parent's decision about a finished child."""
+
+    RETRY = "retry"  # start the same child again, from its beginning
+    NEXT = "next"  # leave it; continue with the other children
+    ABORT = "abort"  # stop all children; the parent has failed
+
+
+@dataclass(frozen=True, slots=True)
+class StartChild:
+    """Start this child."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class StopChild:
+    """End this child. Idempotent."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class FinishParent:
+    """The children have finished: the parent has this final status."""
+
+    status: BehaviorStatus
+    payload: Mapping[str, object] = field(default_factory=dict)
+
+
+Instruction = StartChild | StopChild | FinishParent
+BRANCH = "branch"
+"""Key in the payload of a report: node → its state, for the nodes below the child."""
+
+
+@dataclass(frozen=True, slots=True)
+class Suspension:
+    """A started child that has no grant.
+
+    Attributes:
+        because: Reason and cause, for people.
+        since_s: Mission time of its first report.
+    """
+
+    because: str
+    since_s: float
+
+
+class Children:
+    """The rules of a parent that lets its behavior decide on each finished child.
+
+    Args:
+        names: Names of the children, in the order of the mission file.
+        together: True: all run at the same time; False: one after the other.
+    """
+
+    expects_failures: ClassVar[bool] = False
+    """True: a child that failed is part of the plan, and no alarm; only a root that failed is one."""
+    in_file_order: ClassVar[bool] = False
+    """True: the drawing of the branch shows the children in the order of the mission file."""
+
+    def __init__(self, names: Sequence[str], *, together: bool = True) -> None:
+        self._names, self._together = tuple(names), together
+        self._open, self._running = list(names), list[str]()
+        self.has_finished = False
+        """True once the parent has finished; from then on no instruction follows."""
+        self.status: dict[str, BehaviorStatus] = {}
+        self.payload: dict[str, Mapping[str, object]] = {}
+        self.suspensions: dict[str, Suspension] = {}
+
+    # ------------------------------------------------------------------ the rules, for derived classes
+    def decision(self, name: str) -> Decision:
+        """Return the decision on a finished child: by default a failure aborts, a success continues."""
+        return Decision.NEXT if self.status[name] is BehaviorStatus.SUCCESS else Decision.ABORT
+
+    def wanted(self, now_s: float) -> list[str]:  # noqa: ARG002  for derived classes
+        """Return the open children that shall run now, in order."""
+        return self._open if self._together else self._open[:1]
+
+    def verdict(self, now_s: float) -> FinishParent | None:  # noqa: ARG002  for derived classes
+        """Return how the parent finishes now; None: it goes on."""
+        if self._open:
+            return None
+        failed = self._with_status(BehaviorStatus.FAILURE)
+        if not failed:
+            return FinishParent(BehaviorStatus.SUCCESS)
+        return FinishParent(BehaviorStatus.FAILURE, {"failed": failed})
+
+    @property
+    def wakes_at_s(self) -> float:
+        """Mission time at which ``time_passed`` shall be called; infinite: never."""
+        return math.inf
+
+    # ------------------------------------------------------------------ events
+    def begin(self, now_s: float) -> list[Instruction]:
+        """Return the orders for the children that run first; none for a behavior without children."""
+        return self._arrange(now_s) if self._names else []
+
+    def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
+        """Record a report; return True if the child has newly finished and the parent must decide."""
+        if name not in self._running or self.has_finished or self.status[name].is_final:
+            return False
+        self.status[name], self.payload[name] = status, payload
+        if status.is_final:
+            self.suspensions.pop(name, None)
+        return status.is_final
+
+    def decided(self, name: str, decision: Decision, now_s: float) -> list[Instruction]:
+        """Return the instructions after the parent's decision about a finished child."""
+        if self.has_finished or name not in self._running or not self.status[name].is_final:
+            return []
+        match decision:
+            case Decision.RETRY:
+                self._running.remove(name)
+                del self.status[name]
+                return [StopChild(name), *self._arrange(now_s)]
+            case Decision.ABORT:
+                return self._finish(FinishParent(BehaviorStatus.FAILURE, {"child": name, **self.payload[name]}))
+            case Decision.NEXT:
+                self._running.remove(name)
+                self._open.remove(name)
+                return [StopChild(name), *self._arrange(now_s)]
+
+    def suspended(self, name: str, because: str, now_s: float) -> list[Instruction]:
+        """Return the instructions after a report of a child about its grant.
+
+        Args:
+            because: Reason and cause of the suspension; empty: it is at work.
+        """
+        if name not in self._running or self.has_finished or self.status[name].is_final:
+            return []
+        before = self.suspensions.pop(name, None)
+        if because:
+            self.suspensions[name] = Suspension(because, now_s if before is None else before.since_s)
+        return self._arrange(now_s)
+
+    def time_passed(self, now_s: float) -> list[Instruction]:
+        """Return the instructions that are due now."""
+        return self._arrange(now_s) if self._open else []
+
+    def left(self, name: str, now_s: float) -> list[Instruction]:
+        """Return the instructions after another component ended a child, which counts as if there were none such."""
+        if self.has_finished or name not in self._running:
+            return []
+        self._running.remove(name)
+        self._open.remove(name)
+        del self.status[name]
+        self.suspensions.pop(name, None)
+        return self._arrange(now_s)
+
+    def end(self) -> list[Instruction]:
+        """Return the orders that end all started children."""
+        self.has_finished = True
+        stops: list[Instruction] = [StopChild(name) for name in reversed(self._running)]
+        self._running, self._open = [], []
+        self.suspensions = {}
+        return stops
+
+    # ------------------------------------------------------------------ for people
+    @property
+    def suspended_because(self) -> str:
+        """Why no started child is at work; empty: one is, or none is started."""
+        waiting = [name for name in self._running if name in self.suspensions]
+        if not waiting or len(waiting) < len(self._running):
+            return ""
+        return ", ".join(f"{name}: {self.suspensions[name].because}" for name in waiting)
+
+    @property
+    def sentence(self) -> str:
+        """Which children run, and why; empty: nothing to say."""
+        return ""
+
+    def remarks(self) -> dict[str, str]:
+        """Return node → its state, for the drawing of the branch."""
+        remarks = {name: self._remark(name) for name in self.status}
+        for name, status in self.status.items():
+            below = {} if status.is_final or self.has_finished else self.payload.get(name, {}).get(BRANCH)
+            remarks |= below if isinstance(below, dict) else {}
+        return remarks
+
+    def why_failed(self, name: str) -> str:
+        """Return the failure of a child as part of a sentence.
+
+        Example:
+            >>> children = Children(["hide"])
+            >>> children.payload["hide"] = {"looks": 20}
+            >>> children.why_failed("hide")
+            'hide failed (looks 20)'
+        """
+        payload = self.payload.get(name, {})
+        if "detail" in payload:
+            return f"{name} failed: {payload['detail']}"
+        given = ", ".join(f"{word} {value_text(value)}" for word, value in payload.items())
+        return f"{name} failed ({given})" if given else f"{name} failed"
+
+    # ------------------------------------------------------------------ within
+    def _remark(self, name: str) -> str:
+        if name in self.suspensions:
+            return f"suspended: {self.suspensions[name].because}"
+        is_ended = self.has_finished and not self.status[name].is_final
+        return "ended" if is_ended else str(self.status[name])
+
+    def _with_status(self, status: BehaviorStatus) -> list[str]:
+        return [name for name in self._names if self.status.get(name) is status]
+
+    def _arrange(self, now_s: float) -> list[Instruction]:
+        """Finish if the verdict is in; else stop and start what makes wish and fact equal."""
+        if self.has_finished:
+            return []
+        verdict = self.verdict(now_s)
+        if verdict is not None:
+            return self._finish(verdict)
+        wanted = self.wanted(now_s)
+        stopping = [name for name in reversed(self._running) if name not in wanted]
+        starting = [name for name in wanted if name not in self._running]
+        for name in stopping:
+            self._running.remove(name)
+            del self.status[name]
+            self.suspensions.pop(name, None)
+        self._running += starting
+        self.status |= dict.fromkeys(starting, BehaviorStatus.RUNNING)
+        return [*map(StopChild, stopping), *map(StartChild, starting)]
+
+    def _finish(self, finish: FinishParent) -> list[Instruction]:
+        return [*self.end(), finish]

@@ -1,0 +1,198 @@
+"""ChildrenLoop: carries out what the rules for a behavior's children order.
+
+Rule of this file: an order waits for those before it in the same answer of the rules, and for those before it about the
+same child; the end of the parent waits for all. So no child starts before it has stopped, and a child whose stop takes
+long, because its host does not answer, holds up no other answer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import assert_never
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import Absence
+from backbone.mission.behavior_orders import PathStep
+from mission_control.behavior_hooks import BehaviorHooks
+from mission_control.behavior_tree import BehaviorNode
+from mission_control.child_keeper import ChildKeeper
+from mission_control.children import Children, Decision, FinishParent, Instruction, StartChild, StopChild
+from mission_control.messages import BehaviorStatus
+
+
+@dataclass(frozen=True, slots=True)
+class ChildOrder:
+    """An instruction, and the orders about the same child that go before it."""
+
+    instruction: Instruction
+    after: Sequence[asyncio.Event]
+    is_done: asyncio.Event = field(default_factory=asyncio.Event)
+
+
+class ChildrenLoop:
+    """Feeds the events of children, and the time, to the rules, and carries out the answers."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        nodes: Mapping[str, BehaviorNode],
+        path: Callable[[], Sequence[PathStep]],
+        rules: Children,
+        hooks: BehaviorHooks,
+        *,
+        owner: str,
+        begin: Callable[[Coroutine[object, None, None], str], asyncio.Task[None] | None],
+        note: Callable[[str, str], object],
+        publish_event: Callable[..., None],
+        changed: Callable[[], None],
+        arranged: Callable[[], None],
+    ) -> None:
+        """Start no child yet.
+
+        Args:
+            bus: Bus of the behavior.
+            clock: The mission's clock.
+            nodes: Name of a child → its node.
+            path: Names and priorities from the mission's root to the behavior, as they are now.
+            rules: What follows an event.
+            hooks: The behavior's decisions.
+            owner: Name of the behavior.
+            begin: Runs work as a task, unless the behavior is ending.
+            note: Subject, event → the story.
+            publish_event: The same, for people.
+            changed: Called when ``absences`` may have changed.
+            arranged: Called after each event that the rules have handled.
+        """
+        self.rules = rules
+        """The state of the children."""
+        self._clock, self._hooks, self._owner, self._has_children = clock, hooks, owner, bool(nodes)
+        self._begin, self._note, self._changed, self._arranged = begin, note, changed, arranged
+        self._keeper = ChildKeeper(
+            bus,
+            clock,
+            nodes,
+            path,
+            reported=self.reported,
+            left=self._child_left,
+            begin=begin,
+            note=note,
+            publish_event=publish_event,
+            changed=changed,
+        )
+        self._given_up: dict[str, Absence] = {}
+        self._last_orders: dict[str, asyncio.Event] = {}
+        self._waking: asyncio.Task[None] | None = None
+        self._wakes_at_s, self._woke_at_s = math.inf, -math.inf
+        self._latest_s = -math.inf
+
+    # ------------------------------------------------------------------ for the behavior
+    def begin(self) -> None:
+        """Start the children that run first; end those of an earlier life that do not."""
+        self._carry_out(self.rules.begin(self._now_s()))
+        if self._has_children:
+            self._begin(
+                self._keeper.stop_those_of_an_earlier_life(lambda name: name in self.rules.status),
+                "children of an earlier life",
+            )
+
+    def reported(
+        self, name: str, status: BehaviorStatus, payload: Mapping[str, object], suspended_because: str = ""
+    ) -> None:
+        """Handle a child's report; a final status leads to a decision."""
+        if self.rules.reported(name, status, payload):
+            self._note(name, f"finished: {status}")
+            self._begin(self._decide(name, status, payload), f"decide on {name}")
+        elif not status.is_final:
+            self._carry_out(self.rules.suspended(name, suspended_because, self._now_s()))
+
+    def look_again(self) -> None:
+        """Apply the rules now, after a change of their settings."""
+        self._carry_out(self.rules.time_passed(self._now_s()))
+
+    async def end(self) -> None:
+        """Return when all started children have ended; no other is started."""
+        stops = [each.name for each in self.rules.end() if isinstance(each, StopChild)]
+        self._arm()
+        await asyncio.gather(*map(self._keeper.stop, stops))
+
+    def absences(self, *, has_finished: bool) -> list[Absence]:
+        """Return the children that are given up and, until the behavior has finished, those that are missing."""
+        return [*([] if has_finished else self._keeper.absences()), *self._given_up.values()]
+
+    def give_up(self, name: str, payload: Mapping[str, object]) -> None:
+        """Report a behavior that could not work as a lasting absence; one that finished and failed is no absence."""
+        if "code" in payload:
+            remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self._owner} and start it again"
+            cause = str(payload.get("detail", "it failed"))
+            self._given_up[name] = Absence(name, self._clock.now_s(), cause, remedy=remedy)
+            self._changed()
+
+    # ------------------------------------------------------------------ within
+    def _child_left(self, name: str) -> None:
+        self._carry_out(self.rules.left(name, self._now_s()))
+
+    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
+        decision = await self._hooks.child_finished(name, status, payload)
+        self._note(name, f"{decision} after {status}")
+        if decision is not Decision.RETRY and not self.rules.expects_failures:
+            self.give_up(name, payload)
+        self._carry_out(self.rules.decided(name, decision, self._now_s()))
+
+    def _carry_out(self, instructions: Sequence[Instruction]) -> None:
+        if instructions:
+            self._begin(self._obey_in_order([self._order(each) for each in instructions]), "children")
+        self._arm()
+        self._arranged()
+
+    def _order(self, instruction: Instruction) -> ChildOrder:
+        if isinstance(instruction, FinishParent):
+            return ChildOrder(instruction, list(self._last_orders.values()))
+        before = self._last_orders.get(instruction.name)
+        order = ChildOrder(instruction, [] if before is None else [before])
+        self._last_orders[instruction.name] = order.is_done
+        return order
+
+    async def _obey_in_order(self, orders: Sequence[ChildOrder]) -> None:
+        for order in orders:
+            for earlier in order.after:
+                await earlier.wait()
+            await self._obey(order.instruction)
+            order.is_done.set()
+
+    async def _obey(self, instruction: Instruction) -> None:
+        match instruction:
+            case StartChild(name):
+                self._given_up.pop(name, None)
+                if not self.rules.has_finished:
+                    await self._keeper.start(name)
+            case StopChild(name):
+                await self._keeper.stop(name)
+            case FinishParent(status, payload):
+                await self._hooks.children_finished(status, payload)
+            case _:
+                assert_never(instruction)
+
+    def _arm(self) -> None:
+        """Wake at the time that the rules name; once for each such time."""
+        at_s = self.rules.wakes_at_s
+        if at_s in (self._wakes_at_s, self._woke_at_s):
+            return
+        waking, self._waking, self._wakes_at_s = self._waking, None, at_s
+        if waking is not None:
+            waking.cancel()
+        if at_s < math.inf:
+            self._waking = self._begin(self._wake(at_s), "wake")
+
+    async def _wake(self, at_s: float) -> None:
+        await self._clock.sleep_until_s(at_s)
+        self._waking, self._wakes_at_s, self._woke_at_s = None, math.inf, at_s
+        self._carry_out(self.rules.time_passed(self._now_s(at_s)))
+
+    def _now_s(self, at_least_s: float = -math.inf) -> float:
+        """Return a time that never runs backwards; a sleep may end a rounding error early."""
+        self._latest_s = max(self._latest_s, at_least_s, self._clock.now_s())
+        return self._latest_s

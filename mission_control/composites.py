@@ -1,0 +1,354 @@
+"""Composites: the rules of parents that the mission file composes, as events in and instructions out. Pure.
+
+Names and meanings are those of BehaviorTree.CPP 4, with three differences:
+
+* There are no ticks. A child is a process of its own that reports; every rule is applied at an event.
+* A child may be suspended at any time, because its ARC has no grant. By default it stands still, and nothing else
+  changes. ``while_suspended`` declares otherwise, where that makes sense.
+* A child that another component ended (an operator, say) counts as if the file had no such child. BehaviorTree.CPP
+  calls this *skipped*.
+
+Each rule reads its settings when it is applied, so that the owner may change them at any time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from typing import ClassVar
+
+from mission_control.children import Children, Decision, FinishParent, Instruction
+from mission_control.messages import BehaviorStatus
+
+ENDLESS = -1
+"""As a number of cycles or attempts: without end; as a threshold: all children."""
+
+
+class WhileSuspended(StrEnum):
+    """What a suspended child means to its parent."""
+
+    WAIT = "wait"  # it stands still: no time runs, and the parent waits for it
+    COUNT = "count"  # its time runs on
+    NEXT = "next"  # it is not available now: the next alternative stands in for it until it is at work again
+
+
+class Composite(Children):
+    """A parent that decides by rule alone. Without children it has finished at once."""
+
+    expects_failures = True
+    in_file_order = True
+
+    def begin(self, now_s: float) -> list[Instruction]:
+        """Return the orders for the children that run first, or the end of a parent that has nothing to wait for."""
+        return self._arrange(now_s)
+
+    @property
+    def sentence(self) -> str:
+        """Which children run, and why."""
+        if self.has_finished or not self._running:
+            return ""
+        working = [name for name in self._running if name not in self.suspensions]
+        runs = f"runs {' and '.join(working)}" if working else f"waits ({self.suspended_because})"
+        return runs + self._because()
+
+    def remarks(self) -> dict[str, str]:
+        """Return node → its state, also of children that are not started; see ``Children.remarks``."""
+        return dict.fromkeys(self._names, "not started") | super().remarks()
+
+    def _remark(self, name: str) -> str:
+        is_failed = self.status[name] is BehaviorStatus.FAILURE
+        return self.why_failed(name).partition(" ")[2] if is_failed else super()._remark(name)
+
+    def _because(self) -> str:
+        """Return the rest of the sentence: how far it is, and why."""
+        return ""
+
+    def _place(self, name: str) -> str:
+        return f"{self._names.index(name) + 1} of {len(self._names)}"
+
+
+class InSequence(Composite):
+    """One child after the other: success after all have succeeded, failure at the first that fails."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        super().__init__(names, together=False)
+
+    def _because(self) -> str:
+        before = self._with_status(BehaviorStatus.SUCCESS)
+        after = f", after {before[-1]} succeeded" if before else ""
+        return f", {self._place(self._running[0])}{after}"
+
+
+class InFallback(Composite):
+    """One alternative after the other: success at the first that succeeds, failure after all have failed.
+
+    With ``WhileSuspended.NEXT``, a child without a grant for ``patience_s`` is not available: it stays started, and the
+    next child that has not failed runs meanwhile. As soon as a child is at work again, the later ones are stopped; they
+    start from their beginning when they are needed again. A child that failed is not tried again. If no other child
+    is left, the parent waits for the suspended ones.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        *,
+        while_suspended: WhileSuspended = WhileSuspended.WAIT,
+        patience_s: float = 0.0,
+    ) -> None:
+        super().__init__(names, together=False)
+        self.while_suspended, self.patience_s = while_suspended, patience_s
+
+    def decision(self, name: str) -> Decision:  # noqa: ARG002
+        """Leave every finished child; the verdict tells success from failure."""
+        return Decision.NEXT
+
+    def wanted(self, now_s: float) -> list[str]:
+        """Return the first available child, and those before it, which may become available."""
+        wanted: list[str] = []
+        for name in self._open:
+            wanted.append(name)
+            if self._unavailable_at_s(name) > now_s:
+                break
+        return wanted
+
+    def verdict(self, now_s: float) -> FinishParent | None:  # noqa: ARG002
+        """Return success if a child has succeeded, failure if none is left."""
+        if self._with_status(BehaviorStatus.SUCCESS):
+            return FinishParent(BehaviorStatus.SUCCESS)
+        if self._open:
+            return None
+        failed = self._with_status(BehaviorStatus.FAILURE)
+        last = {"child": failed[-1], **self.payload[failed[-1]]} if failed else {}
+        return FinishParent(BehaviorStatus.FAILURE, {**last, "failed": failed})
+
+    @property
+    def wakes_at_s(self) -> float:
+        """When the first running child becomes unavailable."""
+        times = [self._unavailable_at_s(name) for name in self._running[-1:]]
+        return math.inf if self.has_finished or len(self._running) == len(self._open) else min(times, default=math.inf)
+
+    def _unavailable_at_s(self, name: str) -> float:
+        if self.while_suspended is not WhileSuspended.NEXT or name not in self.suspensions:
+            return math.inf
+        return self.suspensions[name].since_s + self.patience_s
+
+    def _because(self) -> str:
+        failed = self._with_status(BehaviorStatus.FAILURE)
+        reasons = [self.why_failed(name) for name in failed[-1:]]
+        if len(self._running) > 1:
+            reasons += [f"{name} is suspended: {one.because}" for name, one in self.suspensions.items()]
+        because = f", because {' and '.join(reasons)}" if reasons else ""
+        return f", {self._place(self._running[-1])}{because}"
+
+
+class InParallel(Composite):
+    """All children at the same time: the numbers of successes and of failures decide.
+
+    Args:
+        names: Names of the children.
+        success_count: So many successes are a success; -1: all, -2: all but one, and so on.
+        failure_count: So many failures are a failure; negative as above. It also fails as soon as too few children are
+            left to succeed.
+    """
+
+    def __init__(self, names: Sequence[str], *, success_count: int = ENDLESS, failure_count: int = 1) -> None:
+        super().__init__(names)
+        self.success_count, self.failure_count = success_count, failure_count
+
+    def decision(self, name: str) -> Decision:  # noqa: ARG002
+        """Leave every finished child; the verdict counts."""
+        return Decision.NEXT
+
+    def verdict(self, now_s: float) -> FinishParent | None:  # noqa: ARG002
+        """Return the result as soon as the counts say it."""
+        succeeded, failed = self._with_status(BehaviorStatus.SUCCESS), self._with_status(BehaviorStatus.FAILURE)
+        in_all = len(succeeded) + len(failed) + len(self._undecided)
+        needed = self._threshold(self.success_count, in_all)
+        if len(succeeded) >= needed:
+            return FinishParent(BehaviorStatus.SUCCESS)
+        if in_all - len(failed) < needed or len(failed) >= self._threshold(self.failure_count, in_all):
+            reasons = "; ".join(map(self.why_failed, failed))
+            detail = f"{len(succeeded)} of {in_all} succeeded, {needed} needed" + (f": {reasons}" if reasons else "")
+            return FinishParent(BehaviorStatus.FAILURE, {"failed": failed, "detail": detail})
+        return None
+
+    @property
+    def _undecided(self) -> list[str]:
+        finished = [name for name, status in self.status.items() if status.is_final]
+        return [name for name in self._open if name not in finished]
+
+    @staticmethod
+    def _threshold(count: int, in_all: int) -> int:
+        return count if count >= 0 else max(in_all + count + 1, 0)
+
+    def _because(self) -> str:
+        succeeded, failed = self._with_status(BehaviorStatus.SUCCESS), self._with_status(BehaviorStatus.FAILURE)
+        needed = self._threshold(self.success_count, len(succeeded) + len(failed) + len(self._undecided))
+        because = f", because {self.why_failed(failed[-1])}" if failed else ""
+        return f", {len(succeeded)} of {needed} needed successes{because}"
+
+
+class Again(Composite):
+    """Its child again and again: how often, and after which end, is for derived classes.
+
+    Args:
+        names: Name of the child.
+        most: Number of starts; -1: without end.
+        pause_s: Time from an end of the child to its next start.
+    """
+
+    again_after: ClassVar[BehaviorStatus]
+
+    def __init__(self, names: Sequence[str], *, most: int, pause_s: float = 0.0) -> None:
+        super().__init__(names, together=False)
+        self.most, self.pause_s = most, pause_s
+        self._ends, self._starts_at_s = 0, -math.inf
+
+    def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
+        """Record a report; count the ends."""
+        has_finished = super().reported(name, status, payload)
+        self._ends += has_finished
+        return has_finished
+
+    def decision(self, name: str) -> Decision:
+        """Return retry while starts are left."""
+        if self.status[name] is self.again_after and (self.most < 0 or self._ends < self.most):
+            return Decision.RETRY
+        return super().decision(name)
+
+    def decided(self, name: str, decision: Decision, now_s: float) -> list[Instruction]:
+        """Begin the pause; see ``Children.decided``."""
+        if decision is Decision.RETRY:
+            self._starts_at_s = now_s + self.pause_s
+        return super().decided(name, decision, now_s)
+
+    def wanted(self, now_s: float) -> list[str]:
+        """Return the child, but none during the pause."""
+        return self._open if now_s >= self._starts_at_s else []
+
+    @property
+    def wakes_at_s(self) -> float:
+        """When the pause is over."""
+        return math.inf if self.has_finished or self._running else self._starts_at_s
+
+    @property
+    def sentence(self) -> str:
+        """Whether the child runs, or when it starts again."""
+        if self.has_finished or self._running:
+            return super().sentence
+        return f"starts {self._open[0]} again at {self._starts_at_s:.1f} s of mission time{self._because()}"
+
+    def _because(self) -> str:
+        turn = f", {self._turn} {self._ends + 1}" + ("" if self.most < 0 else f" of {self.most}")
+        failed = self._ends and self.again_after is BehaviorStatus.FAILURE
+        return turn + (f", because {self.why_failed(self._open[0])}" if failed else "")
+
+    @property
+    def _turn(self) -> str:
+        return "attempt" if self.again_after is BehaviorStatus.FAILURE else "cycle"
+
+
+class WithRetries(Again):
+    """Its child again while it fails: success as soon as the child succeeds, failure after ``most`` attempts."""
+
+    again_after = BehaviorStatus.FAILURE
+
+
+class WithRepeats(Again):
+    """Its child again while it succeeds: success after ``most`` cycles, failure as soon as the child fails."""
+
+    again_after = BehaviorStatus.SUCCESS
+
+
+class Stopwatch:
+    """Sums up the time in which it runs, until a limit is reached."""
+
+    def __init__(self) -> None:
+        self.sum_s = 0.0
+        """The sum at the last change."""
+        self._since_s = math.inf
+
+    def run(self, now_s: float, *, running: bool) -> None:
+        """Run from now on, or stand still."""
+        self.sum_s += max(0.0, now_s - self._since_s)
+        self._since_s = now_s if running else math.inf
+
+    def reaches_at_s(self, limit_s: float) -> float:
+        """Return when the sum reaches the limit; infinite: not while it stands still."""
+        return -math.inf if self.sum_s >= limit_s else self._since_s + (limit_s - self.sum_s)
+
+
+class WithTimeout(Composite):
+    """Its child, for at most ``seconds``: the child's result, or failure when the time is over.
+
+    With ``WhileSuspended.WAIT`` the clock stands still while the child is suspended; with ``COUNT`` it runs on.
+    """
+
+    def __init__(
+        self, names: Sequence[str], *, seconds: float, while_suspended: WhileSuspended = WhileSuspended.WAIT
+    ) -> None:
+        super().__init__(names, together=False)
+        self.seconds, self.while_suspended = seconds, while_suspended
+        self._watch = Stopwatch()
+
+    def begin(self, now_s: float) -> list[Instruction]:
+        """Start the child and the clock."""
+        self._watch.run(now_s, running=True)
+        return super().begin(now_s)
+
+    def suspended(self, name: str, because: str, now_s: float) -> list[Instruction]:
+        """Stop or start the clock; see ``Children.suspended``."""
+        is_counted = not because or self.while_suspended is WhileSuspended.COUNT
+        self._watch.run(now_s, running=is_counted)
+        return super().suspended(name, because, now_s)
+
+    def verdict(self, now_s: float) -> FinishParent | None:
+        """Return failure when the time is over."""
+        is_at_work = any(not self.status[name].is_final for name in self._running)
+        if is_at_work and now_s >= self._watch.reaches_at_s(self.seconds):
+            detail = f"{self._open[0]} was not done within {self.seconds:g} s"
+            return FinishParent(BehaviorStatus.FAILURE, {"child": self._open[0], "detail": detail})
+        return super().verdict(now_s)
+
+    @property
+    def wakes_at_s(self) -> float:
+        """When the time is over."""
+        return math.inf if self.has_finished else self._watch.reaches_at_s(self.seconds)
+
+    def _because(self) -> str:
+        until_s = self.wakes_at_s
+        if until_s < math.inf:
+            return f", until {until_s:.1f} s of mission time"
+        return f", {self.seconds - self._watch.sum_s:.1f} s left"
+
+
+class WithDelay(Composite):
+    """No child: success after ``seconds``."""
+
+    def __init__(self, names: Sequence[str], *, seconds: float) -> None:
+        super().__init__(names)
+        self.seconds, self._watch = seconds, Stopwatch()
+
+    def begin(self, now_s: float) -> list[Instruction]:
+        """Start the clock."""
+        self._watch.run(now_s, running=True)
+        return super().begin(now_s)
+
+    def time_passed(self, now_s: float) -> list[Instruction]:
+        """Finish when the time is over."""
+        return self._arrange(now_s)
+
+    def verdict(self, now_s: float) -> FinishParent | None:
+        """Return success when the time is over."""
+        return FinishParent(BehaviorStatus.SUCCESS) if now_s >= self.wakes_at_s else None
+
+    @property
+    def wakes_at_s(self) -> float:
+        """When the time is over."""
+        return math.inf if self.has_finished else self._watch.reaches_at_s(self.seconds)
+
+    @property
+    def sentence(self) -> str:
+        """Until when it waits."""
+        return "" if self.has_finished else f"waits until {self.wakes_at_s:.1f} s of mission time"

@@ -1,0 +1,410 @@
+"""Random trees of composites, run twice: by events through the rules, and by ticks as in BehaviorTree.CPP.
+
+Time is counted in ticks. A leaf works for some ticks in which it is not suspended, then succeeds or fails; its results
+differ from start to start. At one instant, children come before their parent's own clock, in the order of the file.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from hypothesis import strategies as st
+
+from mission_control.children import Children, Decision, FinishParent, Instruction, StartChild, StopChild
+from mission_control.composites import (
+    InFallback,
+    InParallel,
+    InSequence,
+    WhileSuspended,
+    WithDelay,
+    WithRepeats,
+    WithRetries,
+    WithTimeout,
+)
+from mission_control.messages import BehaviorStatus
+
+LONGEST = 120  # ticks of one run
+RUNNING, SUCCESS, FAILURE = BehaviorStatus.RUNNING, BehaviorStatus.SUCCESS, BehaviorStatus.FAILURE
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A node: ``leaf`` has ``outcomes`` (ticks of work, success) and the ticks in which it is suspended."""
+
+    kind: str
+    name: str
+    children: tuple[Plan, ...] = ()
+    outcomes: tuple[tuple[int, bool], ...] = ()
+    suspended: frozenset[int] = frozenset()
+    settings: dict[str, Any] = field(default_factory=dict)
+
+
+RULES: dict[str, type[Children]] = {
+    "sequence": InSequence,
+    "fallback": InFallback,
+    "parallel": InParallel,
+    "retry": WithRetries,
+    "repeat": WithRepeats,
+    "timeout": WithTimeout,
+    "wait": WithDelay,
+}
+Result = tuple[BehaviorStatus, int] | None
+"""Final status and its tick; None: still running after the longest time."""
+
+
+# ---------------------------------------------------------------------- random trees
+@st.composite
+def _suspensions(draw: st.DrawFn) -> frozenset[int]:
+    spans = draw(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 15)), max_size=3))
+    return frozenset(tick for begin, length in spans for tick in range(begin, begin + length))
+
+
+@st.composite
+def trees(draw: st.DrawFn, depth: int = 4, name: str = "n") -> Plan:
+    """Draw a tree whose nodes are named by their place."""
+    inner = ["sequence", "fallback", "parallel", "retry", "repeat", "timeout"] if depth > 1 else []
+    kind = draw(st.sampled_from([*inner, *inner, "leaf", "wait"] if inner else ["leaf", "leaf", "leaf", "wait"]))
+    count = draw(st.integers(1, 3)) if kind in ("sequence", "fallback", "parallel") else int(kind in inner)
+    children = tuple(draw(trees(depth - 1, f"{name}{number}")) for number in range(count))
+    match kind:
+        case "leaf":
+            outcomes = draw(st.lists(st.tuples(st.integers(1, 12), st.booleans()), min_size=1, max_size=3))
+            return Plan(kind, name, outcomes=tuple(outcomes), suspended=draw(_suspensions()))
+        case "parallel":
+            thresholds = st.integers(1, count) | st.integers(-count, -1)
+            settings = {"success_count": draw(thresholds), "failure_count": draw(thresholds)}
+        case "retry" | "repeat":
+            settings = {"most": draw(st.sampled_from([-1, 1, 2, 3])), "pause_s": draw(st.integers(0, 3))}
+        case "timeout":
+            how = draw(st.sampled_from([WhileSuspended.WAIT, WhileSuspended.COUNT]))
+            settings = {"seconds": draw(st.integers(1, 30)), "while_suspended": how}
+        case "wait":
+            settings = {"seconds": draw(st.integers(1, 12))}
+        case "fallback":
+            how = draw(st.sampled_from([WhileSuspended.WAIT, WhileSuspended.NEXT]))
+            settings = {"while_suspended": how, "patience_s": draw(st.integers(0, 5))}
+        case _:
+            settings = {}
+    return Plan(kind, name, children, settings=settings)
+
+
+# ---------------------------------------------------------------------- by events
+class ByEvents:
+    """Runs a tree through the rules, and checks on the way that nothing starts twice or after the end."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.now = 0
+        self.runs = Counter[str]()
+        self.result: Result = None
+        self.kids: dict[str, _Node] = {}
+        self._root = self.make(plan)
+
+    def run(self) -> Result:
+        self.kids[self._root.plan.name] = self._root
+        self._root.begin()
+        while self.result is None and self.now < LONGEST:
+            self.now += 1
+            self._root.visit()
+        return self.result
+
+    def make(self, plan: Plan, parent: _Inner | None = None) -> _Node:
+        self.runs[plan.name] += 1
+        return (_Leaf if plan.kind == "leaf" else _Inner)(self, plan, parent)
+
+
+class _Node:
+    def __init__(self, world: ByEvents, plan: Plan, parent: _Inner | None) -> None:
+        self.world, self.plan, self.parent = world, plan, parent
+        self.began_at, self.is_over, self.reported_suspended = world.now, False, False
+
+    def begin(self) -> None: ...
+    def visit(self) -> None: ...
+    def stop(self) -> None: ...
+
+    def report(self, status: BehaviorStatus) -> None:
+        assert not self.is_over, f"{self.plan.name} finished twice"
+        self.is_over = True
+        if self.parent is None:
+            self.world.result = (status, self.world.now)
+        else:
+            self.parent.heard(self.plan.name, status)
+
+    def report_suspended(self, is_suspended: bool) -> None:
+        if is_suspended != self.reported_suspended and not self.is_over:
+            self.reported_suspended = is_suspended
+            if self.parent is not None:
+                self.parent.heard_suspended(self.plan.name, is_suspended)
+
+
+class _Leaf(_Node):
+    def begin(self) -> None:
+        outcomes = self.plan.outcomes
+        self.left, self.succeeds = outcomes[(self.world.runs[self.plan.name] - 1) % len(outcomes)]
+        self.report_suspended(self.world.now in self.plan.suspended)
+
+    def visit(self) -> None:
+        self.left -= not self.reported_suspended
+        if self.left == 0:
+            self.report(SUCCESS if self.succeeds else FAILURE)
+        else:
+            self.report_suspended(self.world.now in self.plan.suspended)
+
+    def stop(self) -> None:
+        self.is_over = True
+
+
+class _Inner(_Node):
+    def __init__(self, world: ByEvents, plan: Plan, parent: _Inner | None) -> None:
+        super().__init__(world, plan, parent)
+        self.rules: Any = RULES[plan.kind]([child.name for child in plan.children], **plan.settings)
+        self.plans = {child.name: child for child in plan.children}
+        self.kids: dict[str, _Node] = {}
+        self.orders: deque[Instruction] = deque()
+        self.is_working = False
+
+    def begin(self) -> None:
+        self.carry_out(self.rules.begin(self.world.now))
+        self.settle()
+
+    def visit(self) -> None:
+        for name in self.plans:
+            if name in self.kids and self.kids[name].began_at < self.world.now:
+                self.kids[name].visit()
+        if not self.is_over and self.rules.wakes_at_s <= self.world.now:
+            self.carry_out(self.rules.time_passed(self.world.now))
+            assert self.is_over or self.rules.wakes_at_s > self.world.now, "it would wake for ever"
+        self.settle()
+
+    def settle(self) -> None:
+        self.report_suspended(bool(self.rules.suspended_because))
+
+    def stop(self) -> None:
+        self.carry_out(self.rules.end())
+        assert not self.kids, f"{self.plan.name} left {list(self.kids)} running"
+        self.is_over = True
+
+    def heard(self, name: str, status: BehaviorStatus) -> None:
+        assert self.rules.reported(name, status, {})
+        self.carry_out(self.rules.decided(name, self.rules.decision(name), self.world.now))
+
+    def heard_suspended(self, name: str, is_suspended: bool) -> None:
+        self.carry_out(self.rules.suspended(name, "slice" if is_suspended else "", self.world.now))
+
+    def carry_out(self, instructions: Sequence[Instruction]) -> None:
+        self.orders.extend(instructions)
+        if self.is_working:
+            return
+        self.is_working = True
+        while self.orders:
+            self.obey(self.orders.popleft())
+        self.is_working = False
+
+    def obey(self, instruction: Instruction) -> None:
+        match instruction:
+            case StartChild(name):
+                assert not self.is_over, f"{self.plan.name} starts {name} after its end"
+                assert name not in self.kids, f"{self.plan.name} starts {name} twice"
+                self.kids[name] = self.world.make(self.plans[name], self)
+                self.kids[name].begin()
+            case StopChild(name):
+                self.kids.pop(name).stop()
+            case FinishParent(status):
+                assert not self.kids, f"{self.plan.name} finishes before {list(self.kids)} have ended"
+                self.report(status)
+
+
+# ---------------------------------------------------------------------- by ticks: the reference
+class Tick:
+    """A node as BehaviorTree.CPP has it: ``tick`` until it is no longer running, ``halt`` in between."""
+
+    def __init__(self, plan: Plan, runs: Counter[str]) -> None:
+        self.plan, self.runs = plan, runs
+        self.children = [reference(child, runs) for child in plan.children]
+        self.is_running = False
+
+    @property
+    def is_suspended(self) -> bool:
+        running = [child for child in self.children if child.is_running]
+        return self.is_running and bool(running) and all(child.is_suspended for child in running)
+
+    def tick(self, now: int) -> BehaviorStatus:
+        if not self.is_running:
+            self.is_running = True
+            self.runs[self.plan.name] += 1
+            self.reset(now)
+        status = self.go_on(now)
+        if status.is_final:
+            self.halt()
+        return status
+
+    def halt(self) -> None:
+        self.is_running = False
+        for child in self.children:
+            child.halt()
+
+    def reset(self, now: int) -> None: ...
+    def go_on(self, now: int) -> BehaviorStatus: ...  # type: ignore[empty-body]
+
+
+class TickLeaf(Tick):
+    def reset(self, now: int) -> None:
+        self.left, self.succeeds = self.plan.outcomes[(self.runs[self.plan.name] - 1) % len(self.plan.outcomes)]
+        self.began = now
+
+    @property
+    def is_suspended(self) -> bool:
+        return self.is_running and self.stands
+
+    def go_on(self, now: int) -> BehaviorStatus:
+        if now > self.began and not self.stands:
+            self.left -= 1
+        self.stands = now in self.plan.suspended
+        return RUNNING if self.left else SUCCESS if self.succeeds else FAILURE
+
+
+class TickInOrder(Tick):
+    """Sequence and fallback: the next child after this one has ended with ``goes_on``."""
+
+    goes_on, stops = SUCCESS, FAILURE
+
+    def reset(self, now: int) -> None:
+        self.at = 0
+
+    def go_on(self, now: int) -> BehaviorStatus:
+        while self.at < len(self.children):
+            status = self.children[self.at].tick(now)
+            if status is not self.goes_on:
+                return status
+            self.at += 1
+        return self.goes_on
+
+
+class TickFallback(TickInOrder):
+    goes_on, stops = FAILURE, SUCCESS
+
+
+class TickFallbackNext(Tick):
+    """From the first child on at every tick; one that is suspended for too long is passed over."""
+
+    def reset(self, now: int) -> None:
+        self.failed, self.since = set[int](), dict[int, int]()
+
+    def go_on(self, now: int) -> BehaviorStatus:
+        for place, child in enumerate(self.children):
+            if place in self.failed:
+                continue
+            status = child.tick(now)
+            if status is SUCCESS:
+                return SUCCESS
+            if status is FAILURE:
+                self.failed.add(place)
+            elif not self._is_unavailable(place, now):
+                for later, other in enumerate(self.children[place + 1 :], place + 1):
+                    other.halt()
+                    self.since.pop(later, None)
+                return RUNNING
+        return FAILURE if len(self.failed) == len(self.children) else RUNNING
+
+    def _is_unavailable(self, place: int, now: int) -> bool:
+        if not self.children[place].is_suspended:
+            self.since.pop(place, None)
+            return False
+        return now - self.since.setdefault(place, now) >= self.plan.settings["patience_s"]
+
+
+class TickParallel(Tick):
+    def reset(self, now: int) -> None:
+        self.results: dict[int, BehaviorStatus] = {}
+
+    def go_on(self, now: int) -> BehaviorStatus:
+        count = len(self.children)
+        needed, too_many = (
+            given if given >= 0 else max(count + given + 1, 0)
+            for given in (self.plan.settings["success_count"], self.plan.settings["failure_count"])
+        )
+        for place, child in enumerate(self.children):
+            if place in self.results:
+                continue
+            status = child.tick(now)
+            if status.is_final:
+                self.results[place] = status
+            found = Counter(self.results.values())
+            if found[SUCCESS] >= needed:
+                return SUCCESS
+            if count - found[FAILURE] < needed or found[FAILURE] == too_many:
+                return FAILURE
+        return RUNNING
+
+
+class TickAgain(Tick):
+    """Retry and repeat."""
+
+    def reset(self, now: int) -> None:
+        self.count, self.rests_until = 0, now
+
+    def go_on(self, now: int) -> BehaviorStatus:
+        again = FAILURE if self.plan.kind == "retry" else SUCCESS
+        while now >= self.rests_until:
+            status = self.children[0].tick(now)
+            if status is not again:
+                return status
+            self.count += 1
+            if self.count == self.plan.settings["most"]:
+                return status
+            self.rests_until = now + self.plan.settings["pause_s"]
+        return RUNNING
+
+
+class TickTimeout(Tick):
+    def reset(self, now: int) -> None:
+        self.used = -1
+
+    def go_on(self, now: int) -> BehaviorStatus:
+        stands = self.children[0].is_suspended and self.plan.settings["while_suspended"] is WhileSuspended.WAIT
+        self.used += not stands
+        status = self.children[0].tick(now)
+        return FAILURE if status is RUNNING and self.used >= self.plan.settings["seconds"] else status
+
+
+class TickWait(Tick):
+    def reset(self, now: int) -> None:
+        self.until = now + self.plan.settings["seconds"]
+
+    def go_on(self, now: int) -> BehaviorStatus:
+        return SUCCESS if now >= self.until else RUNNING
+
+
+def reference(plan: Plan, runs: Counter[str]) -> Tick:
+    kinds: dict[str, type[Tick]] = {
+        "leaf": TickLeaf,
+        "sequence": TickInOrder,
+        "fallback": TickFallback,
+        "parallel": TickParallel,
+        "retry": TickAgain,
+        "repeat": TickAgain,
+        "timeout": TickTimeout,
+        "wait": TickWait,
+    }
+    if plan.settings.get("while_suspended") is WhileSuspended.NEXT:
+        return TickFallbackNext(plan, runs)
+    return kinds[plan.kind](plan, runs)
+
+
+def by_ticks(plan: Plan) -> tuple[Result, Counter[str]]:
+    """Return the result of the reference, and how often it started each node."""
+    runs = Counter[str]()
+    root = reference(plan, runs)
+    for now in range(LONGEST + 1):
+        status = root.tick(now)
+        if status.is_final:
+            return (status, now), runs
+    return None, runs
+
+
+def decide(rules: Children, name: str, now: float) -> list[Instruction]:
+    """Return what the rules answer to a finished child."""
+    decision: Decision = rules.decision(name)
+    return rules.decided(name, decision, now)

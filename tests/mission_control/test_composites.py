@@ -1,0 +1,258 @@
+"""Composites do what BehaviorTree.CPP defines, by events, with any child suspended at any time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from composed_trees import ByEvents, Plan, by_ticks, decide, trees
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mission_control.children import Children, FinishParent, Instruction, StartChild, StopChild
+from mission_control.composites import (
+    InFallback,
+    InParallel,
+    InSequence,
+    WhileSuspended,
+    WithDelay,
+    WithRepeats,
+    WithRetries,
+    WithTimeout,
+)
+from mission_control.messages import BehaviorStatus
+
+SUCCESS, FAILURE, RUNNING = BehaviorStatus.SUCCESS, BehaviorStatus.FAILURE, BehaviorStatus.RUNNING
+NAMES = ["a", "b", "c"]
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow])
+@given(trees())
+def test_a_tree_ends_as_the_reference_does_at_the_same_instant_after_the_same_starts(tree: Plan) -> None:
+    result, starts = by_ticks(tree)
+    events = ByEvents(tree)
+    assert events.run() == result
+    assert events.runs == starts
+
+
+MAKERS: dict[str, Callable[[], Children]] = {
+    "sequence": lambda: InSequence(NAMES),
+    "fallback": lambda: InFallback(NAMES),
+    "fallback-next": lambda: InFallback(NAMES, while_suspended=WhileSuspended.NEXT, patience_s=2.0),
+    "parallel-all": lambda: InParallel(NAMES),
+    "parallel-any": lambda: InParallel(NAMES, success_count=1, failure_count=-1),
+    "parallel-two": lambda: InParallel(NAMES, success_count=2, failure_count=-1),
+    "retry": lambda: WithRetries(["a"], most=3),
+    "retry-later": lambda: WithRetries(["a"], most=-1, pause_s=2.0),
+    "repeat": lambda: WithRepeats(["a"], most=3),
+    "timeout": lambda: WithTimeout(["a"], seconds=7.0),
+    "timeout-count": lambda: WithTimeout(["a"], seconds=7.0, while_suspended=WhileSuspended.COUNT),
+    "wait": lambda: WithDelay([], seconds=7.0),
+}
+_events = st.lists(
+    st.tuples(
+        st.sampled_from(NAMES),
+        st.sampled_from(["success", "failure", "running", "suspended", "resumed", "left", "time", "end"]),
+        st.floats(0.0, 3.0),
+    ),
+    max_size=40,
+)
+
+
+class Watched:
+    """Carries instructions out and checks each."""
+
+    def __init__(self, rules: Children) -> None:
+        self.rules, self.running, self.results = rules, set[str](), list[BehaviorStatus]()
+
+    def carry_out(self, instructions: list[Instruction]) -> None:
+        for instruction in instructions:
+            match instruction:
+                case StartChild(name):
+                    assert name not in self.running, "started twice"
+                    assert not self.rules.has_finished, "started after the finish"
+                    self.running.add(name)
+                case StopChild(name):
+                    self.running.remove(name)
+                case FinishParent(status):
+                    assert not self.running, "finished with children left"
+                    self.results.append(status)
+        assert len(self.results) <= 1, "finished twice"
+        assert not (self.results and self.running)
+
+
+@pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
+@given(events=_events)
+def test_whatever_happens_children_run_once_and_none_after_the_end(
+    make: Callable[[], Children], events: list[tuple[str, str, float]]
+) -> None:
+    now, rules = 0.0, make()
+    watched = Watched(rules)
+    watched.carry_out(rules.begin(now))
+    for name, event, lasts_s in events:
+        now += lasts_s
+        match event:
+            case "success" | "failure" | "running":
+                if rules.reported(name, BehaviorStatus(event), {}):
+                    watched.carry_out(decide(rules, name, now))
+            case "suspended" | "resumed":
+                watched.carry_out(rules.suspended(name, "slice" if event == "suspended" else "", now))
+            case "left":
+                instructions = rules.left(name, now)
+                watched.running.discard(name)
+                watched.carry_out(instructions)
+            case "time":
+                watched.carry_out(rules.time_passed(now))
+                assert rules.wakes_at_s > now
+            case "end":
+                watched.carry_out(rules.end())
+                assert not watched.running
+        assert rules.remarks() is not None
+        assert isinstance(rules.sentence, str)
+
+
+def begun(rules: Children) -> Children:
+    rules.begin(0.0)
+    return rules
+
+
+def end(rules: Children, name: str, status: BehaviorStatus, now: float = 0.0, **payload: object) -> list[Instruction]:
+    assert rules.reported(name, status, payload)
+    return decide(rules, name, now)
+
+
+def test_a_fallback_says_what_runs_and_why() -> None:
+    rules = begun(InFallback(["patrol", "go-home", "hide"]))
+    assert rules.sentence == "runs patrol, 1 of 3"
+    end(rules, "patrol", FAILURE, detail="world does not know scout1")
+    assert rules.sentence == "runs go-home, 2 of 3, because patrol failed: world does not know scout1"
+    assert rules.remarks() == {
+        "patrol": "failed: world does not know scout1",
+        "go-home": "running",
+        "hide": "not started",
+    }
+
+
+def test_a_fallback_fails_with_the_reason_of_its_last_child() -> None:
+    rules = begun(InFallback(["a", "b"]))
+    end(rules, "a", FAILURE, detail="first")
+    *_, finish = end(rules, "b", FAILURE, code="x", detail="second")
+    assert finish == FinishParent(FAILURE, {"child": "b", "code": "x", "detail": "second", "failed": ["a", "b"]})
+
+
+def test_a_child_that_is_at_work_again_takes_over_from_the_one_that_stood_in() -> None:
+    rules = begun(InFallback(NAMES, while_suspended=WhileSuspended.NEXT, patience_s=5.0))
+    assert rules.suspended("a", "higher by console-1", 1.0) == []
+    assert rules.wakes_at_s == 6.0
+    assert rules.time_passed(6.0) == [StartChild("b")]
+    assert rules.sentence == "runs b, 2 of 3, because a is suspended: higher by console-1"
+    assert rules.suspended_because == ""
+    assert rules.suspended("b", "slice", 7.0) == []
+    assert rules.time_passed(12.0) == [StartChild("c")]
+    assert rules.suspended("a", "", 13.0) == [StopChild("c"), StopChild("b")]
+    assert rules.sentence == "runs a, 1 of 3"
+
+
+def test_a_stand_in_that_succeeds_is_the_success_of_the_fallback() -> None:
+    rules = begun(InFallback(["a", "b"], while_suspended=WhileSuspended.NEXT))
+    rules.suspended("a", "slice", 0.0)
+    assert end(rules, "b", SUCCESS) == [StopChild("b"), StopChild("a"), FinishParent(SUCCESS)]
+
+
+def test_a_stand_in_that_failed_is_not_tried_again_and_the_fallback_waits() -> None:
+    rules = begun(InFallback(["a", "b"], while_suspended=WhileSuspended.NEXT))
+    rules.suspended("a", "slice", 0.0)
+    assert end(rules, "b", FAILURE) == [StopChild("b")]
+    assert rules.suspended_because == "a: slice"
+    assert rules.sentence == "waits (a: slice), 1 of 2, because b failed"
+
+
+def test_a_timeout_stands_still_while_its_child_does() -> None:
+    rules = begun(WithTimeout(["a"], seconds=10.0))
+    assert (rules.wakes_at_s, rules.sentence) == (10.0, "runs a, until 10.0 s of mission time")
+    rules.suspended("a", "slice", 4.0)
+    assert rules.time_passed(100.0) == []
+    assert rules.sentence == "waits (a: slice), 6.0 s left"
+    rules.suspended("a", "", 100.0)
+    assert rules.wakes_at_s == 106.0
+    stop, finish = rules.time_passed(106.0)
+    assert stop == StopChild("a")
+    assert finish == FinishParent(FAILURE, {"child": "a", "detail": "a was not done within 10 s"})
+
+
+def test_a_timeout_may_count_while_its_child_is_suspended() -> None:
+    rules = begun(WithTimeout(["a"], seconds=10.0, while_suspended=WhileSuspended.COUNT))
+    rules.suspended("a", "slice", 4.0)
+    assert rules.wakes_at_s == 10.0
+
+
+def test_a_parallel_that_can_no_longer_succeed_fails_at_once() -> None:
+    rules = begun(InParallel(NAMES, success_count=2, failure_count=-1))
+    assert end(rules, "a", FAILURE, detail="lost") == [StopChild("a")]
+    assert rules.sentence == "runs b and c, 0 of 2 needed successes, because a failed: lost"
+    *_, finish = end(rules, "b", FAILURE)
+    assert isinstance(finish, FinishParent)
+    assert finish.payload["detail"] == "0 of 3 succeeded, 2 needed: a failed: lost; b failed"
+
+
+def test_a_parallel_of_too_few_children_fails_before_it_starts_any() -> None:
+    [finish] = InParallel(["a"], success_count=2).begin(0.0)
+    assert isinstance(finish, FinishParent)
+    assert finish.status is FAILURE
+
+
+@pytest.mark.parametrize(
+    ("rules", "status"),
+    [
+        (InSequence(["a"]), SUCCESS),
+        (InFallback(["a"]), FAILURE),
+        (InParallel(["a"]), SUCCESS),
+        (InParallel(["a"], success_count=1), FAILURE),
+        (WithRetries(["a"], most=3), SUCCESS),
+        (WithTimeout(["a"], seconds=3.0), SUCCESS),
+    ],
+)
+def test_a_child_that_an_operator_ended_counts_as_none(rules: Children, status: BehaviorStatus) -> None:
+    begun(rules)
+    [finish] = rules.left("a", 1.0)
+    assert isinstance(finish, FinishParent)
+    assert finish.status is status
+
+
+def test_a_setting_can_be_changed_on_the_way() -> None:
+    rules = WithTimeout(["a"], seconds=10.0)
+    begun(rules)
+    rules.seconds = 3.0
+    assert rules.time_passed(4.0)[-1] == FinishParent(FAILURE, {"child": "a", "detail": "a was not done within 3 s"})
+
+
+def test_retry_and_repeat_say_which_turn_it_is() -> None:
+    retry = begun(WithRetries(["a"], most=3))
+    end(retry, "a", FAILURE, detail="no path")
+    assert retry.sentence == "runs a, attempt 2 of 3, because a failed: no path"
+    repeat = begun(WithRepeats(["a"], most=-1))
+    end(repeat, "a", SUCCESS)
+    assert repeat.sentence == "runs a, cycle 2"
+
+
+def test_a_retry_pauses_before_the_next_attempt() -> None:
+    retry = begun(WithRetries(["a"], most=-1, pause_s=2.0))
+    assert end(retry, "a", FAILURE, 10.0, detail="no path") == [StopChild("a")]
+    assert retry.sentence == "starts a again at 12.0 s of mission time, attempt 2, because a failed: no path"
+    assert retry.wakes_at_s == 12.0
+    assert retry.remarks() == {"a": "not started"}
+    assert retry.time_passed(12.0) == [StartChild("a")]
+
+
+def test_a_sequence_says_what_came_before() -> None:
+    rules = begun(InSequence(NAMES))
+    assert end(rules, "a", SUCCESS) == [StopChild("a"), StartChild("b")]
+    assert rules.sentence == "runs b, 2 of 3, after a succeeded"
+
+
+def test_a_report_that_repeats_a_suspension_does_not_prolong_the_patience() -> None:
+    rules = begun(InFallback(["a", "b"], while_suspended=WhileSuspended.NEXT, patience_s=5.0))
+    rules.suspended("a", "slice", 1.0)
+    rules.suspended("a", "higher by console-1", 4.0)
+    assert rules.wakes_at_s == 6.0
+    assert rules.sentence == "waits (a: higher by console-1), 1 of 2"
