@@ -17,7 +17,7 @@ INSTANT_S = 1e-9  # chosen: far above the rounding of mission times, far below a
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class ReplyTurn:
     """What one packet does.
 
     Attributes:
@@ -37,15 +37,15 @@ class ReplyTurns:
         self._asked_s: dict[int, float] = {}
         self._open: set[int] = set()
 
-    def take(self, network_id: int, now_s: float) -> Turn:
+    def take(self, network_id: int, now_s: float) -> ReplyTurn:
         """Return what the packet does that is sent to this robot now, never before an earlier one."""
         asked_s = self._asked_s.get(network_id)
         if asked_s is not None and now_s < asked_s + self._every_s - INSTANT_S:
-            return Turn()
+            return ReplyTurn()
         is_lost = network_id in self._open
         self._asked_s[network_id] = now_s
         self._open.add(network_id)
-        return Turn(asks=True, is_lost=is_lost)
+        return ReplyTurn(asks=True, is_lost=is_lost)
 
     def heard(self, network_id: int) -> None:
         """Record a reply of this robot."""

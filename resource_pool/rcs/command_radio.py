@@ -128,18 +128,7 @@ class CommandRadio(ResourceController[RcParameters]):
         if order.answers:
             self._listen(order.network_id, component_of(asked.source))
         now_s = self.clock.now_s()
-        packet = Packet(
-            order.arc,
-            order.network_id,
-            order.payload,
-            order.safe_payload,
-            order.robot_epoch,
-            until_s=now_s + order.lasts_s if order.lasts_s > 0 else math.inf,
-            afterwards=order.afterwards,
-            kind=order.kind,
-            moves=order.moves,
-            robot_stop=order.robot_stop,
-        )
+        packet = _packet(order, now_s)
         if self._schedule.is_overtaken(packet):
             self.applied -= 1
             raise self._overtaken(packet)
@@ -296,3 +285,18 @@ class CommandRadio(ResourceController[RcParameters]):
         for news in self._schedule.sent(sending, begun_s, took_s):
             log.warning("%s: %s", packet.arc, news)
             self.publish_event(packet.arc, f"on {self.name}: {news}")
+
+
+def _packet(order: LoadPacket, now_s: float) -> Packet:
+    return Packet(
+        order.arc,
+        order.network_id,
+        order.payload,
+        order.safe_payload,
+        order.robot_epoch,
+        until_s=now_s + order.lasts_s if order.lasts_s > 0 else math.inf,
+        afterwards=order.afterwards,
+        kind=order.kind,
+        moves=order.moves,
+        robot_stop=order.robot_stop,
+    )

@@ -7,7 +7,7 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from resource_pool.drivers.reply_turns import ReplyTurns, Turn
+from resource_pool.drivers.reply_turns import ReplyTurn, ReplyTurns
 from resource_pool.link_watch import LOST_IN_A_ROW, LinkNews, LinkWatch
 from resource_pool.readings_book import EVERY_S, RECHARGED_SHARE, BatteryWatch, Charge, ReadingsBook
 
@@ -20,12 +20,12 @@ SHARES = st.floats(0, 1)
 steps = st.lists(st.tuples(st.sampled_from(["packet", "reply"]), ROBOTS, PAUSES), max_size=60)
 
 
-def played(history: list[tuple[str, int, float]]) -> list[tuple[float, int, str, Turn]]:
+def played(history: list[tuple[str, int, float]]) -> list[tuple[float, int, str, ReplyTurn]]:
     """Return what happened: time, robot, step, and for a packet its turn."""
     turns, now_s, found = ReplyTurns(0.5), 0.0, []
     for what, robot, pause_s in history:
         now_s += pause_s
-        turn = turns.take(robot, now_s) if what == "packet" else Turn()
+        turn = turns.take(robot, now_s) if what == "packet" else ReplyTurn()
         if what == "reply":
             turns.heard(robot)
         found.append((now_s, robot, what, turn))
@@ -61,7 +61,7 @@ def test_one_robots_turns_do_not_depend_on_the_others(history: list[tuple[str, i
         if who == robot:
             if what == "reply":
                 turns.heard(robot)
-            alone.append(turns.take(robot, now_s) if what == "packet" else Turn())
+            alone.append(turns.take(robot, now_s) if what == "packet" else ReplyTurn())
     assert alone == [turn for _, who, _, turn in played(history) if who == robot]
 
 

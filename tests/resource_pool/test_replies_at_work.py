@@ -16,11 +16,11 @@ from backbone.bus.clock import run_virtual
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from resource_pool.arc_client import ArcClient
+from resource_pool.arc_client import ArcClient, Readings, ask_readings, watch_readings
 from resource_pool.drivers.interface import DriverSite, ScoutReports
 from resource_pool.drivers.simulated import REPLY_EVERY_S, SimulatedScoutProtocol
 from resource_pool.drivers.world_messages import RadioPacket, ReplyOnAir
-from resource_pool.messages import AskReadings, Readings, Reply
+from resource_pool.messages import Reply
 from resource_pool.rcs.scout import Scout
 from resource_pool.simulated_world import SimulatedWorld
 from scout_model import radio_link
@@ -115,8 +115,8 @@ def said(events: list[StoryEvent]) -> list[tuple[LogLevel, str, str]]:
     return [(event.level, event.subject, event.what) for event in events if event.level is not LogLevel.INFO]
 
 
-async def asked(pool: Pool, rc: str = SCOUT1) -> Readings:
-    return await pool.voice_of("ui_console/ear").ask(rc, AskReadings(), Readings, within_s=1)
+async def asked(pool: Pool, rc: str = "scout1") -> Readings:
+    return await ask_readings(pool.voice_of("ui_console/ear"), rc)
 
 
 def counts(pool: Pool, rc: str) -> dict[str, float]:
@@ -140,7 +140,8 @@ def test_the_battery_falls_while_the_robot_drives_and_its_readings_come_twice_a_
     async def main() -> None:
         async with pool_in(local_mission, world_with(battery_j=20.0)) as pool:
             assert (await asked(pool)).at_s < 0
-            published = overhear(pool, SCOUT1, Conversation.READINGS, Readings)
+            published: list[Readings] = []
+            watch_readings(pool.voice_of("ui_console/ear"), published.append)
             times_s: list[float] = []
             pool.voice_of("ui_console/ear").subscribe(
                 SCOUT1, Conversation.READINGS, Readings, lambda heard: times_s.append(heard.stamp_s)
@@ -157,7 +158,7 @@ def test_the_battery_falls_while_the_robot_drives_and_its_readings_come_twice_a_
             newest = await asked(pool)
             assert newest.values["battery_share"] <= charges[-1]
             assert newest.at_s == pytest.approx(pool.clock.now_s(), abs=2 * REPLY_EVERY_S)
-            assert (await asked(pool, address(Subsystem.RESOURCE_POOL, "scout2"))).at_s < 0
+            assert (await asked(pool, "scout2")).at_s < 0
 
     run_virtual(main())
 
