@@ -68,6 +68,12 @@ class SilentProtocol:
             setattr(self, word, getattr(self._protocol, word))
 
 
+class ReportsNothing(Scout):
+    """A kind of robot without gauges."""
+
+    reports = None
+
+
 def world_with(battery_j: float | None = None, **air: Any) -> WorldDescription:
     scouts = [
         ScoutPlace("scout1", 1, 2.0, 2.0, 0.0, battery_j=battery_j),
@@ -311,6 +317,21 @@ def test_radio_or_protocol_without_replies_work_as_before(local_mission: Any, rc
             found = counts(pool, "radio")
             assert (found["replies"], found["replies_lost"]) == (0, 0)
             assert not said(events)
+
+    run_virtual(main())
+
+
+def test_a_robot_whose_kind_reports_nothing_is_never_asked(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, RCS) as pool:
+            packets = overhear(pool, AIR, Conversation.COMMAND, RadioPacket)
+            await pool.end("scout1")
+            given = {"network_id": 1, "links": {"command_radio": ["radio"]}}
+            await pool.start(ReportsNothing, "scout1", given, kind="scout")
+            await drive(pool, 2.0, await granted(pool))
+            assert packets
+            assert not any(packet.asks for packet in packets)
+            assert (await asked(pool)).values == {}
 
     run_virtual(main())
 
