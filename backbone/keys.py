@@ -24,6 +24,8 @@ class Conversation(StrEnum):
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
     TELEMETRY = "telemetry"  # applied commands, measures, overruns
+    REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
+    READINGS = "readings"  # what the hardware measures, by name
     FRAMES = "frames"  # pictures
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each

@@ -38,6 +38,7 @@ from resource_pool.messages import (
     GiveCommand,
     NoSuchAction,
     Noted,
+    Readings,
     Release,
     Resumed,
     SliceEnds,
@@ -48,6 +49,7 @@ from resource_pool.messages import (
     WantLonger,
     WantRuntime,
 )
+from resource_pool.rc_readings import ask_readings, watch_readings
 from resource_pool.robot_stops import ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
@@ -72,6 +74,7 @@ __all__ = [
     "OtherStop",
     "PathNode",
     "Pose",
+    "Readings",
     "Resumed",
     "SliceEnds",
     "StopState",
@@ -81,11 +84,13 @@ __all__ = [
     "SwappedOut",
     "Usage",
     "arc_name",
+    "ask_readings",
     "ask_stop",
     "claim_parameters",
     "lift_stop",
     "notice_arc",
     "stop_robot",
+    "watch_readings",
     "watch_stops",
 ]
 

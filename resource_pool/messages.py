@@ -2,7 +2,8 @@
 
 * decision process → ARC: ``ArcQuestion``, and the commands of its kind (``commands``); ARC → decision process:
   ``ArcNotice``.
-* robot RC → command radio RC: ``LoadPacket``.
+* robot RC → command radio RC: ``LoadPacket``; command radio RC → robot RCs: ``Reply``, published.
+* robot RC → everybody: ``Readings``, published when they change, and the answer to ``AskReadings``.
 * framegrabber RC → subscribers of its ARC: ``Frame``, published under the ARC's address.
 """
 
@@ -204,7 +205,7 @@ ArcNotice = Resumed | SliceEnds | Suspending | Suspended | AskBeat
 
 
 # ---------------------------------------------------------------------- ARC → RCs
-class LoadPacket(Message, frozen=True):
+class LoadPacket(Message, frozen=True, tag="LoadPacket/2"):
     """Send this packet. Robot RCs ask this under the radio's grant to their ARC.
 
     Attributes:
@@ -222,6 +223,7 @@ class LoadPacket(Message, frozen=True):
         kind: Kind of its stream; the ARC's first stream if the ARC has none of this kind.
         moves: True: it moves the robot, and is not sent after a packet of a later stop was loaded.
         robot_stop: Number of the robot's last stop when the packet was made.
+        answers: True: the robot's replies can be read, so the radio asks for them, if it can.
     """
 
     arc: Mention
@@ -236,10 +238,41 @@ class LoadPacket(Message, frozen=True):
     kind: Mention = "drive"
     moves: bool = False
     robot_stop: Count = 0
+    answers: bool = False
 
 
 class PacketLoaded(Message, frozen=True):
     """Answer to ``LoadPacket``: the packet is loaded, and sent if ``at_once``."""
+
+
+class Reply(Message, frozen=True):
+    """A robot's reply, published under the address of the radio that heard it.
+
+    Attributes:
+        network_id: Network id of the robot.
+        payload: Bytes of the robot's own protocol.
+    """
+
+    network_id: Count
+    payload: Payload
+
+
+class AskReadings(Message, frozen=True):
+    """Ask an RC for its newest readings."""
+
+
+class Readings(Message, frozen=True):
+    """What the hardware of an RC measured last.
+
+    Attributes:
+        rc: The RC.
+        at_s: Mission time at which the RC got them; negative: never.
+        values: Field of the RC's ``reports`` → number or flag.
+    """
+
+    rc: Mention
+    at_s: Instant
+    values: Annotated[dict[Mention, Measure | bool], FEW] = {}
 
 
 class NothingHeard(Message, frozen=True):

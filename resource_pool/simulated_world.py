@@ -1,4 +1,4 @@
-"""The simulated world as hardware: radio packets in, states of all bodies out.
+"""The simulated world as hardware: radio packets in, replies and states of all bodies out.
 
 It steps physics at the mission's pace and never skips a step. After a short delay it catches up. After a longer pause
 the world's time has not advanced, because robots would get no packet while it catches up, and stop by themselves.
@@ -6,6 +6,8 @@ Other processes draw pictures from the state that it publishes once a frame.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import msgspec
 
@@ -15,12 +17,22 @@ from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.world_messages import AskPose, AskWorld, ClockTick, Pose, RadioPacket, WorldModel, WorldState
+from resource_pool.drivers.world_messages import (
+    AskPose,
+    AskWorld,
+    ClockTick,
+    Pose,
+    RadioPacket,
+    ReplyOnAir,
+    WorldModel,
+    WorldState,
+)
 from scout_model.air import antenna_m, distance_m
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.errors import UnknownBody
 from scout_model.radio_air import RadioAir, Sent
+from scout_model.radio_link import packet_bits
 from scout_model.world import World
 
 AWAY_S = 0.1  # chosen: three frames; with the usual pause between packets well below a robot's limit of silence
@@ -52,6 +64,7 @@ class SimulatedWorld(Component[WorldParameters]):
         self._world = World(described)
         self._antenna_m = antenna_m(described.air, described.width_m, described.depth_m)
         self._air = RadioAir(described.seed, described.air)
+        self._replies = RadioAir(described.seed, described.air, "reply to ")
         self._robots = {scout.network_id: scout.name for scout in described.robots}
         self._on_since: dict[str, tuple[str, int]] = {}
         self._epochs: dict[int, int] = {}
@@ -79,8 +92,13 @@ class SimulatedWorld(Component[WorldParameters]):
             await self.clock.sleep_until_s(due_s)
             for packet in self._air.arrived(due_s):
                 self._world.hear(packet.network_id, packet.payload)
+                if packet.asks:
+                    self._reply(packet, due_s)
             self._world.step_frame()
             self._publish(frame, due_s)
+            for reply in self._replies.arrived(due_s):
+                on_air = ReplyOnAir(reply.radio, reply.network_id, reply.payload, reply.number)
+                self.bus.publish(self.address, Conversation.REPLIES, on_air)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``AskWorld`` and ``AskPose``."""
@@ -104,6 +122,8 @@ class SimulatedWorld(Component[WorldParameters]):
             "packets": self._packets,
             "packets_lost": sum(lost.values()),
             "packets_for_no_robot": self._air.for_no_robot,
+            "replies_delivered": sum(self._replies.delivered.values()),
+            "replies_lost": sum(self._replies.lost.values()),
             **{f"packets_lost_{name}": lost.get(network_id, 0) for network_id, name in self._robots.items()},
             **{f"packets_delivered_{name}": delivered.get(network_id, 0) for network_id, name in self._robots.items()},
             "stale_packets": self._stale,
@@ -122,12 +142,28 @@ class SimulatedWorld(Component[WorldParameters]):
             self.story.note(packet.arc, f"sent robot {packet.network_id} a packet of the past epoch {packet.epoch}")
         self._epochs[packet.network_id] = max(packet.epoch, self._epochs.get(packet.network_id, 0))
         self._audit_stops(packet)
-        robot = self._robots.get(packet.network_id)
-        away_m = None if robot is None else distance_m(self._world.position_m(robot), self._antenna_m)
         sent = Sent(
-            packet.radio, packet.number, packet.network_id, packet.payload, self.clock.now_s(), packet.air_time_s
+            packet.radio,
+            packet.number,
+            packet.network_id,
+            packet.payload,
+            self.clock.now_s(),
+            packet.air_time_s,
+            packet.asks,
         )
-        self._air.send(sent, away_m)
+        self._air.send(sent, self._away_m(packet.network_id))
+
+    def _reply(self, asked: Sent, now_s: float) -> None:
+        """Put the robot's reply, if it has one, on the air at the rate of the packet that asked."""
+        payload = self._world.reply(asked.network_id)
+        if payload:
+            air_time_s = asked.air_time_s * packet_bits(payload) / packet_bits(asked.payload)
+            reply = replace(asked, payload=payload, begun_s=now_s, air_time_s=air_time_s)
+            self._replies.send(reply, self._away_m(asked.network_id))
+
+    def _away_m(self, network_id: int) -> float | None:
+        robot = self._robots.get(network_id)
+        return None if robot is None else distance_m(self._world.position_m(robot), self._antenna_m)
 
     def _audit_stops(self, packet: RadioPacket) -> None:
         last, now = self._stops.get(packet.network_id, (0, 0)), (packet.epoch, packet.robot_stop)

@@ -104,6 +104,7 @@ class RobotPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         heading_rad: Where its camera looks.
         kind: Class path ``package.module:Class`` of its kind, a ``scout_model.robot.Robot``.
         carried_by: Target of shape ``carrier`` that brings it and sets it down at this place; empty: it stands there.
+        battery_j: Capacity of its battery, full at the beginning; None: as its kind has it.
     """
 
     name: str
@@ -113,6 +114,7 @@ class RobotPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     heading_rad: float
     kind: str = SCOUT
     carried_by: str = ""
+    battery_j: float | None = None
 
 
 class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

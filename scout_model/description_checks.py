@@ -47,6 +47,8 @@ def check(description: WorldDescription) -> None:
         if not (0 < place.x_m < width_m and 0 < place.y_m < depth_m and math.isfinite(place.heading_rad)):
             raise InvalidWorld(f"{place.name} at ({place.x_m}, {place.y_m}) m is not in the room")
         robot_class(place.kind)
+        if place.battery_j is not None and not 0 < place.battery_j < math.inf:
+            raise InvalidWorld(f"{place.name} with a battery of {place.battery_j} J")
     for dark in description.dark_places:
         _check_extents(dark.name, (dark.width_m, dark.depth_m, dark.height_m), dark.x_m, dark.y_m)
     for furniture in description.furniture:

@@ -2,7 +2,8 @@
 
 A packet arrives whole or not at all.  It is lost with a probability that grows with its length and the
 robot's distance.  Whether it is depends on seed, radio and the packet's number alone, so a packet more
-or less on one radio changes the fate of none on another.
+or less on one radio changes the fate of none on another.  Replies of robots fly in an air of
+their own, with other dice: a reply changes the fate of no packet.
 
 IROS 2001, section 2: each robot has a network id of its own, which lets one radio serve many.
 """
@@ -33,6 +34,7 @@ class Sent:
         payload: As ``scout_model.radio_link`` encodes it.
         begun_s: When its first bit was sent.
         air_time_s: How long its bits take, 0 or more.
+        asks: Whether it asks its robot for a reply.
     """
 
     radio: str
@@ -41,17 +43,19 @@ class Sent:
     payload: bytes
     begun_s: float
     air_time_s: float
+    asks: bool = False
 
 
 class RadioAir:
-    """Packets between the base's antenna and the robots.
+    """Packets between the base's antenna and the robots, one way.
 
     Args:
         air: Delays and losses of packets.
+        way: Name of the way, which gives it dice of its own; empty: to the robots.
     """
 
-    def __init__(self, seed: int, air: AirDescription) -> None:
-        self._seed, self._air = abs(seed), air
+    def __init__(self, seed: int, air: AirDescription, way: str = "") -> None:
+        self._seed, self._air, self._way = abs(seed), air, way
         self._flying: list[tuple[float, int, Sent]] = []
         self._order = itertools.count()
         self._delivered: Counter[int] = Counter()
@@ -98,5 +102,5 @@ class RadioAir:
         lost = 1.0 - (1.0 - by_distance) * (1.0 - self._air.radio_loss)
         if lost == 0.0:
             return False
-        dice = np.random.default_rng((self._seed, key_of(sent.radio), sent.number))
+        dice = np.random.default_rng((self._seed, key_of(self._way + sent.radio), sent.number))
         return bool(dice.random() < lost)

@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
+from scout_model.battery import Battery
 from scout_model.errors import InvalidWorld
 
 _PARTS = ("body_mjcf", "frequency", "motors", "hear", "controls", "counts")
@@ -64,6 +65,13 @@ class AnsweringRobot(Robot, Protocol):
 
     def reply(self, now_s: float) -> bytes:
         """Return its answer to the packets it heard since its last answer; empty: nothing to say."""
+
+
+@runtime_checkable
+class PoweredRobot(Robot, Protocol):
+    """A robot that lives on a battery, which a world may replace by one of another capacity before its first frame."""
+
+    battery: Battery
 
 
 def robot_class(kind: str) -> type[Robot]:

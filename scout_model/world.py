@@ -17,13 +17,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scout_model.battery import Battery
 from scout_model.carrier import CarriedPose, trips
 from scout_model.composition import compose
-from scout_model.description import WorldDescription
+from scout_model.description import RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.readings import Senses
-from scout_model.robot import AnsweringRobot, Robot, robot_class
+from scout_model.robot import AnsweringRobot, PoweredRobot, Robot, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
 from scout_model.targets import Route, TargetState, part_poses, parts
 
@@ -76,7 +77,7 @@ class World:
         self.frame = 0
         """Frames stepped so far."""
         self._step = 0
-        self._robots = {place.name: self._body(place.name, place.kind) for place in description.robots}
+        self._robots = {place.name: self._body(place) for place in description.robots}
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.robots}
         self._trips = trips(description)
         self._carried = {place.name: self._trips[place.carried_by] for place in description.robots if place.carried_by}
@@ -271,7 +272,8 @@ class World:
             raise UnknownBody(f"no Scout named {name!r}")
         return program
 
-    def _body(self, name: str, kind: str) -> _Body:
+    def _body(self, place: RobotPlace) -> _Body:
+        name, kind = place.name, place.kind
         model, prefix = self._model, f"{name}/"
         names = {actuator: model.actuator(actuator).name for actuator in range(model.nu)}
         free = model.joint(f"{name}/free")
@@ -285,6 +287,8 @@ class World:
         last_position = int(model.jnt_qposadr[last]) + _POSITIONS[int(model.jnt_type[last])]
         last_velocity = int(model.jnt_dofadr[last]) + _VELOCITIES[int(model.jnt_type[last])]
         program = robot_class(kind)()
+        if place.battery_j is not None:
+            _fit_battery(program, place.battery_j, kind)
         return _Body(
             kind=kind,
             program=program,
@@ -350,6 +354,12 @@ class World:
                 del self._carried[name]
             else:
                 self._data.qpos[body.free : body.free + 7] = _free_position(held)
+
+
+def _fit_battery(program: Robot, battery_j: float, kind: str) -> None:
+    if not isinstance(program, PoweredRobot):
+        raise InvalidWorld(f"{kind} has no battery, so none of {battery_j:g} J")
+    program.battery = Battery(battery_j)
 
 
 def _free_position(held: CarriedPose) -> list[float]:

@@ -7,16 +7,18 @@ driver: one of ``BUILT_IN`` for its kind, or ``package.module:Class``.
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Annotated, Any, Protocol, TypeVar, runtime_checkable
 
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import WrongParameter
 from backbone.errors import Refusal
+from backbone.ranges import Share
 
 Options = TypeVar("Options", bound=msgspec.Struct)
 
@@ -93,6 +95,19 @@ class RadioDriver(Protocol):
 
 
 @runtime_checkable
+class AnsweringRadio(Protocol):
+    """A radio on which robots reply."""
+
+    def hear(self, network_id: int, heard: Callable[[bytes], None]) -> None:
+        """Ask this robot for replies with packets that are sent to it anyway, from the next one on.
+
+        When: once for each robot whose protocol reads replies. What: call ``heard``, in the event loop, with each
+        reply, and with no bytes if the robot was asked and did not reply in time. Add the time of a reply on the air to
+        what ``transmit`` returns for the packet that asks.
+        """
+
+
+@runtime_checkable
 class AdjustableDriver(Protocol):
     """A driver that can apply changed options and parameters of its RC while it runs."""
 
@@ -154,6 +169,39 @@ class RobotProtocol(Protocol):
 
     def safe(self) -> bytes:
         """Return the packet after which the robot neither moves nor transmits."""
+
+
+class MalformedReply(Refusal):
+    """The bytes are no reply of this kind of robot."""
+
+    code = "driver.malformed_reply"
+    remedy = "Check that robot and protocol are of one kind, and that no two robots have the same network id."
+
+
+@runtime_checkable
+class ReplyReader(Protocol):
+    """A robot's protocol that reads the robot's replies."""
+
+    def read(self, payload: bytes) -> msgspec.Struct:
+        """Return the reply as the struct that the RC's class declares in ``reports``.
+
+        Raises:
+            MalformedReply: The bytes are none.
+        """
+
+
+class ScoutReports(msgspec.Struct, frozen=True):
+    """State of a Scout.
+
+    Attributes:
+        battery_share: Charge of its battery, 0 to 1.
+        tilt_rad: Angle between its upper side and the vertical; pi: it lies on its back.
+        motor_load_share: How hard its motors work, 0 to 1.
+    """
+
+    battery_share: Share
+    tilt_rad: Annotated[float, msgspec.Meta(ge=0, le=math.pi)]
+    motor_load_share: Share
 
 
 class ScoutProtocol(RobotProtocol, Protocol):

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from typing import Annotated
 
 import msgspec
 
+from backbone.bus.interface import Subscription
 from backbone.component.asking import ask_until_answered
 from backbone.errors import LinkError
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from resource_pool.drivers.interface import DriverSite, HardwareFault
-from resource_pool.drivers.world_messages import AskWorld, RadioPacket, WorldModel
+from backbone.wire import Envelope
+from resource_pool.drivers.interface import DriverSite, HardwareFault, MalformedReply, ScoutReports
+from resource_pool.drivers.reply_turns import ReplyTurns
+from resource_pool.drivers.world_messages import AskWorld, RadioPacket, ReplyOnAir, WorldModel
 from scout_model import radio_link
 from scout_model.errors import MalformedPacket
 from scout_model.scout import clip_wheel_speed
 
+REPLY_EVERY_S = 0.5  # chosen: a person reads a gauge no faster; mission seconds, on a faster clock machine seconds
+FIRST_REPLY_BITS = radio_link.packet_bits(bytes(4))  # chosen: a Scout's; afterwards the robot's last reply is known
 WORLD_START_S = 20.0  # chosen: the world compiles its model before it answers
 
 
@@ -58,6 +64,10 @@ class SimulatedRadio:
         self._site, self._world = site, world_of(site)
         self._bits_per_s = site.options(RadioOptions).bits_per_s
         self._numbers = itertools.count()
+        self._turns = ReplyTurns(REPLY_EVERY_S * max(1.0, site.clock.rate))
+        self._hearing: dict[int, Callable[[bytes], None]] = {}
+        self._reply_bits: dict[int, int] = {}
+        self._replies: Subscription | None = None
 
     def adjust(self, site: DriverSite) -> None:
         """Send at the new rate from the next packet on."""
@@ -69,8 +79,12 @@ class SimulatedRadio:
     async def transmit(
         self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
     ) -> float | None:
-        """Send the packet without an acknowledgment, as on the air. Return the duration of its bytes."""
+        """Send the packet without an acknowledgment, as on the air.
+
+        Return the duration of its bytes, and of a reply as long as the robot's last one if it asks for one.
+        """
         air_time_s = radio_link.packet_bits(payload) / self._bits_per_s
+        asks = network_id in self._hearing and self._ask(network_id)
         packet = RadioPacket(
             self._site.resource,
             network_id,
@@ -80,12 +94,37 @@ class SimulatedRadio:
             number=next(self._numbers),
             air_time_s=air_time_s,
             robot_stop=robot_stop,
+            asks=asks,
         )
         self._site.bus.publish(self._world, Conversation.COMMAND, packet)
-        return air_time_s
+        reply_bits = self._reply_bits.get(network_id, FIRST_REPLY_BITS) if asks else 0
+        return air_time_s + reply_bits / self._bits_per_s
+
+    def hear(self, network_id: int, heard: Callable[[bytes], None]) -> None:
+        """Ask this robot for a reply each ``REPLY_EVERY_S``; one that has not come by then is lost."""
+        self._hearing[network_id] = heard
+        if self._replies is None:
+            self._replies = self._site.bus.subscribe(self._world, Conversation.REPLIES, ReplyOnAir, self._heard)
 
     async def close(self) -> None:
-        """Do nothing: no device is open."""
+        """Hear no more replies."""
+        if self._replies is not None:
+            self._replies.close()
+
+    def _ask(self, network_id: int) -> bool:
+        turn = self._turns.take(network_id, self._site.clock.now_s())
+        if turn.is_lost:
+            self._hearing[network_id](b"")
+        return turn.asks
+
+    def _heard(self, envelope: Envelope[ReplyOnAir]) -> None:
+        reply = envelope.body
+        heard = self._hearing.get(reply.network_id)
+        if heard is None or reply.radio != self._site.resource or not reply.payload:
+            return
+        self._turns.heard(reply.network_id)
+        self._reply_bits[reply.network_id] = radio_link.packet_bits(reply.payload)
+        heard(reply.payload)
 
 
 class SimulatedScoutProtocol:
@@ -122,3 +161,11 @@ class SimulatedScoutProtocol:
     def safe(self) -> bytes:
         """Return the packet after which the Scout neither moves nor transmits."""
         return radio_link.encode_safe()
+
+    def read(self, payload: bytes) -> ScoutReports:
+        """Return a Scout's reply; see ``ReplyReader``."""
+        try:
+            reply = radio_link.decode_reply(payload)
+        except MalformedPacket as error:
+            raise MalformedReply(f"{self._site.resource}: {error}") from error
+        return ScoutReports(reply.battery, reply.tilt_rad, reply.load)

@@ -24,7 +24,7 @@ from backbone.wire import Message
 from scout_model.description import AirDescription
 
 
-class RadioPacket(Message, frozen=True):
+class RadioPacket(Message, frozen=True, tag="RadioPacket/2"):
     """A packet on the air: published under the world's address as a command, without an acknowledgment.
 
     Attributes:
@@ -36,6 +36,7 @@ class RadioPacket(Message, frozen=True):
         number: Its number among the packets of its radio since the radio was opened.
         air_time_s: Duration of its bits.
         robot_stop: For the audit: number of the robot's last stop when the payload was made.
+        asks: True: the robot shall reply.
     """
 
     radio: Mention
@@ -46,6 +47,23 @@ class RadioPacket(Message, frozen=True):
     number: Count = 0
     air_time_s: Duration = 0.0
     robot_stop: Count = 0
+    asks: bool = False
+
+
+class ReplyOnAir(Message, frozen=True):
+    """A robot's reply on the air: published under the world's address when it has arrived at the base.
+
+    Attributes:
+        radio: The radio that asked.
+        network_id: Network id of the robot.
+        payload: Bytes of the robot's protocol.
+        number: Number of the packet that asked.
+    """
+
+    radio: Mention
+    network_id: Count
+    payload: Payload
+    number: Count
 
 
 class AskWorld(Message, frozen=True):

@@ -5,6 +5,7 @@ Rules of this file:
 * One packet at a time is on the air, and each keeps it for its packet time, or longer if it takes longer.
 * All packets but safe packets are sent in admitted turns. If an ARC declared too little time, the radio logs it.
 * The last packet to each robot of an ARC is its safe packet. The radio repeats a failed safe packet until it is sent.
+* A reply is published as it came; three lost in a row are one warning, the next reply one notice.
 * If the radio fails while it serves its streams, this RC ends; its creator restarts it and it opens the device again.
 
 Source: IROS 2001, section 4.3; RAM 2002, "Sharable Resources".
@@ -13,6 +14,7 @@ Source: IROS 2001, section 4.3; RAM 2002, "Sharable Resources".
 from __future__ import annotations
 
 import asyncio
+import functools
 import itertools
 import logging
 import math
@@ -21,13 +23,16 @@ from dataclasses import dataclass, replace
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
+from backbone.keys import Conversation
 from backbone.naming import Subsystem, address, component_of
 from backbone.rc_manager.messages import StaleEpoch
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import HardwareFault, RadioDriver
+from resource_pool.drivers.interface import AnsweringRadio, HardwareFault, RadioDriver
 from resource_pool.holds import Hold
+from resource_pool.link_watch import LinkNews, LinkWatch
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     DEFAULT_DRIVE_USAGE,
@@ -35,6 +40,7 @@ from resource_pool.messages import (
     LoadPacket,
     NoTurnSoon,
     PacketLoaded,
+    Reply,
 )
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
 from resource_pool.resource_controller import RcParameters, ResourceController
@@ -72,7 +78,8 @@ class CommandRadio(ResourceController[RcParameters]):
         self._tickets = itertools.count(1)
         self._waiting: dict[int, _Once] = {}
         self._overruns = self._sent = 0
-        self._worst_packet_s = 0.0
+        self._worst_packet_s = self._on_air_s = 0.0
+        self._links = LinkWatch()
 
     async def connect(self) -> None:
         """Open the device."""
@@ -118,19 +125,10 @@ class CommandRadio(ResourceController[RcParameters]):
         if not isinstance(order, LoadPacket):
             return await super().command(asked)
         self.admit(order.arc, order.epoch)
+        if order.answers:
+            self._listen(order.network_id, component_of(asked.source))
         now_s = self.clock.now_s()
-        packet = Packet(
-            order.arc,
-            order.network_id,
-            order.payload,
-            order.safe_payload,
-            order.robot_epoch,
-            until_s=now_s + order.lasts_s if order.lasts_s > 0 else math.inf,
-            afterwards=order.afterwards,
-            kind=order.kind,
-            moves=order.moves,
-            robot_stop=order.robot_stop,
-        )
+        packet = _packet(order, now_s)
         if self._schedule.is_overtaken(packet):
             self.applied -= 1
             raise self._overtaken(packet)
@@ -159,7 +157,7 @@ class CommandRadio(ResourceController[RcParameters]):
         )
 
     def statistics(self) -> dict[str, float]:
-        """Count packets and overruns, in all and of the ARCs now connected, and measure packet times."""
+        """Count packets, overruns and replies, in all and of the ARCs now connected, and measure times on the air."""
         counts = self._schedule.counts()
         late = {f"overruns_{arc}": float(count.overruns) for arc, count in counts.items()}
         worst = {f"worst_packet_s_{arc}": count.worst_packet_s for arc, count in counts.items()}
@@ -168,6 +166,8 @@ class CommandRadio(ResourceController[RcParameters]):
             "packets_sent": self._sent,
             "overruns": self._overruns + sum(count.overruns for count in counts.values()),
             "worst_packet_s": self._worst_packet_s,
+            "on_air_s": self._on_air_s,
+            **self._links.counts(),
             **late,
             **worst,
         }
@@ -211,6 +211,20 @@ class CommandRadio(ResourceController[RcParameters]):
             waiting.on_air.set_result(None)
         else:
             waiting.on_air.set_exception(fault)
+
+    def _listen(self, network_id: int, robot: str) -> None:
+        """Hear this robot's replies, if the radio can."""
+        if isinstance(self._driver, AnsweringRadio) and self._links.add(network_id, robot):
+            self._driver.hear(network_id, functools.partial(self._heard, network_id))
+
+    def _heard(self, network_id: int, payload: bytes) -> None:
+        """Publish a reply, or count one that is lost if there are no bytes."""
+        if payload:
+            self.bus.publish(self.address, Conversation.REPLIES, Reply(network_id, payload))
+        news = self._links.heard(network_id) if payload else self._links.lost(network_id)
+        if news is not LinkNews.NONE:
+            level = LogLevel.WARNING if news is LinkNews.SILENT else LogLevel.NOTICE
+            self.publish_event(self._links.name_of(network_id), f"{news.value} on {self.name}", level)
 
     async def _send_when_due(self) -> None:
         while True:
@@ -266,7 +280,23 @@ class CommandRadio(ResourceController[RcParameters]):
         took_s = self.clock.now_s() - begun_s if reported_s is None else reported_s
         self._air_free_s = max(self._air_free_s, begun_s + took_s)
         self._sent += 1
+        self._on_air_s += took_s
         self._worst_packet_s = max(self._worst_packet_s, took_s)
         for news in self._schedule.sent(sending, begun_s, took_s):
             log.warning("%s: %s", packet.arc, news)
             self.publish_event(packet.arc, f"on {self.name}: {news}")
+
+
+def _packet(order: LoadPacket, now_s: float) -> Packet:
+    return Packet(
+        order.arc,
+        order.network_id,
+        order.payload,
+        order.safe_payload,
+        order.robot_epoch,
+        until_s=now_s + order.lasts_s if order.lasts_s > 0 else math.inf,
+        afterwards=order.afterwards,
+        kind=order.kind,
+        moves=order.moves,
+        robot_stop=order.robot_stop,
+    )

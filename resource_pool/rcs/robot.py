@@ -9,10 +9,11 @@ Source: IROS 2001, section 2; RAM 2002, "Robots for Surveillance and Reconnaissa
 from __future__ import annotations
 
 import asyncio
+import functools
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -25,10 +26,11 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
 from resource_pool.commands import Command, Halt, SwitchTransmitter
-from resource_pool.drivers.interface import RobotProtocol
+from resource_pool.drivers.interface import ReplyReader, RobotProtocol
 from resource_pool.holds import Hold
-from resource_pool.messages import COMMAND_TIMEOUT_S, LoadPacket, NotFromYou, PacketLoaded
+from resource_pool.messages import COMMAND_TIMEOUT_S, AskReadings, LoadPacket, NotFromYou, PacketLoaded
 from resource_pool.resource_controller import RcParameters, ResourceController
+from resource_pool.robot_reports import RobotReports
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop, EmergencyQuestion, EmergencyStop, GivenBeforeStop, LiftStop, StopState
 
@@ -46,10 +48,12 @@ class RobotParameters(RcParameters, frozen=True, kw_only=True):
     Attributes:
         network_id: Its address on the command radio, 1 to 254.
         protocol: Name of the driver that encodes its packets; empty: the name in ``driver``.
+        battery_alarm_share: Charge of its battery below which there is an alarm, 0 to 0.9; 0: no alarm.
     """
 
     network_id: int
     protocol: str = ""
+    battery_alarm_share: Annotated[float, msgspec.Meta(ge=0, le=0.9)] = 0.2
 
 
 class NoRadio(Refusal):
@@ -65,7 +69,8 @@ P = TypeVar("P", bound=RobotParameters)
 class Robot(ResourceController[P], Generic[P]):
     """Encodes commands as packets of the robot's protocol; the radio sends them at the ARC's rate.
 
-    Derive, set ``commands`` and override ``obey``; a command with ``moves`` reaches it only while no stop is in force.
+    Derive, set ``commands``, and ``reports`` if the protocol is a ``ReplyReader``, and override ``obey``; a command
+    with ``moves`` reaches it only while no stop is in force.
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RobotParameters
@@ -74,7 +79,8 @@ class Robot(ResourceController[P], Generic[P]):
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        cls.accepts = cls.accepts | EmergencyQuestion if cls.accepts is not None else EmergencyQuestion
+        own = EmergencyQuestion | AskReadings
+        cls.accepts = cls.accepts | own if cls.accepts is not None else own
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -87,12 +93,27 @@ class Robot(ResourceController[P], Generic[P]):
         self._timeouts = 0
         self._stop_file = Path(launch.run_directory) / "stops" / self.name if launch.run_directory else None
         self._latch = StopLatch(self.name, _read_stop(self._stop_file))
+        self._reports = RobotReports(
+            self.name,
+            bus,
+            clock,
+            self._protocol if isinstance(self._protocol, ReplyReader) and self.reports is not None else None,
+            alarm_share=self.parameters.battery_alarm_share,
+            say=functools.partial(self.publish_event, self.name),
+        )
+
+    async def connect(self) -> None:
+        """Hear the robot's replies, too."""
+        await super().connect()
+        if self._radio:
+            self._reports.listen(address(Subsystem.RESOURCE_POOL, self._radio), self.parameters.network_id)
 
     async def serve(self) -> None:
         """Stop the wheels when no command comes, and end the hold when its lease expires."""
         if self._latch.state.is_stopped:
             self._tell_stop(self._latch.state, "is still stopped")
         self.start_task(self._halt_when_silent(), "dead man")
+        self.start_task(self._reports.publish_when_due(), "readings")
         await super().serve()
 
     async def connected(self, hold: Hold) -> None:
@@ -108,6 +129,8 @@ class Robot(ResourceController[P], Generic[P]):
         match asked.body:
             case AskStop():
                 return self._latch.state
+            case AskReadings():
+                return self._reports.readings()
             case EmergencyStop() | LiftStop() if not asked.source.startswith(OPERATORS):
                 self.refused_strangers += 1
                 self.story.note(self.name, f"{asked.source} was refused: {type(asked.body).__name__}")
@@ -172,9 +195,10 @@ class Robot(ResourceController[P], Generic[P]):
         self._stands(hold)
 
     def statistics(self) -> dict[str, float]:
-        """Count halts for lack of commands, and emergency stops, too."""
+        """Count halts for lack of commands, emergency stops, and replies, too."""
         stops = float(self._latch.state.number)
-        return {**super().statistics(), "command_timeouts": self._timeouts, "emergency_stops": stops}
+        own = {"command_timeouts": self._timeouts, "emergency_stops": stops}
+        return {**super().statistics(), **own, **self._reports.statistics()}
 
     async def _stop_now(self, by: str, reason: str, console: str) -> StopState:
         """Refuse all further motion, and stop the wheels if a holder may be turning them."""
@@ -266,6 +290,7 @@ class Robot(ResourceController[P], Generic[P]):
             kind,
             moves,
             self._latch.state.number,
+            self._reports.are_read,
         )
         radio = address(Subsystem.RESOURCE_POOL, self._radio)
         await self.bus.ask(radio, order, PacketLoaded, within_s=RADIO_REPLY_S)

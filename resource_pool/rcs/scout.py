@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from backbone.errors import Refusal
 from resource_pool.commands import Command, Drive, Halt, Jump, Move, SwitchTransmitter
-from resource_pool.drivers.interface import ScoutProtocol
+from resource_pool.drivers.interface import ScoutProtocol, ScoutReports
 from resource_pool.holds import Hold
 from resource_pool.rcs.robot import Robot, RobotParameters
 from scout_model.dimensions import TRACK_M, WHEEL_RADIUS_M, WHEEL_SPEED_LIMIT_RAD_S
@@ -33,6 +33,7 @@ class Scout(Robot[RobotParameters]):
 
     body_class = "scout_model.scout:Scout"
     commands = Move | Drive | Halt | Jump | SwitchTransmitter
+    reports = ScoutReports
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {
         "forward_m_s": (-MOST_M_S, MOST_M_S),
         "turn_rad_s": (-MOST_TURN_RAD_S, MOST_TURN_RAD_S),

@@ -19,6 +19,7 @@ from resource_pool.drivers.interface import DriverSite, Picture, UnknownDriver
 from resource_pool.messages import NeedsRestart
 from resource_pool.rcs.framegrabber import Framegrabber
 from resource_pool.rcs.video_frequency import VideoFrequency
+from scout_model.radio_link import ScoutReply, encode_drive, encode_reply, packet_bits
 
 
 class PatientGrabber:
@@ -116,10 +117,15 @@ def test_the_radio_sends_at_its_new_rate_from_the_next_packet_on(local_mission: 
             arc = await pool.arc(await pool.owner("watcher"), "drive", "scout1")
             await arc.wait_granted()
             await arc.drive(1.0, 1.0)
-            fast_s = pool.running["radio"].statistics()["worst_packet_s"]
+            drive, reply = encode_drive(1.0, 1.0), encode_reply(ScoutReply(1.0, 0.0, 0.0))
+            fast_s = (packet_bits(drive) + packet_bits(reply)) / 115200
+            assert pool.running["radio"].statistics()["worst_packet_s"] == pytest.approx(fast_s)
             await set_parameter(pool, "radio", "options", {"bits_per_s": 57600})
             await arc.drive(1.0, 1.0)
-            await pool.clock.sleep_s(0.2)
+            await pool.clock.sleep_s(0.2)  # in which no packet asks for a reply
+            assert pool.running["radio"].statistics()["worst_packet_s"] == pytest.approx(packet_bits(drive) / 57600)
+            await arc.drive(1.0, 1.0)
+            await pool.clock.sleep_s(0.4)
             assert pool.running["radio"].statistics()["worst_packet_s"] == pytest.approx(2 * fast_s)
             with pytest.raises(WrongParameter):
                 await set_parameter(pool, "radio", "options", {"baud": 9600})

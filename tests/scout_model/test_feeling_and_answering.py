@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from scout_model import dimensions, radio_link
 from scout_model.battery import Battery
 from scout_model.description import RobotPlace, WorldDescription
+from scout_model.errors import InvalidWorld
 from scout_model.inclinometer import SMOOTHING_S, Inclinometer
-from scout_model.robot import AnsweringRobot, FeelingRobot, Robot
+from scout_model.robot import AnsweringRobot, FeelingRobot, PoweredRobot, Robot
 from scout_model.scout import Scout, Spring
 from scout_model.world import World
 
@@ -229,6 +230,30 @@ def test_no_experiment_lasts_as_long_as_the_shipped_battery() -> None:
     scout = Scout()
     run(scout, 0.0, 0.1, radio_link.encode_transmitter_on("video1"))
     assert scout.battery.share(24 * 3600.0) > 0.8
+
+
+def test_a_body_has_the_battery_that_the_world_gives_it() -> None:
+    small, own = RobotPlace("small", 2, 5.0, 3.0, 0.0, battery_j=40.0), RobotPlace("own", 3, 7.0, 3.0, 0.0)
+    room = scouts(small, own)
+    assert isinstance(Scout(), PoweredRobot)
+    for network_id, capacity_j in ((2, 40.0), (3, dimensions.BATTERY_J)):
+        for _ in range(90):
+            room.hear(network_id, radio_link.encode_transmitter_on("video1"))
+            room.step_frame()
+        drawn_j = 3.0 * (dimensions.IDLE_W + dimensions.TRANSMITTER_W)
+        charge = radio_link.decode_reply(room.reply(network_id)).battery
+        assert charge == pytest.approx(1.0 - drawn_j / capacity_j, abs=0.03)
+
+
+@pytest.mark.parametrize("battery_j", [0.0, -1.0, math.inf, math.nan])
+def test_a_battery_that_cannot_be_is_refused(battery_j: float) -> None:
+    with pytest.raises(InvalidWorld, match=r"small with a battery of"):
+        scouts(RobotPlace("small", 2, 5.0, 3.0, 0.0, battery_j=battery_j))
+
+
+def test_a_battery_for_a_body_without_one_is_refused() -> None:
+    with pytest.raises(InvalidWorld, match=r"rover:Rover has no battery, so none of 40 J"):
+        scouts(RobotPlace("rover1", 2, 8.0, 5.0, 0.0, "rover:Rover", battery_j=40.0))
 
 
 # ---------------------------------------------------------------------- inclinometer

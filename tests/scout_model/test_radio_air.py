@@ -120,3 +120,19 @@ def test_the_same_seed_loses_the_same_packets_another_seed_others() -> None:
 def test_a_packets_bits_are_those_of_its_head_and_its_payload() -> None:
     assert packet_bits(HALT) == 40
     assert packet_bits(encode_drive(1.0, 2.0)) == 120
+
+
+@given(st.integers(0, 10_000), st.sets(st.integers(0, 39)))
+def test_the_fate_of_a_reply_depends_on_no_other_reply(seed: int, replied: set[int]) -> None:
+    air = AirDescription(radio_loss=0.5)
+    alone = fates(RadioAir(seed, air, "reply to "), [packet(number) for number in replied], 2.0)
+    among_all = fates(RadioAir(seed, air, "reply to "), [packet(number) for number in range(40)], 2.0)
+    assert alone == {(radio, number) for radio, number in among_all if number in replied}
+
+
+def test_the_reply_to_a_packet_that_arrived_can_be_lost() -> None:
+    packets = [packet(number) for number in range(2000)]
+    air = AirDescription(radio_loss=0.5)
+    there = fates(RadioAir(1, air), packets, 2.0)
+    back = fates(RadioAir(1, air, "reply to "), [sent for sent in packets if (sent.radio, sent.number) in there], 2.0)
+    assert len(back) / len(there) == pytest.approx(0.5, abs=0.05)

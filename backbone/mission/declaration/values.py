@@ -138,4 +138,5 @@ Height = Annotated[float, Field(ge=0, le=100, json_schema_extra=_kind("height"))
 Coordinate = Annotated[float, Field(ge=-1000, le=1000, json_schema_extra=_kind("coordinate")), _DECIMAL_TEXT]
 Extent = Annotated[float, Field(gt=0, le=1000, json_schema_extra=_kind("extent")), _DECIMAL_TEXT]
 Speed = Annotated[float, Field(gt=0, le=100, json_schema_extra=_kind("speed")), _DECIMAL_TEXT]
+Energy = Annotated[float, Field(gt=0, le=1_000_000_000, json_schema_extra=_kind("energy")), _DECIMAL_TEXT]
 Degrees = Annotated[float, Field(ge=-360, le=360, json_schema_extra=_kind("degrees")), _DECIMAL_TEXT]

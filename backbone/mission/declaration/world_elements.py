@@ -9,6 +9,7 @@ from backbone.mission.declaration.values import (
     ClassPath,
     Coordinate,
     Degrees,
+    Energy,
     Extent,
     File,
     Flag,
@@ -150,6 +151,13 @@ class RobotElement(Declared):
         default="",
         description=(
             "The target of shape carrier that brings it and sets it down at this place; left out: it stands there."
+        ),
+    )
+    battery_j: Energy | None = Field(
+        default=None,
+        description=(
+            "Capacity of its battery in joules, above 0, at most 1000000000; it is full at the beginning; left out: as "
+            "its class has it."
         ),
     )
 

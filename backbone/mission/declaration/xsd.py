@@ -123,7 +123,7 @@ def _facets(schema: Schema) -> Iterator[str]:
         yield f"<xs:pattern value={quoteattr(schema['pattern'].removeprefix('^').removesuffix('$'))}/>"
     for key, facet in _FACETS.items():
         if key in schema and schema[key] not in (LEAST_WHOLE, MOST_WHOLE):
-            yield f'<xs:{facet} value="{schema[key]:g}"/>'
+            yield f'<xs:{facet} value="{schema[key]:.15g}"/>'
 
 
 def _documentation(text: str) -> str:

@@ -80,6 +80,14 @@ def test_a_file_from_before_other_robots_is_still_read(tmp_path: Path) -> None:
     assert world_of(tmp_path, former) == world_of(tmp_path, SMALL)
 
 
+def test_a_robots_battery_is_the_files_or_its_kinds(tmp_path: Path) -> None:
+    described = world_of(tmp_path, SMALL.replace('<robot name="scout1"', '<robot name="scout1" battery-j="450000"', 1))
+    assert {scout.name: scout.battery_j for scout in described.robots} == {"scout1": 450_000.0, "scout2": None}
+    for wrong in ("0", "-3", "1000000001", "full"):
+        text = SMALL.replace('<robot name="scout1"', f'<robot name="scout1" battery-j="{wrong}"', 1)
+        assert "battery-j" in refusal(tmp_path, text)
+
+
 def test_a_room_of_ones_own_travels_with_the_mission(tmp_path: Path) -> None:
     (tmp_path / "rooms").mkdir()
     (tmp_path / "rooms" / "hall.xml").write_text(HALL)

@@ -1,0 +1,119 @@
+"""Reports of one robot: its replies read, its readings published, its battery watched.
+
+A reply that cannot be read, or has a value out of its range, is counted and changes nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Protocol
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import LogLevel
+from backbone.keys import Conversation
+from backbone.wire import Envelope
+from resource_pool.drivers.interface import MalformedReply, ReplyReader
+from resource_pool.messages import Readings, Reply
+from resource_pool.readings_book import EVERY_S, BatteryWatch, Charge, ReadingsBook
+
+BATTERY = "battery_share"
+"""Field of a robot's reports with the charge of its battery, 0 to 1."""
+
+
+class Say(Protocol):
+    """Publishes an event about the robot."""
+
+    def __call__(self, what: str, level: LogLevel) -> None:
+        """Publish it."""
+
+
+class RobotReports:
+    """Hears the replies of one robot on its radio."""
+
+    def __init__(
+        self, rc: str, bus: Bus, clock: Clock, reader: ReplyReader | None, *, alarm_share: float, say: Say
+    ) -> None:
+        """Hear nothing yet.
+
+        Args:
+            rc: Name of the robot's RC.
+            bus: Of the RC.
+            clock: The mission's clock.
+            reader: The robot's protocol; None: it reads no replies.
+            alarm_share: Charge of the battery below which there is an alarm.
+            say: Publishes an event about the robot.
+        """
+        self._rc, self._bus, self._clock, self._reader, self._say = rc, bus, clock, reader, say
+        self._book = ReadingsBook(EVERY_S * max(1.0, clock.rate))
+        self._battery = BatteryWatch(alarm_share)
+        self._news = asyncio.Event()
+        self._read = self._malformed = 0
+
+    @property
+    def are_read(self) -> bool:
+        """True if the robot's protocol reads replies."""
+        return self._reader is not None
+
+    def listen(self, radio: str, network_id: int) -> None:
+        """Read the replies of this network id from now on.
+
+        Args:
+            radio: Address of the robot's radio.
+        """
+        reader = self._reader
+        if reader is None:
+            return
+
+        def heard(envelope: Envelope[Reply]) -> None:
+            if envelope.source == radio and envelope.body.network_id == network_id:
+                self._take(reader, envelope.body.payload)
+
+        self._bus.subscribe(radio, Conversation.REPLIES, Reply, heard)
+
+    async def publish_when_due(self) -> None:
+        """Publish the newest readings each time they are due."""
+        while True:
+            self._news.clear()
+            due_s = self._book.due_s
+            if due_s is None:
+                await self._news.wait()
+                continue
+            await self._clock.sleep_until_s(due_s)
+            now_s, due_s = self._clock.now_s(), self._book.due_s
+            if due_s is not None and due_s <= now_s:
+                self._bus.publish(self._bus.source, Conversation.READINGS, self.readings())
+                self._book.published(now_s)
+
+    def readings(self) -> Readings:
+        """Return the newest readings."""
+        return Readings(self._rc, self._book.at_s, dict(self._book.values))
+
+    def statistics(self) -> dict[str, float]:
+        """Count replies."""
+        return {"replies_read": self._read, "replies_malformed": self._malformed}
+
+    def _take(self, reader: ReplyReader, payload: bytes) -> None:
+        try:
+            report = reader.read(payload)
+            msgspec.convert(msgspec.to_builtins(report), type(report))  # its ranges
+        except (MalformedReply, msgspec.ValidationError):
+            self._malformed += 1
+            return
+        self._read += 1
+        fields = msgspec.structs.asdict(report)
+        values = {name: value for name, value in fields.items() if isinstance(value, bool | int | float)}
+        self._book.put(values, self._clock.now_s())
+        self._news.set()
+        if BATTERY in values:
+            self._watch_battery(values[BATTERY])
+
+    def _watch_battery(self, share: float) -> None:
+        match self._battery.see(share):
+            case Charge.LOW:
+                self._say(f"its battery is low: {share:.0%} left", LogLevel.ALARM)
+            case Charge.CHARGED_AGAIN:
+                self._say(f"its battery is charged again: {share:.0%}", LogLevel.NOTICE)
+            case Charge.AS_BEFORE:
+                pass
