@@ -7,19 +7,15 @@ from collections.abc import Callable, Coroutine
 from contextlib import AbstractAsyncContextManager
 from typing import Any
 
-import mujoco
-import numpy as np
 import pytest
 from pool_on_local_network import Pool, a_pool
+from world_joints import joints
 
 from backbone.bus.clock import run_virtual
 from backbone.component.abilities import ValueKind
 from backbone.dependency_database.messages import Resource
-from backbone.keys import Conversation
-from backbone.naming import Subsystem, address
 from resource_pool.arc_client import ArcClient, stop_robot
 from resource_pool.commands import Drive, Jump, Move, SwitchTransmitter, WrongCommand
-from resource_pool.drivers.world_messages import AskWorld, WorldModel, WorldState
 from resource_pool.messages import COMMAND_TIMEOUT_S, NoSuchAction
 from resource_pool.robots.rover.arcs import RoverCaptureArc, RoverDriveArc
 from resource_pool.robots.rover.body import LIFT_M, PADDLES_M, TOP_M_S, TOP_RAD_S
@@ -29,7 +25,6 @@ from resource_pool.robots.rover.report import report_of
 from resource_pool.stop_messages import EmergencyStopped
 from scout_model.description import ScoutPlace, WorldDescription
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOn
-from scout_model.world import STATE
 
 BODY = "resource_pool.robots.rover.body:Rover"
 PROTOCOL = "resource_pool.robots.rover.rc:RoverProtocol"
@@ -79,17 +74,9 @@ def sent(pool: Pool) -> list[Packet]:
 
 
 async def gripper(pool: Pool) -> tuple[float, float]:
-    """Return how far its paddles are closed and its lift is up, from the state of the world."""
-    world, states = address(Subsystem.RESOURCE_POOL, "world"), []
-    ear = pool.voice_of(OPERATOR)
-    known = await ear.ask(world, AskWorld(), WorldModel, within_s=5)
-    hearing = ear.subscribe(world, Conversation.TELEMETRY, WorldState, lambda heard: states.append(heard.body))
-    await pool.clock.sleep_s(0.1)
-    hearing.close()
-    model = mujoco.MjModel.from_xml_string(known.mjcf)
-    data = mujoco.MjData(model)
-    mujoco.mj_setState(model, data, np.frombuffer(states[-1].state), STATE)
-    return data.joint("rover1/left_paddle").qpos[0] / PADDLES_M, data.joint("rover1/lift").qpos[0] / LIFT_M
+    """Return how far its paddles are closed and its lift is up."""
+    paddles_m, lift_m = await joints(pool, "rover1/left_paddle", "rover1/lift")
+    return paddles_m / PADDLES_M, lift_m / LIFT_M
 
 
 # ---------------------------------------------------------------------- what it does
