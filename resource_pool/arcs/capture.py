@@ -21,24 +21,26 @@ class CaptureArc(VideoDriveArc):
     """A robot, its radio and video frequency, and a framegrabber tuned to it; frames go out under its address."""
 
     roles: ClassVar[Sequence[str]] = (*VideoDriveArc.roles, "framegrabber")
+    receiver: ClassVar[str] = "framegrabber"
+    """Role of the RC that receives and delivers."""
     gives_pictures = True
     accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the transmitter on and tune, at the same time."""
         tune = Tune(self.rc("video_frequency"), self.rc(self.body))
-        tuning = self.tell_rc("framegrabber", epochs[self.rc("framegrabber")], tune)
+        tuning = self.tell_rc(self.receiver, epochs[self.rc(self.receiver)], tune)
         await asyncio.gather(super().prepare(epochs), tuning)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer the framegrabber, too: switch on a transmitter that it does not receive."""
+        """Answer the receiver, too: switch on a transmitter that it does not receive."""
         match asked.body:
             case NothingHeard(rc=rc, epoch=epoch):
-                grabber = self.rc("framegrabber")
-                if asked.source != address(Subsystem.RESOURCE_POOL, grabber) or rc != grabber:
-                    raise NotFromYou(f"{self.name} hears from {grabber} what is on the air, not from {asked.source}")
-                if self.epochs.get(grabber) == epoch:
-                    self.story.note(self.name, f"{grabber} hears nothing: the transmitter is switched on again")
+                receiver = self.rc(self.receiver)
+                if asked.source != address(Subsystem.RESOURCE_POOL, receiver) or rc != receiver:
+                    raise NotFromYou(f"{self.name} hears from {receiver} what is on the air, not from {asked.source}")
+                if self.epochs.get(receiver) == epoch:
+                    self.story.note(self.name, f"{receiver} hears nothing: the transmitter is switched on again")
                     await super().prepare(self.epochs)
                 return Accepted()
             case _:

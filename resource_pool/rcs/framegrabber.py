@@ -98,6 +98,18 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._driver.tune(order.frequency, deliver)
         return {}
 
+    def is_wanted(self, picture: Picture, expected: str) -> bool:
+        """Return whether to deliver the picture: exactly the expected robot transmits. Count the other pictures."""
+        if picture.transmitters == 0:
+            self._silent += 1
+        elif picture.transmitters > 1:
+            self._garbled += 1
+        elif expected and picture.robot and picture.robot != expected:  # a transmitter that should be off
+            self._foreign += 1
+        else:
+            return True
+        return False
+
     def statistics(self) -> dict[str, float]:
         """Count delivered pictures, and pictures dropped because no, several or another robot transmitted.
 
@@ -118,15 +130,10 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         if picture.kind:
             self._kinds[picture.kind] += 1
         if picture.transmitters == 0:
-            self._silent += 1
             self._heard_nothing(hold)
-            return
-        self._silent_since_s = math.inf
-        if picture.transmitters > 1:
-            self._garbled += 1
-            return
-        if expected and picture.robot and picture.robot != expected:  # a transmitter that should be off
-            self._foreign += 1
+        else:
+            self._silent_since_s = math.inf
+        if not self.is_wanted(picture, expected):
             return
         self._delivered += 1
         frame = Frame(
