@@ -152,13 +152,15 @@ class SwitchTransmitter(Command, frozen=True, tag="SwitchTransmitter/2"):
     frequency: Mention = ""
 
 
-class Tune(Command, frozen=True, tag="Tune/2"):
+class Tune(Command, frozen=True, tag="Tune/3"):
     """Receive this video frequency and deliver its pictures to the ARC that holds the framegrabber.
 
     Attributes:
         frequency: Name of the video frequency's RC.
         robot: The robot of the ARC; pictures of other robots are not delivered. Empty: any.
+        camera: Last segment of the address of the pictures, for a further camera of the ARC; empty: the ARC's address.
     """
 
     frequency: Mention
     robot: Mention = ""
+    camera: Mention = ""

@@ -259,15 +259,19 @@ class Pool:
         """Start an ARC for this robot and return the owner's hold on it."""
         name = f"{owner.name}-{kind}"
         client = owner.know(name)
-        given = {"minimum_runtime_s": 5.0, "path": [PathNode("local", 10), PathNode(owner.name, 1)]} | more
-        parameters = claim_parameters(owner.address, wish={self.arc_classes[kind].body: robot}, **given)
+        path = [PathNode("local", 10), PathNode(owner.name, 1)]
+        given = {"minimum_runtime_s": 5.0, "path": path, "wish": {self.arc_classes[kind].body: robot}} | more
+        parameters = claim_parameters(owner.address, **given)
         await self.start(self.arc_classes[kind], name, msgspec.to_builtins(parameters), kind=kind)
         return client
 
-    async def console(self, name: str, kind: str, robot: str, priority: int = 100) -> tuple[Owner, ArcClient]:
+    async def console(
+        self, name: str, kind: str, robot: str, priority: int = 100, **more: Any
+    ) -> tuple[Owner, ArcClient]:
         owner = await self.owner(name)
         path = [PathNode(name, priority)]
-        return owner, await self.arc(owner, kind, robot, path=path, console=True, minimum_runtime_s=0.1)
+        more = {"console": True, "minimum_runtime_s": 0.1} | more
+        return owner, await self.arc(owner, kind, robot, path=path, **more)
 
     async def end(self, name: str) -> None:
         """Let it leave in good order."""
