@@ -2,47 +2,29 @@
 
 from __future__ import annotations
 
-import os
-import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
+from guide import files_of, lines_of, pool_of, rehearse, written
 from pool_on_local_network import a_pool
 from world_joints import joints
 
 from backbone.bus.clock import run_virtual
-from backbone.component.process import load_class
 from backbone.mission.reader import read_mission
 from mission_control.behaviors.patrol import Patrol
 from mission_control.laboratory.simulation.whole_mission import mission_in_one_process
-from scout_model.description import WorldDescription
 
-TOP = Path(__file__).parents[3]
-GUIDE = (TOP / "docs" / "how-to" / "add-a-robot.md").read_text(encoding="utf-8")
-FILES = dict(re.findall(r"^`([\w./]+)`:\n\n```\w+\n(.*?)^```", GUIDE, re.M | re.S))
+FILES = files_of("add-a-robot.md")
 RC_LINES, ARC_LINES = 40, 25  # chosen: more is not done in an hour
 
 
 @pytest.fixture
-def mission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Give the guide's mission file; its robots can be imported."""
-    for name, text in FILES.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    (tmp_path / "my_robots" / "__init__.py").touch()
-    monkeypatch.syspath_prepend(str(tmp_path))
-    yield tmp_path / "cart.xml"
-    for module in [name for name in sys.modules if name.partition(".")[0] == "my_robots"]:
-        del sys.modules[module]
-
-
-def lines_of(name: str) -> int:
-    return len([line for line in FILES[name].splitlines() if line.strip()])
+def mission(tmp_path: Path) -> Iterator[Path]:
+    """Give the guide's mission file; its robot can be imported."""
+    with written(FILES, tmp_path, "my_robots"):
+        yield tmp_path / "cart.xml"
 
 
 def test_the_robot_of_the_guide_patrols(mission: Path) -> None:
@@ -50,30 +32,18 @@ def test_the_robot_of_the_guide_patrols(mission: Path) -> None:
         async with mission_in_one_process(read_mission(mission)) as running:
             behavior = running.component("patrol")
             assert isinstance(behavior, Patrol)
-            for _ in range(60):
+            until_s = running.clock.now_s() + 60.0
+            while behavior.route.reached < 4:
+                assert running.clock.now_s() < until_s, f"{behavior.route.reached} way points in a minute"
                 await running.clock.sleep_s(1.0)
-                if behavior.route.reached >= 4:
-                    break
-            assert behavior.route.reached >= 4
             assert (await running.statistics("world"))["stale_packets"] == 0
 
     run_virtual(main())
 
 
 def test_it_obeys_its_own_command_while_it_drives_and_keeps_to_its_limits(mission: Path, local_mission: Any) -> None:
-    described = read_mission(mission)
-    classes = {kind.name: load_class(kind.class_path) for kind in described.types if "my_robots" in kind.class_path}
-    [world] = [component for component in described.components if component.name == "world"]
-
     async def main() -> None:
-        async with a_pool(
-            local_mission,
-            ["radio", "cart1"],
-            world=msgspec.convert(world.parameters["world"], WorldDescription),
-            hardware=[resource for resource in described.resources if resource.name != "radio"],
-            rc_classes={"cart": classes["cart"]},
-            arc_classes={"cart_drive": classes["cart_drive"]},  # type: ignore[dict-item]
-        ) as pool:
+        async with a_pool(local_mission, ["radio", "cart1"], **pool_of(read_mission(mission), "my_robots")) as pool:
             arc = await pool.arc(await pool.owner("walker"), "cart_drive", "cart1")
             await arc.wait_granted()
             began_m, _ = await pool.pose("cart1")
@@ -93,22 +63,13 @@ def test_it_obeys_its_own_command_while_it_drives_and_keeps_to_its_limits(missio
     run_virtual(main())
 
 
-def test_rc_and_arcs_of_the_guide_are_as_short_as_it_says() -> None:
+def test_rc_and_arcs_of_the_guide_are_short() -> None:
     assert sorted(FILES) == ["cart.xml", *(f"my_robots/{name}" for name in ("arcs.py", "cart.py", "cart.xml", "rc.py"))]
-    assert lines_of("my_robots/rc.py") <= RC_LINES
-    assert lines_of("my_robots/arcs.py") <= ARC_LINES
+    assert lines_of(FILES["my_robots/rc.py"]) <= RC_LINES
+    assert lines_of(FILES["my_robots/arcs.py"]) <= ARC_LINES
 
 
 @pytest.mark.processes
 def test_the_mission_file_of_the_guide_is_sound(mission: Path) -> None:
-    command = [str(Path(sys.executable).parent / "scout-backbone"), "check", "cart.xml", "--dry-run"]
-    paths = os.pathsep.join([str(mission.parent), str(TOP)])
-    done = subprocess.run(
-        command,
-        cwd=mission.parent,
-        env={**os.environ, "PYTHONPATH": paths},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = rehearse(mission)
     assert (done.returncode, "every request gets its turn" in done.stdout) == (0, True), done.stdout + done.stderr
