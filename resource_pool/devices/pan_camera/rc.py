@@ -42,7 +42,7 @@ class FixedProtocol(PanProtocol):
         raise HardwareFault(f"{self._site.resource} is fixed", remedy="Command the camera that pans.")
 
 
-class Camera(Robot[RobotParameters]):
+class VideoCamera(Robot[RobotParameters]):
     """A camera with transmitter, reached through a command radio like a robot."""
 
     commands = Look | Halt | SwitchTransmitter

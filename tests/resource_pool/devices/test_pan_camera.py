@@ -22,7 +22,7 @@ from resource_pool.commands import WrongCommand
 from resource_pool.devices.monitor.rc import Monitor
 from resource_pool.devices.pan_camera.arcs import TwoCamerasArc
 from resource_pool.devices.pan_camera.body import MOST_PAN_RAD, PAN_RAD_S, PanCamera, encode_look
-from resource_pool.devices.pan_camera.rc import Camera, Look
+from resource_pool.devices.pan_camera.rc import Look, VideoCamera
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.messages import NoSuchAction
 from resource_pool.stop_messages import EmergencyStopped
@@ -67,7 +67,7 @@ def play(mission: Any, scene: Callable[[Pool, ArcClient, Seen], Coroutine[Any, A
             RCS,
             world=ROOM,
             hardware=HARDWARE,
-            rc_classes={"camera": Camera, "monitor": Monitor},
+            rc_classes={"camera": VideoCamera, "monitor": Monitor},
             arc_classes={"two_cameras": TwoCamerasArc},
         ) as pool:
             _person, arc = await pool.console("anna", "two_cameras", "wall_cam", wish=WISH)
