@@ -172,6 +172,10 @@ class Robot(ResourceController[P], Generic[P]):
         if not goes_on:
             self._stands(hold)
 
+    def stop_packet(self) -> bytes:
+        """Return the packet of an operator's stop; override if parts of the robot move on at a halt."""
+        return self._protocol.halt()
+
     def statistics(self) -> dict[str, float]:
         """Count halts for lack of commands, and emergency stops, too."""
         stops = float(self._latch.state.number)
@@ -185,7 +189,7 @@ class Robot(ResourceController[P], Generic[P]):
         holder = self._holder
         if holder is not None:
             try:
-                await self._load(holder, self._protocol.halt())
+                await self._load(holder, self.stop_packet())
             except (
                 Refusal,
                 LinkError,

@@ -1,6 +1,7 @@
 """RC of a rover: speeds, gripper, video transmitter.
 
-In its safe state wheels and transmitter are off, and the gripper keeps its grip.
+In its safe state wheels and transmitter are off, and the gripper keeps its grip. An operator's stop stops the gripper,
+too.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from resource_pool.drivers.simulated import SimulatedRobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.rcs.robot import Robot, RobotParameters
 from resource_pool.robots.rover.body import TOP_M_S, TOP_RAD_S
-from resource_pool.robots.rover.link import GripPacket, MovePacket, encode
+from resource_pool.robots.rover.link import GripPacket, MovePacket, StopPacket, encode
 from resource_pool.robots.rover.report import RoverReport
 
 
@@ -56,6 +57,10 @@ class Rover(Robot[RobotParameters]):
         "lift": (0.0, 1.0),
     }
     _protocol: RoverProtocol
+
+    def stop_packet(self) -> bytes:
+        """Return the packet that stops wheels and gripper."""
+        return encode(StopPacket())
 
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Move, halt, grip, or switch the transmitter."""

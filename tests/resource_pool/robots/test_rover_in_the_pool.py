@@ -19,7 +19,16 @@ from resource_pool.commands import Drive, Jump, Move, SwitchTransmitter, WrongCo
 from resource_pool.messages import COMMAND_TIMEOUT_S, NoSuchAction
 from resource_pool.robots.rover.arcs import RoverCaptureArc, RoverDriveArc
 from resource_pool.robots.rover.body import LIFT_M, PADDLES_M, TOP_M_S, TOP_RAD_S
-from resource_pool.robots.rover.link import Bumpers, GripPacket, MovePacket, Packet, RoverReply, decode, encode_reply
+from resource_pool.robots.rover.link import (
+    Bumpers,
+    GripPacket,
+    MovePacket,
+    Packet,
+    RoverReply,
+    StopPacket,
+    decode,
+    encode_reply,
+)
 from resource_pool.robots.rover.rc import Grip, Rover
 from resource_pool.robots.rover.report import report_of
 from resource_pool.stop_messages import EmergencyStopped
@@ -175,16 +184,20 @@ def test_silence_stops_it(local_mission: Any) -> None:
 def test_an_emergency_stop_stops_it_and_refuses_wheels_and_gripper(local_mission: Any) -> None:
     async def scene(pool: Pool, arc: ArcClient) -> None:
         await move_for(pool, arc, 1.0, 0.5)
+        await arc.give("grip", {"closed": 1.0, "lift": 1.0})
         stop = await stop_robot(pool.voice_of(OPERATOR), "rover1", "child in the room", "anna")
         assert (stop.is_stopped, stop.is_confirmed) == (True, True)
         await pool.clock.sleep_s(0.5)
-        stood_m = await pool.pose("rover1")
+        stood_m, gripped = await pool.pose("rover1"), await gripper(pool)
+        assert max(gripped) < 0.5
+        assert sent(pool)[-1] == StopPacket()
         for refused in (arc.move(0.5), arc.give("grip", {"closed": 1.0, "lift": 0.0})):
             with pytest.raises(EmergencyStopped):
                 await refused
         await arc.halt()
         await pool.clock.sleep_s(1.0)
         assert await pool.pose("rover1") == pytest.approx(stood_m, abs=1e-3)
+        assert await gripper(pool) == pytest.approx(gripped, abs=0.01)
         assert sent(pool)[-1] == HaltPacket()
 
     play(local_mission, scene)
