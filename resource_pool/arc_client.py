@@ -262,15 +262,21 @@ class ArcClient:
         """
         return self._stops.heard(state)
 
-    def frames(self, listener: Callable[[Frame], None]) -> Subscription:
-        """Call the listener with the newest picture of the present grant; pictures of earlier grants never arrive."""
+    def frames(self, listener: Callable[[Frame], None], camera: str = "") -> Subscription:
+        """Call the listener with the newest picture of the present grant; pictures of earlier grants never arrive.
+
+        Args:
+            listener: Called in the event loop.
+            camera: Role of a further camera of the ARC; empty: the camera of its robot.
+        """
 
         def arrived(envelope: Envelope[Frame]) -> None:
             frame = envelope.body
             if self.granted is not None and self.granted.epochs.get(frame.rc) == frame.epoch:
                 listener(frame)
 
-        return self._bus.subscribe(self.address, Conversation.FRAMES, Frame, arrived, latest=True)
+        at = f"{self.address}/{camera}" if camera else self.address
+        return self._bus.subscribe(at, Conversation.FRAMES, Frame, arrived, latest=True)
 
     async def wait_stop_lifted(self, robot: str) -> None:
         """Return when no operator's stop is in force on this robot.

@@ -13,33 +13,52 @@ from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import AskRequest, CloseGate, OpenGate, TakePath
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arcs.video_drive import VideoDriveArc
-from resource_pool.commands import Tune
+from resource_pool.commands import SwitchTransmitter, Tune
 from resource_pool.messages import Accepted, ArcQuestion, NotFromYou, NothingHeard
 
 
 class CaptureArc(VideoDriveArc):
     """A robot, its radio and video frequency, and a framegrabber tuned to it; frames go out under its address."""
 
-    roles: ClassVar[Sequence[str]] = (*VideoDriveArc.roles, "framegrabber")
+    roles: ClassVar[Mapping[str, str] | Sequence[str]] = (*VideoDriveArc.roles, "framegrabber")
+    receiver: ClassVar[str] = "framegrabber"
+    """Role of the RC that receives and delivers."""
     gives_pictures = True
     accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
 
+    @classmethod
+    def cameras(cls) -> Mapping[str, tuple[str, str]]:
+        """Return role of each RC with a camera → roles of its video frequency and of its receiver.
+
+        Pictures of a camera that is not the ARC's body have the camera's role as last segment of their address.
+        """
+        return {cls.body: ("video_frequency", cls.receiver)}
+
     async def prepare(self, epochs: Mapping[str, int]) -> None:
-        """Switch the transmitter on and tune, at the same time."""
-        tune = Tune(self.rc("video_frequency"), self.rc(self.body))
-        tuning = self.tell_rc("framegrabber", epochs[self.rc("framegrabber")], tune)
-        await asyncio.gather(super().prepare(epochs), tuning)
+        """Switch each transmitter on and tune its receiver, at the same time."""
+        tuning = (self._tune(camera, *with_it, epochs) for camera, with_it in self.cameras().items())
+        switching = (self._switch_on(camera, epochs) for camera in self.cameras())
+        await asyncio.gather(*switching, *tuning)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer the framegrabber, too: switch on a transmitter that it does not receive."""
+        """Answer the receivers, too: switch on a transmitter that one does not receive."""
         match asked.body:
             case NothingHeard(rc=rc, epoch=epoch):
-                grabber = self.rc("framegrabber")
-                if asked.source != address(Subsystem.RESOURCE_POOL, grabber) or rc != grabber:
-                    raise NotFromYou(f"{self.name} hears from {grabber} what is on the air, not from {asked.source}")
-                if self.epochs.get(grabber) == epoch:
-                    self.story.note(self.name, f"{grabber} hears nothing: the transmitter is switched on again")
-                    await super().prepare(self.epochs)
+                cameras = {self.rc(receiver): camera for camera, (_, receiver) in self.cameras().items()}
+                if asked.source != address(Subsystem.RESOURCE_POOL, rc) or rc not in cameras:
+                    heard = ", ".join(cameras)
+                    raise NotFromYou(f"{self.name} hears from {heard} what is on the air, not from {asked.source}")
+                if self.epochs.get(rc) == epoch:
+                    self.story.note(self.name, f"{rc} hears nothing: the transmitter is switched on again")
+                    await self._switch_on(cameras[rc], self.epochs)
                 return Accepted()
             case _:
                 return await super().answer(asked)
+
+    async def _switch_on(self, camera: str, epochs: Mapping[str, int]) -> None:
+        frequency, _ = self.cameras()[camera]
+        await self.tell_rc(camera, epochs[self.rc(camera)], SwitchTransmitter(True, self.rc(frequency)))
+
+    async def _tune(self, camera: str, frequency: str, receiver: str, epochs: Mapping[str, int]) -> None:
+        tune = Tune(self.rc(frequency), self.rc(camera), "" if camera == self.body else camera)
+        await self.tell_rc(receiver, epochs[self.rc(receiver)], tune)

@@ -15,6 +15,6 @@ from resource_pool.commands import Command, Drive, Halt, Jump, Move
 class DriveArc(AggregateResourceController):
     """A robot and a share of its command radio."""
 
-    roles: ClassVar[Sequence[str]] = ("scout", "command_radio")
+    roles: ClassVar[Mapping[str, str] | Sequence[str]] = ("scout", "command_radio")
     commands: ClassVar[Mapping[type[Command], str]] = dict.fromkeys((Move, Drive, Halt, Jump), "scout")
     body: ClassVar[str] = "scout"

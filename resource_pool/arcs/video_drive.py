@@ -15,7 +15,7 @@ from resource_pool.commands import SwitchTransmitter
 class VideoDriveArc(DriveArc):
     """A robot, a share of its command radio, and a video frequency on which it transmits during a grant."""
 
-    roles: ClassVar[Sequence[str]] = (*DriveArc.roles, "video_frequency")
+    roles: ClassVar[Mapping[str, str] | Sequence[str]] = (*DriveArc.roles, "video_frequency")
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the robot's transmitter on; when the set is given back the radio switches it off."""

@@ -1,6 +1,7 @@
 """RC of a framegrabber behind a tuned receiver: pictures of one frequency, for the ARC that holds it.
 
 Pictures are published under the ARC's address with the connection's epoch; subscribers drop pictures of other epochs.
+Those of a further camera of the ARC have an address below it, so that each camera's newest picture is delivered.
 If the hardware knows the transmitting robots, a picture is delivered only if exactly the expected robot transmits.
 
 Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
@@ -92,11 +93,23 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         numbers = itertools.count(1)
 
         def deliver(picture: Picture) -> None:
-            self._deliver(hold, order.robot, picture, numbers)
+            self._deliver(hold, order, picture, numbers)
 
         self._silent_since_s = math.inf
         self._driver.tune(order.frequency, deliver)
         return {}
+
+    def is_wanted(self, picture: Picture, expected: str) -> bool:
+        """Return whether to deliver the picture: exactly the expected robot transmits. Count the other pictures."""
+        if picture.transmitters == 0:
+            self._silent += 1
+        elif picture.transmitters > 1:
+            self._garbled += 1
+        elif expected and picture.robot and picture.robot != expected:  # a transmitter that should be off
+            self._foreign += 1
+        else:
+            return True
+        return False
 
     def statistics(self) -> dict[str, float]:
         """Count delivered pictures, and pictures dropped because no, several or another robot transmitted.
@@ -112,35 +125,31 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             **{f"frames_{kind}": float(count) for kind, count in sorted(self._kinds.items())},
         }
 
-    def _deliver(self, hold: Hold, expected: str, picture: Picture, numbers: Iterator[int]) -> None:
+    def _deliver(self, hold: Hold, order: Tune, picture: Picture, numbers: Iterator[int]) -> None:
         if not self.holds.has(hold.arc, hold.epoch):
             return  # a driver may deliver one picture after its stop
         if picture.kind:
             self._kinds[picture.kind] += 1
         if picture.transmitters == 0:
-            self._silent += 1
             self._heard_nothing(hold)
-            return
-        self._silent_since_s = math.inf
-        if picture.transmitters > 1:
-            self._garbled += 1
-            return
-        if expected and picture.robot and picture.robot != expected:  # a transmitter that should be off
-            self._foreign += 1
+        else:
+            self._silent_since_s = math.inf
+        if not self.is_wanted(picture, order.robot):
             return
         self._delivered += 1
         frame = Frame(
             rc=self.name,
             arc=hold.arc,
             epoch=hold.epoch,
-            robot=picture.robot or expected,
+            robot=picture.robot or order.robot,
             number=next(numbers),
             captured_s=picture.captured_s,
             width_px=picture.width_px,
             height_px=picture.height_px,
             pixels=picture.pixels,
         )
-        self.bus.publish(address(Subsystem.RESOURCE_POOL, hold.arc), Conversation.FRAMES, frame)
+        at = address(Subsystem.RESOURCE_POOL, hold.arc)
+        self.bus.publish(f"{at}/{order.camera}" if order.camera else at, Conversation.FRAMES, frame)
 
     def _heard_nothing(self, hold: Hold) -> None:
         """Ask the ARC to switch a silent transmitter on: it was reset, or missed its packet."""

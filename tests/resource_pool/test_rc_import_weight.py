@@ -16,6 +16,9 @@ LIGHT = [
     "resource_pool.rcs.skeleton",
     "resource_pool.drivers.simulated",
     "resource_pool.arcs.capture",
+    "resource_pool.robots.rover.arcs",
+    "resource_pool.devices.monitor.rc",
+    "resource_pool.devices.monitor.arcs",
     "resource_pool.arc_client",
     "resource_pool.robots.walker.body",
 ]

@@ -90,7 +90,7 @@ def test_the_mission_file_of_the_guide_is_sound_and_consoles_know_what_to_draw(t
 
 def test_one_person_at_a_time_sounds_it_and_it_is_silent_afterwards(local_mission: Any, my_lab: Any) -> None:
     async def scene() -> None:
-        async with a_pool(local_mission, ["siren1"], more=[Resource("siren1", "siren", driver=HORN)]) as pool:
+        async with a_pool(local_mission, ["siren1"], hardware=[Resource("siren1", "siren", driver=HORN)]) as pool:
             owner = await pool.owner("alarm")
             arc = owner.know("alarm-siren_alone")
             path = [PathNode("local", 10), PathNode("alarm", 1)]

@@ -53,11 +53,12 @@ from backbone.scheduling.trace import Line
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.audit import Audit, Happening
 from mission_control.laboratory.simulation.played_hosts import HOST, PlayedHosts, PlayedRole
+from resource_pool.rcs.framegrabber import Framegrabber
 
 START_TIME_S = 60.0  # chosen: virtual time, in which only settling and back-offs pass
 REPLY_TIME_S = 5.0  # chosen: virtual time; an answer takes none
 MEETING_AT = "backbone/launcher"
-FRAMEGRABBER, SIMULATED = "framegrabber", "simulated"
+SIMULATED = "simulated"
 FELL = frozenset({"fails", "gives up"})
 
 
@@ -185,10 +186,11 @@ async def mission_in_one_process(
 
 
 def _painted(mission: MissionDescription) -> MissionDescription:
-    """Return the mission with the painter behind each simulated framegrabber: its pictures are the same everywhere."""
+    """Return the mission with the painter behind each simulated receiver: its pictures are the same everywhere."""
+    receivers = {kind.name for kind in mission.types if issubclass(load_class(kind.class_path), Framegrabber)}
     resources = tuple(
         msgspec.structs.replace(resource, parameters={**resource.parameters, "camera": "paint"})
-        if resource.type == FRAMEGRABBER and resource.driver == SIMULATED
+        if resource.type in receivers and resource.driver == SIMULATED
         else resource
         for resource in mission.resources
     )

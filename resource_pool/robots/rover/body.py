@@ -6,7 +6,7 @@ Rules:
 * Reflex: a bumper pressed in front while it drives forward, or shall, stops all forward motion at once. It stays so
   until a packet asks for anything but forward. Turning and backing off stay possible.
 * Without a packet for ``COMMAND_TIMEOUT_S`` the wheels stop and the transmitter goes off; the gripper keeps its grip.
-  So it does at halt and safe.
+  So it does at halt and safe. A stop packet stops the gripper, too, as it is.
 * With an empty battery it hears and answers nothing, its wheels are not driven, its transmitter is off; the gripper's
   screws hold by themselves.
 
@@ -26,6 +26,7 @@ from resource_pool.robots.rover.link import (
     GripPacket,
     MovePacket,
     RoverReply,
+    StopPacket,
     decode,
     encode_reply,
 )
@@ -116,6 +117,9 @@ class Rover:
                 self._grip = packet
             case HaltPacket():
                 self._ask(_STAND)
+            case StopPacket():
+                self._ask(_STAND)
+                self._grip = GripPacket(self._paddles_m / PADDLES_M, self._lift_m / LIFT_M)
             case TransmitterOn(frequency):
                 self._frequency = frequency
             case TransmitterOff():

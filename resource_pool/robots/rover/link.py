@@ -4,6 +4,7 @@ One byte says which command it is, then come its values in network byte order:
 
 * ``M`` move: two 16-bit integers, forward in mm/s and turn in mrad/s, to the left is positive
 * ``G`` grip: two bytes, how far the paddles are closed and the lift is up, 255 is all the way
+* ``Q`` stop: nothing more
 * halt, safe, transmitter on and off: as in ``scout_model.radio_link``
 
 Its answer is ``R`` and 38 bytes. Network id and check sum are the radio's business, as they are for every robot.
@@ -57,6 +58,11 @@ class GripPacket:
 
 
 @dataclass(frozen=True, slots=True)
+class StopPacket:
+    """Stop wheels, paddles and lift where they are; a halt stops the wheels only."""
+
+
+@dataclass(frozen=True, slots=True)
 class Bumpers:
     """Which of its bumpers are pressed: in front, at the tips of the paddles, behind."""
 
@@ -97,7 +103,7 @@ class RoverReply:
     is_holding: bool
 
 
-Packet = MovePacket | GripPacket | HaltPacket | TransmitterOn | TransmitterOff | Safe
+Packet = MovePacket | GripPacket | StopPacket | HaltPacket | TransmitterOn | TransmitterOff | Safe
 
 
 def encode(packet: Packet) -> bytes:
@@ -111,6 +117,8 @@ def encode(packet: Packet) -> bytes:
             return b"M" + _packed(_MOVE, _milli(forward_m_s), _milli(turn_rad_s))
         case GripPacket(closed, lift):
             return b"G" + _GRIP.pack(share_to_byte(closed), share_to_byte(lift))
+        case StopPacket():
+            return b"Q"
         case HaltPacket():
             return radio_link.encode_halt()
         case TransmitterOn(frequency):
@@ -138,6 +146,8 @@ def decode(payload: bytes) -> Packet:
     if command == b"G":
         closed, lift = _unpacked(_GRIP, values)
         return GripPacket(byte_to_share(closed), byte_to_share(lift))
+    if payload == b"Q":
+        return StopPacket()
     packet = radio_link.decode(payload)
     if isinstance(packet, radio_link.DrivePacket | radio_link.JumpPacket):
         raise MalformedPacket(f"a rover has no command {command!r}")

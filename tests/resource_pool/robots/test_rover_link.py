@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resource_pool.robots.rover import link
-from resource_pool.robots.rover.link import Bumpers, GripPacket, MovePacket, RoverReply
+from resource_pool.robots.rover.link import Bumpers, GripPacket, MovePacket, RoverReply, StopPacket
 from scout_model import radio_link
 from scout_model.errors import MalformedPacket
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOff, TransmitterOn
@@ -22,7 +22,7 @@ packets = st.one_of(
     st.builds(MovePacket, milli, milli),
     st.builds(GripPacket, shares, shares),
     st.builds(TransmitterOn, names),
-    st.sampled_from([HaltPacket(), TransmitterOff(), Safe()]),
+    st.sampled_from([StopPacket(), HaltPacket(), TransmitterOff(), Safe()]),
 )
 replies = st.builds(
     RoverReply,

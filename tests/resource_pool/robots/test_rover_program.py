@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from resource_pool.robots.rover import body, link
 from resource_pool.robots.rover.body import Rover
-from resource_pool.robots.rover.link import GripPacket, MovePacket, RoverReply
+from resource_pool.robots.rover.link import GripPacket, MovePacket, RoverReply, StopPacket
 from scout_model.battery import Battery
 from scout_model.dimensions import COMMAND_TIMEOUT_S
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOff, TransmitterOn
@@ -19,7 +19,7 @@ PRESSED, FREE = 12.0, 0.0
 packets = st.one_of(
     st.builds(MovePacket, st.floats(-30, 30), st.floats(-30, 30)).map(link.encode),
     st.builds(GripPacket, st.floats(0, 1), st.floats(0, 1)).map(link.encode),
-    st.sampled_from([HaltPacket(), TransmitterOn("video1"), TransmitterOff(), Safe()]).map(link.encode),
+    st.sampled_from([StopPacket(), HaltPacket(), TransmitterOn("video1"), TransmitterOff(), Safe()]).map(link.encode),
     st.binary(max_size=8),
 )
 
@@ -122,6 +122,17 @@ def test_noise_does_not_keep_it_driving() -> None:
         driven.frame()
     assert driven.speed() == (0.0, 0.0)
     assert driven.rover.counts()["malformed"] == 30
+
+
+def test_a_stop_stops_wheels_paddles_and_lift_where_they_are() -> None:
+    driven = Driven()
+    driven.go(1.0, MovePacket(1.0, 0.0), GripPacket(1.0, 1.0))
+    assert driven.go(1.0, StopPacket()) == (0.0, 0.0)
+    stopped = driven.frame()
+    assert 0.0 < stopped["paddles"] < body.PADDLES_M
+    assert 0.0 < stopped["lift"] < body.LIFT_M
+    driven.go(5.0, StopPacket())
+    assert driven.frame() == stopped
 
 
 @pytest.mark.parametrize("packet", [HaltPacket(), Safe()])

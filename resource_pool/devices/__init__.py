@@ -1,0 +1,1 @@
+"""One folder per kind of device that is no robot."""

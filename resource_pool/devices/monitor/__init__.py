@@ -1,0 +1,1 @@
+"""A video monitor: a receiver whose pictures only people see."""

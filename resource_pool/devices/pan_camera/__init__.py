@@ -1,0 +1,1 @@
+"""A camera on a stand, which pans or is fixed: body, on-board program, RC and ARC."""
