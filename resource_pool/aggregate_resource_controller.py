@@ -11,7 +11,9 @@ Source: RAM 2002, "Resource Pool" and "The RC Scheduler".
 from __future__ import annotations
 
 import asyncio
+import functools
 import logging
+import operator
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, TypeVar
 
@@ -44,7 +46,7 @@ from backbone.rc_manager.messages import (
     TakePath,
     Withdraw,
 )
-from backbone.wire import Accepts, Envelope, Message
+from backbone.wire import Accepts, Envelope, Message, kinds_of
 from resource_pool.arc_request import ROBOT, ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
 from resource_pool.commands import OF_THE_BASE, Command, command_of
@@ -102,10 +104,9 @@ class AggregateResourceController(Component[ArcParameters]):
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        accepts = cls.accepts
-        for command in cls.commands:
-            accepts = accepts | command if accepts is not None else command
-        cls.accepts = accepts
+        inherited = kinds_of(cls.accepts) if cls.accepts is not None else ()
+        others = (kind for kind in inherited if not issubclass(kind, Command))  # a base may have other commands
+        cls.accepts = functools.reduce(operator.or_, (*others, *cls.commands))
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

@@ -7,6 +7,7 @@ values, or is the refusal ``StaleEpoch``.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import ClassVar, Self
@@ -80,6 +81,23 @@ def command_of(kind: type[Command], values: Mapping[str, object], *, role: str, 
         return msgspec.convert([kind.__struct_config__.tag, *given, role, after_stop], kind)
     except msgspec.ValidationError as error:
         raise WrongCommand(f"{kind.word()}: {error}") from None
+
+
+def clipped(order: Command, limits: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+    """Return those of the command's values that have limits, each within them.
+
+    Raises:
+        WrongCommand: One of them is not finite.
+
+    Example:
+        >>> clipped(Move(5.0, 0.5), {"forward_m_s": (-1.0, 1.0), "turn_rad_s": (-2.0, 2.0)})
+        {'forward_m_s': 1.0, 'turn_rad_s': 0.5}
+    """
+    values = {name: getattr(order, name) for name in limits if name in order.__struct_fields__}
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise WrongCommand(f"{order.word()}: {name} is {value}", field=name)
+    return {name: min(limits[name][1], max(limits[name][0], value)) for name, value in values.items()}
 
 
 class Move(Command, frozen=True):

@@ -88,27 +88,15 @@ class SimulatedRadio:
         """Do nothing: no device is open."""
 
 
-class SimulatedScoutProtocol:
-    """Encodes packets for the simulated Scout's firmware."""
+class SimulatedRobotProtocol:
+    """Encodes the packets that every simulated robot reads; derive and add those of the kind."""
 
     def __init__(self, site: DriverSite) -> None:
         self._site = site
 
-    def clip_wheel_speed(self, speed_rad_s: float) -> float:
-        """Return the speed within the motor's limits, rad/s."""
-        return clip_wheel_speed(speed_rad_s)
-
-    def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
-        """Return the packet for these wheel speeds."""
-        return radio_link.encode_drive(left_rad_s, right_rad_s)
-
     def halt(self) -> bytes:
-        """Return the packet that stops the wheels."""
+        """Return the packet that stops all motion."""
         return radio_link.encode_halt()
-
-    def jump(self) -> bytes:
-        """Return the packet for a jump."""
-        return radio_link.encode_jump()
 
     def transmitter(self, on: bool, frequency: str) -> bytes:
         """Return the packet that switches the transmitter on or off."""
@@ -120,5 +108,21 @@ class SimulatedScoutProtocol:
             raise HardwareFault(f"{self._site.resource}: {error}") from error
 
     def safe(self) -> bytes:
-        """Return the packet after which the Scout neither moves nor transmits."""
+        """Return the packet after which the robot neither moves nor transmits."""
         return radio_link.encode_safe()
+
+
+class SimulatedScoutProtocol(SimulatedRobotProtocol):
+    """Encodes packets for the simulated Scout's firmware."""
+
+    def clip_wheel_speed(self, speed_rad_s: float) -> float:
+        """Return the speed within the motor's limits, rad/s."""
+        return clip_wheel_speed(speed_rad_s)
+
+    def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
+        """Return the packet for these wheel speeds."""
+        return radio_link.encode_drive(left_rad_s, right_rad_s)
+
+    def jump(self) -> bytes:
+        """Return the packet for a jump."""
+        return radio_link.encode_jump()

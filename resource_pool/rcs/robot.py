@@ -161,15 +161,16 @@ class Robot(ResourceController[P], Generic[P]):
         self._driven.set()
         await self._move(hold, order, packet, lasts_s=COMMAND_TIMEOUT_S, afterwards=self._protocol.halt())
 
-    async def move_once(self, hold: Hold, order: Command, packet: bytes, kind: str) -> None:
+    async def move_once(self, hold: Hold, order: Command, packet: bytes, kind: str, *, goes_on: bool = False) -> None:
         """Send a packet that moves the robot once, in the stream of this kind; raises as ``move``.
 
         Afterwards the radio repeats a packet that changes nothing, because a repeated drive or halt could cancel the
-        motion.
+        motion. With ``goes_on`` the radio goes on with the packet before, because this one concerns another part.
         """
-        as_it_is = self._protocol.transmitter(bool(self._frequency), self._frequency)
+        as_it_is = b"" if goes_on else self._protocol.transmitter(bool(self._frequency), self._frequency)
         await self._move(hold, order, packet, at_once=True, afterwards=as_it_is, kind=kind)
-        self._stands(hold)
+        if not goes_on:
+            self._stands(hold)
 
     def statistics(self) -> dict[str, float]:
         """Count halts for lack of commands, and emergency stops, too."""
