@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
@@ -203,6 +203,8 @@ class Pool:
     network: LocalNetwork
     clock: VirtualClock
     hardware: list[Resource]
+    rc_classes: Mapping[str, type[Component[Any]]] = field(default_factory=lambda: RC_CLASSES)
+    arc_classes: Mapping[str, type[AggregateResourceController]] = field(default_factory=lambda: ARC_CLASSES)
     running: dict[str, Component[Any]] = field(default_factory=dict)
     lives: dict[str, asyncio.Task[None]] = field(default_factory=dict)
     voices: dict[str, Bus] = field(default_factory=dict)
@@ -244,7 +246,7 @@ class Pool:
     async def rc(self, name: str, **changed: Any) -> Any:
         resource = next(resource for resource in self.hardware if resource.name == name)
         parameters = resource.rc_parameters() | changed
-        return await self.start(RC_CLASSES[resource.type], name, parameters, kind=resource.type)
+        return await self.start(self.rc_classes[resource.type], name, parameters, kind=resource.type)
 
     async def manager(self) -> RcManager:
         parameters = {"mission": "local", "mission_priority": 10}
@@ -253,19 +255,19 @@ class Pool:
     async def owner(self, name: str) -> Owner:
         return await self.start(Owner, name, None, Subsystem.MISSION_CONTROL)
 
-    async def arc(self, owner: Owner, kind: str, scout: str, **more: Any) -> ArcClient:
+    async def arc(self, owner: Owner, kind: str, robot: str, **more: Any) -> ArcClient:
         """Start an ARC for this robot and return the owner's hold on it."""
         name = f"{owner.name}-{kind}"
         client = owner.know(name)
         given = {"minimum_runtime_s": 5.0, "path": [PathNode("local", 10), PathNode(owner.name, 1)]} | more
-        parameters = claim_parameters(owner.address, wish={"scout": scout}, **given)
-        await self.start(ARC_CLASSES[kind], name, msgspec.to_builtins(parameters), kind=kind)
+        parameters = claim_parameters(owner.address, wish={self.arc_classes[kind].body: robot}, **given)
+        await self.start(self.arc_classes[kind], name, msgspec.to_builtins(parameters), kind=kind)
         return client
 
-    async def console(self, name: str, kind: str, scout: str, priority: int = 100) -> tuple[Owner, ArcClient]:
+    async def console(self, name: str, kind: str, robot: str, priority: int = 100) -> tuple[Owner, ArcClient]:
         owner = await self.owner(name)
         path = [PathNode(name, priority)]
-        return owner, await self.arc(owner, kind, scout, path=path, console=True, minimum_runtime_s=0.1)
+        return owner, await self.arc(owner, kind, robot, path=path, console=True, minimum_runtime_s=0.1)
 
     async def end(self, name: str) -> None:
         """Let it leave in good order."""
@@ -325,17 +327,27 @@ class Pool:
 
 
 @asynccontextmanager
-async def a_pool(mission: Any, rcs: list[str], *, manager: bool = True) -> AsyncIterator[Pool]:
-    """Give a pool with these RCs running."""
+async def a_pool(
+    mission: Any,
+    rcs: list[str],
+    *,
+    manager: bool = True,
+    world: WorldDescription = WORLD,
+    hardware: Sequence[Resource] = (),
+    rc_classes: Mapping[str, type[Component[Any]]] | None = None,
+    arc_classes: Mapping[str, type[AggregateResourceController]] | None = None,
+) -> AsyncIterator[Pool]:
+    """Give a pool with these RCs running; hardware and classes are added to those of this file."""
     clock = VirtualClock()
     WiretappedRadio.built.clear()
     HandOperatedGrabber.built.clear()
     async with mission(clock=clock) as network, AsyncExitStack() as stack:
-        pool = Pool(network, clock, HARDWARE)
+        all_hardware = [*HARDWARE, *hardware]
+        pool = Pool(network, clock, all_hardware, RC_CLASSES | (rc_classes or {}), ARC_CLASSES | (arc_classes or {}))
         stack.push_async_callback(pool.close)
-        resources = [msgspec.to_builtins(resource) for resource in HARDWARE if resource.name in rcs]
+        resources = [msgspec.to_builtins(resource) for resource in all_hardware if resource.name in rcs]
         await pool.start(DependencyDatabase, "dependency_database", {"resources": resources}, Subsystem.BACKBONE)
-        await pool.start(SimulatedWorld, "world", {"world": msgspec.to_builtins(WORLD)})
+        await pool.start(SimulatedWorld, "world", {"world": msgspec.to_builtins(world)})
         for name in rcs:
             await pool.rc(name)
         if manager:

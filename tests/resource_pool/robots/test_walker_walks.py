@@ -11,7 +11,7 @@ from resource_pool.robots.walker import link
 from resource_pool.robots.walker.gait import WALK, TrunkSpeed
 from scout_model import radio_link
 from scout_model.camera import Camera
-from scout_model.description import ScoutPlace, WorldDescription
+from scout_model.description import RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.world import World
 
@@ -105,8 +105,8 @@ def test_silence_in_the_middle_of_a_stride_lets_it_stand() -> None:
 
 
 def test_in_a_world_it_walks_beside_a_scout_and_sleeps_when_it_stands() -> None:
-    places = [ScoutPlace("walker1", 1, 3.0, 3.0, 0.0, WALKER), ScoutPlace("scout1", 2, 3.0, 4.0, 0.0)]
-    room, pilot = World(WorldDescription(9.0, 6.0, scouts=places)), Pilot()
+    places = [RobotPlace("walker1", 1, 3.0, 3.0, 0.0, WALKER), RobotPlace("scout1", 2, 3.0, 4.0, 0.0)]
+    room, pilot = World(WorldDescription(9.0, 6.0, robots=places)), Pilot()
     pilot.control.request(TrunkSpeed(0.3))
     room.hear(1, radio_link.encode_transmitter_on("video1"))
     for frame in range(3 * FRAMES_PER_S):
@@ -131,8 +131,8 @@ def test_in_a_world_it_walks_beside_a_scout_and_sleeps_when_it_stands() -> None:
 
 
 def test_its_camera_sees_the_room_from_its_head() -> None:
-    places = [ScoutPlace("walker1", 1, 3.0, 3.0, 0.0, WALKER), ScoutPlace("scout1", 2, 4.0, 3.0, 0.0)]
-    with Camera(World(WorldDescription(9.0, 6.0, scouts=places)).mjcf, "paint") as camera:
+    places = [RobotPlace("walker1", 1, 3.0, 3.0, 0.0, WALKER), RobotPlace("scout1", 2, 4.0, 3.0, 0.0)]
+    with Camera(World(WorldDescription(9.0, 6.0, robots=places)).mjcf, "paint") as camera:
         assert camera.picture("walker1").std() > 10
 
 

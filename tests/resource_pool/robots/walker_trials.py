@@ -14,7 +14,7 @@ from resource_pool.robots.walker.gait import LEGS, TROT, GaitParameters, TrunkSp
 from resource_pool.robots.walker.link import JOINTS, JointTargets
 from resource_pool.robots.walker.motion import STEP_S, MotionControl
 from scout_model.composition import compose
-from scout_model.description import ScoutPlace, WorldDescription
+from scout_model.description import RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEPS_PER_FRAME
 
 WALKER = "resource_pool.robots.walker.body:Walker"
@@ -85,8 +85,8 @@ class Trial:
         self._rng = random.Random(seed)
         self._is_disturbed = seed is not None
         heading_rad = self._rng.uniform(-math.pi, math.pi) if self._is_disturbed else 0.0
-        place = ScoutPlace("walker1", 1, 6.0, 6.0, heading_rad, WALKER)
-        self.model = mujoco.MjModel.from_xml_string(compose(WorldDescription(12.0, 12.0, scouts=[place])))
+        place = RobotPlace("walker1", 1, 6.0, 6.0, heading_rad, WALKER)
+        self.model = mujoco.MjModel.from_xml_string(compose(WorldDescription(12.0, 12.0, robots=[place])))
         self.data = mujoco.MjData(self.model)
         if self._is_disturbed:
             friction = self._rng.uniform(0.5, 1.0)
