@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+import random
+from typing import Any, cast
 
 import pytest
 from pool_on_local_network import Pool
@@ -11,20 +12,19 @@ from walker_pool import Trunk, claim, move_for, play, sent, take_over, walker_po
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, Clock
-from backbone.component.abilities import ValueKind
 from backbone.component.launch import Launch
 from backbone.errors import LinkError, Refusal
+from backbone.rc_manager.messages import Disconnect, Disconnected
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import ArcClient, lift_stop, stop_robot
 from resource_pool.commands import Drive, Jump, SwitchTransmitter
 from resource_pool.drivers.interface import HardwareFault
-from resource_pool.messages import COMMAND_TIMEOUT_S, NoSuchAction
+from resource_pool.messages import COMMAND_TIMEOUT_S, NoSuchAction, NoTurnSoon
 from resource_pool.rcs.command_radio import CommandRadio
-from resource_pool.robots.walker.gait import MAX_FORWARD_M_S, MAX_TURN_RAD_S, TROT, WALK, ImpossibleMove, TrunkSpeed
-from resource_pool.robots.walker.link import JointTargets, Status, encode_status
-from resource_pool.robots.walker.motion import STEP_S, MotionControl
+from resource_pool.robots.walker.gait import MAX_FORWARD_M_S, MAX_TURN_RAD_S, TROT, WALK, ImpossibleMove
+from resource_pool.robots.walker.link import JointTargets
+from resource_pool.robots.walker.motion import STEP_S
 from resource_pool.robots.walker.rc import Walker
-from resource_pool.robots.walker.report import report_of
 from resource_pool.stop_messages import EmergencyStopped
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOn
 
@@ -185,6 +185,18 @@ def test_the_end_of_its_grant_puts_its_legs_down(local_mission: Any) -> None:
     play(local_mission, scene)
 
 
+def test_no_step_follows_the_end_of_its_hold_even_if_its_radio_still_takes_packets(local_mission: Any) -> None:
+    async def scene(pool: Pool, arc: ArcClient, trunk: Trunk) -> None:
+        await move_for(pool, arc, 1.0, 0.3)
+        order = Disconnect(arc.arc, arc.epochs["walker1"])
+        await pool.manager_voice.ask("resource_pool/walker1", order, Disconnected, within_s=1)
+        stepped = steps(pool)
+        await pool.clock.sleep_s(0.1)
+        assert steps(pool) == stepped
+
+    play(local_mission, scene)
+
+
 async def hand_over(pool: Pool, arc: ArcClient, trunk: Trunk, share: float) -> None:
     """Let a person take the walker over at this share of a round of its feet, and walk the other way."""
     await move_for(pool, arc, 1.0, 0.3)
@@ -213,6 +225,43 @@ def test_it_is_handed_over_upright_at_every_phase(local_mission: Any, twentieth:
     play(local_mission, scene)
 
 
+async def end_walk(pool: Pool, arc: ArcClient, how: str) -> None:
+    match how:
+        case "halt":
+            await arc.halt()
+        case "still":
+            await arc.move(0.0)
+        case "stop":
+            await stop_robot(pool.voice_of(OPERATOR), "walker1", "child in the room", "anna")
+        case "idle":
+            await arc.idle()
+        case "take over":
+            await take_over(pool, "anna")
+        case "kill":
+            await pool.kill("walker1")
+        case "kill radio":
+            await pool.kill("radio")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", ["halt", "still", "silence", "stop", "idle", "take over", "kill", "kill radio"])
+@pytest.mark.parametrize("seed", range(10))
+def test_whatever_ends_a_walk_at_whatever_moment_it_stands_upright(local_mission: Any, how: str, seed: int) -> None:
+    async def scene(pool: Pool, arc: ArcClient, trunk: Trunk) -> None:
+        rng = random.Random(seed)
+        for _ in range(3):
+            forward_m_s, turn_rad_s = rng.uniform(-0.4, 0.4), rng.uniform(-2.0, 2.0)
+            await move_for(pool, arc, rng.uniform(0.1, 1.5), forward_m_s, turn_rad_s)
+        await pool.clock.sleep_s(rng.uniform(0.0, 0.1))
+        await end_walk(pool, arc, how)
+        await pool.clock.sleep_s(COMMAND_TIMEOUT_S + STANDS_S)
+        stood = (trunk.x_m, trunk.y_m)
+        await pool.clock.sleep_s(1.0)
+        assert (trunk.x_m, trunk.y_m) == pytest.approx(stood, abs=2e-3)
+
+    play(local_mission, scene)
+
+
 @pytest.mark.parametrize("fault", ["breaks", "hangs"])
 def test_a_walker_whose_radio_fails_puts_its_legs_down(local_mission: Any, fault: str) -> None:
     async def scene(pool: Pool, arc: ArcClient, trunk: Trunk) -> None:
@@ -224,6 +273,35 @@ def test_a_walker_whose_radio_fails_puts_its_legs_down(local_mission: Any, fault
         assert isinstance(await pool.outcome("radio"), HardwareFault)
 
     play(local_mission, scene)
+
+
+class RefusingRadio(CommandRadio):
+    """Refuses packets when the test says so, and keeps its holders."""
+
+    refuses = False
+
+    async def command(self, asked: Envelope[Message]) -> Message:
+        if self.refuses:
+            raise NoTurnSoon(f"{self.name} has no turn")
+        return await super().command(asked)
+
+
+def test_a_walk_whose_packets_are_refused_ends_and_its_sender_learns_why(local_mission: Any) -> None:
+    async def scene(pool: Pool, arc: ArcClient, trunk: Trunk) -> None:
+        radio = cast(RefusingRadio, pool.running["radio"])
+        await move_for(pool, arc, 1.0, 0.3)
+        radio.refuses = True
+        await assert_stands(pool, trunk)
+        notes = [event.what for event in pool.running["walker1"].story.of(arc.arc)]
+        assert [note for note in notes if note.startswith("its walk ended: radio has no turn")]
+        with pytest.raises(NoTurnSoon):
+            await arc.move(0.3)
+        radio.refuses = False
+        began_m = trunk.x_m
+        await move_for(pool, arc, 1.0, 0.3)
+        assert trunk.x_m > began_m + 0.1
+
+    play(local_mission, scene, command_radio=RefusingRadio)
 
 
 # ---------------------------------------------------------------------- at its rate, beside a Scout
@@ -319,44 +397,3 @@ def test_a_standing_walker_loads_nothing(local_mission: Any) -> None:
         assert pool.running["world"].statistics()["packets"] > 0
 
     play(local_mission, scene)
-
-
-# ---------------------------------------------------------------------- what consoles draw
-def test_its_abilities_have_the_limits_of_its_gait() -> None:
-    abilities = Walker.abilities()
-    forms = {form.word: form for form in abilities.commands}
-    assert list(forms) == ["move", "halt", "switch_transmitter"]
-    assert [(field.least, field.most) for field in forms["move"].fields] == [
-        (-MAX_FORWARD_M_S, MAX_FORWARD_M_S),
-        (-MAX_TURN_RAD_S, MAX_TURN_RAD_S),
-    ]
-    assert abilities.is_robot
-    assert abilities.body_class == "resource_pool.robots.walker.body:Walker"
-
-
-def test_each_value_of_its_report_can_be_a_gauge() -> None:
-    reports = Walker.abilities().reports
-    assert {field.kind for field in reports} == {ValueKind.NUMBER, ValueKind.FLAG}
-    assert all(field.doc for field in reports)
-    units = {field.name: field.unit for field in reports}
-    assert [units[name] for name in ("expected_m_s", "turn_rad_s", "hind_left_knee_rad", "phase")] == [
-        "m/s",
-        "rad/s",
-        "rad",
-        "",
-    ]
-
-
-def test_its_status_and_its_state_of_motion_are_one_report() -> None:
-    angles_rad = tuple(number / 100 for number in range(12))
-    payload = encode_status(Status(1.0, 0.1, -0.2, 0.5, angles_rad, (True, False, True, False)))
-    control = MotionControl()
-    control.request(TrunkSpeed(0.2, 0.4))
-    control.step(0.0)
-    report = report_of(payload, control.state())
-    assert (report.battery_share, report.roll_rad, report.pitch_rad, report.turn_rad_s) == (1.0, 0.1, -0.2, 0.5)
-    assert (report.commanded_m_s, report.commanded_rad_s, report.expected_m_s) == (0.2, 0.4, 0.0)
-    assert (report.front_left_foot, report.front_right_foot) == (True, False)
-    assert (report.hind_left_foot, report.hind_right_foot) == (True, False)
-    assert report.front_left_abduction_rad == 0.0
-    assert (report.front_right_knee_rad, report.hind_right_knee_rad) == pytest.approx((0.05, 0.11))
