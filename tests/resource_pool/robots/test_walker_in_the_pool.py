@@ -6,9 +6,10 @@ import math
 import random
 from typing import Any, cast
 
+import msgspec
 import pytest
 from pool_on_local_network import Pool
-from walker_pool import Trunk, claim, move_for, play, sent, take_over, walker_pool
+from walker_pool import ROOM, Trunk, claim, move_for, play, sent, take_over, walker_pool
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, Clock
@@ -26,6 +27,7 @@ from resource_pool.robots.walker.link import JointTargets
 from resource_pool.robots.walker.motion import STEP_S
 from resource_pool.robots.walker.rc import Walker
 from resource_pool.stop_messages import EmergencyStopped
+from scout_model.description import AirDescription
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOn
 
 OPERATOR = "ui_console/console-1"
@@ -346,6 +348,21 @@ def test_late_steps_are_counted_and_it_walks_on(local_mission: Any) -> None:
         assert trunk.x_m > 2.6
 
     play(local_mission, scene, walker=LateWalker)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("loss", "least_m"), [(0.1, 0.6), (0.3, 0.35), (0.5, 0.1)])
+@pytest.mark.parametrize("seed", range(5))
+def test_with_packets_lost_it_is_slower_and_does_not_fall(
+    local_mission: Any, loss: float, least_m: float, seed: int
+) -> None:
+    async def scene(pool: Pool, arc: ArcClient, trunk: Trunk) -> None:
+        await move_for(pool, arc, 4.0, 0.3)
+        assert pool.audit["packets_lost"] > 0
+        assert trunk.x_m - 2.0 > least_m
+
+    lossy = msgspec.structs.replace(ROOM, seed=seed, air=AirDescription(radio_loss=loss))
+    play(local_mission, scene, lossy)
 
 
 def test_a_scout_and_a_walker_share_one_radio(local_mission: Any) -> None:

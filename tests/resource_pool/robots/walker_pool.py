@@ -82,12 +82,12 @@ async def watch_trunk(bus: Bus) -> Trunk:
 
 
 def walker_pool(
-    mission: Any, rcs: list[str], **other_classes: type[Component[Any]]
+    mission: Any, rcs: list[str], world: WorldDescription = ROOM, **other_classes: type[Component[Any]]
 ) -> AbstractAsyncContextManager[Pool]:
     return a_pool(
         mission,
         rcs,
-        world=ROOM,
+        world=world,
         hardware=HARDWARE,
         rc_classes={"walker": Walker} | other_classes,
         arc_classes={"walker_drive": WalkerDriveArc, "walker_capture": WalkerCaptureArc},
@@ -97,12 +97,13 @@ def walker_pool(
 def play(
     mission: Any,
     scene: Callable[[Pool, ArcClient, Trunk], Coroutine[Any, Any, None]],
+    world: WorldDescription = ROOM,
     **other_classes: type[Component[Any]],
 ) -> None:
     """Let the scene run with a walker that stands and is granted for driving; afterwards it has not fallen."""
 
     async def main() -> None:
-        async with walker_pool(mission, ["walker1", "scout1", "radio"], **other_classes) as pool:
+        async with walker_pool(mission, ["walker1", "scout1", "radio"], world, **other_classes) as pool:
             trunk = await watch_trunk(pool.ear)
             arc = await claim(pool, "patrol", "walker1")
             granted = await arc.wait_granted()
