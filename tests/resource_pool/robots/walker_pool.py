@@ -10,6 +10,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pytest
 from pool_on_local_network import Pool, a_pool
 
 from backbone.bus.clock import run_virtual
@@ -41,6 +42,8 @@ HARDWARE = [Resource("walker1", "walker", parameters={"network_id": NETWORK_ID},
 DRIVES = Usage(0.05, 0.003, kind="drive")
 WORLD = address(Subsystem.RESOURCE_POOL, "world")
 FALLEN_RAD = math.radians(30.0)
+OPERATOR = "ui_console/console-1"
+STANDS_S = 1.0  # chosen: the trot's last steps, and the time in which the board puts the legs down
 
 
 @dataclass
@@ -137,3 +140,17 @@ async def take_over(pool: Pool, person: str) -> ArcClient:
 def sent(pool: Pool) -> list[link.Packet]:
     """Return what went on the air for the walker."""
     return [link.decode(heard.payload) for heard in pool.radio_driver.heard_by(NETWORK_ID)]
+
+
+def steps(pool: Pool) -> float:
+    """Return how often its motion control has stepped."""
+    return float(pool.running["walker1"].statistics()["steps"])
+
+
+async def assert_stands(pool: Pool, trunk: Trunk) -> None:
+    """Fail unless the walker stands by now, and its motion control rests."""
+    await pool.clock.sleep_s(STANDS_S)
+    stood, stepped = (trunk.x_m, trunk.y_m), steps(pool)
+    await pool.clock.sleep_s(1.0)
+    assert (trunk.x_m, trunk.y_m) == pytest.approx(stood, abs=2e-3)
+    assert steps(pool) == stepped
