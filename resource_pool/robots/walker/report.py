@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
+
 from backbone.ranges import Radians, Share, Speed, TurnRate
-from backbone.wire import Message
 from resource_pool.robots.walker.gait import LEGS
 from resource_pool.robots.walker.link import JOINTS, decode_status
 from resource_pool.robots.walker.motion import StateOfMotion
 
 
-class WalkerReport(Message, frozen=True):
+class WalkerReport(msgspec.Struct, frozen=True):
     """State of the walker.
 
     Attributes:
