@@ -37,7 +37,7 @@ class BehaviorHooks:
         What: inform algorithms of the elapsed time. Not: drive in a loop; that is ``act``.
 
         Args:
-            rcs: Kind → name of the granted RCs.
+            rcs: Role → name of the granted RCs.
         """
 
     async def act(self) -> None:

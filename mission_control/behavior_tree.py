@@ -27,8 +27,8 @@ class ArcNeed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         kind: Component type of the ARC.
         minimum_runtime_s: Shortest useful time, seconds, above 0.
-        wish: Kind of RC → name wanted.
-        features: Kind of RC → features wanted.
+        wish: Role → name wanted.
+        features: Role → features wanted.
         maximum_runtime_s: End of extensions, seconds; 0: the minimum.
         period_s: Interval between radio packets, seconds.
         packet_time_s: Air time of one packet, seconds.

@@ -48,7 +48,7 @@ class BehaviorState(Message, frozen=True):
 
     Attributes:
         payload: Payload of its last report to its parent.
-        holds: Kind → name of its granted RCs; empty while suspended or without an ARC.
+        holds: Role → name of its granted RCs; empty while suspended or without an ARC.
         suspended_because: Reason and cause of the suspension; empty unless suspended.
         tree: Its branch of the behavior tree as text, one line a node.
     """

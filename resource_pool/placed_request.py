@@ -28,7 +28,7 @@ class PlacedRequest:
 
     Attributes:
         request: The request; None until it is made.
-        rcs: Kind → name of the chosen RCs; empty until they are chosen.
+        rcs: Role → name of the chosen RCs; empty until they are chosen.
         sending: Task that sends changed run times; cancelled by the next change.
     """
 

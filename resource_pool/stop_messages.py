@@ -95,19 +95,19 @@ class EmergencyStopped(Refusal):
     Facts: ``rc``, ``number``, ``is_stopped``, ``by``, ``reason``, ``since_s``.
     """
 
-    code = "scout.emergency_stop"
+    code = "robot.emergency_stop"
     remedy = "See that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
 
 
 class GivenBeforeStop(EmergencyStopped):
     """The sender did not know the robot's last stop, which was lifted since; facts as ``EmergencyStopped``."""
 
-    code = "scout.given_before_stop"
+    code = "robot.given_before_stop"
     remedy = "Give the command again, now that you know of the stop: let go of the control and press it again."
 
 
 class OtherStop(Refusal):
     """Another stop than the one to lift is in force; facts: ``number``, ``by``. Nothing is changed."""
 
-    code = "scout.other_stop"
+    code = "robot.other_stop"
     remedy = "See which operator stopped the robot since, and lift that stop if the robot may move."

@@ -56,8 +56,8 @@ class ArcWish(ArcAttributes):
     """The ARC a behavior needs.
 
     Attributes:
-        wish: Kind of RC → name.
-        features: Kind of RC → features.
+        wish: Role → name.
+        features: Role → features.
     """
 
     wish: dict[str, str] = {}

@@ -55,7 +55,7 @@ class RobotParameters(RcParameters, frozen=True, kw_only=True):
 class NoRadio(Refusal):
     """The ARC holds the robot without its command radio."""
 
-    code = "scout.no_radio"
+    code = "robot.no_radio"
     remedy = "Claim a kind of ARC whose set includes the robot's command radio."
 
 

@@ -73,7 +73,7 @@ def test_the_questions_people_ask_first_are_answered_two_clicks_from_the_readme(
     rows = [row for row in section.partition("\n## ")[0].splitlines() if "?" in row]
     answers = {(row.split("|")[1].strip()): [target for _, target in LINK.findall(row)] for row in rows}
     assert {question: [target.partition("#")[0] for target in targets] for question, targets in answers.items()} == {
-        "How do I write an RC and its ARC?": ["how-to/write-a-driver.md"] * 2,  # test_skeletons.py plays it
+        "How do I write an RC and its ARC?": ["how-to/add-a-device.md"] * 2,  # test_the_guide_to_devices.py plays it
         "Why does my request wait?": ["explanation/why-do-i-wait.md"],  # test_wait_examples.py plays it
         "What does this word mean?": ["reference/glossary.md"],  # test_glossary.py compares it
         "Where is the decision made?": ["tour.md"],  # the test of the tour below

@@ -29,7 +29,7 @@ def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources
     """Return the kind of ARC to claim: one whose body is this robot, with the RCs that this sight needs and no others.
 
     Args:
-        robot: The robot; empty: any.
+        robot: The robot, or another device that is a body of a kind; empty: any robot.
         types: Component types of the mission.
         resources: Hardware of the mission.
 
@@ -37,7 +37,7 @@ def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources
         NoArcKind: The mission has no kind for the robot.
     """
     there = {resource.type for resource in resources}
-    of_robot = {resource.type for resource in resources if resource.is_robot and robot in ("", resource.name)}
+    of_robot = {resource.type for resource in resources if resource.name == robot or (not robot and resource.is_robot)}
     drives = [one for one in types if one.needs.get(one.abilities.body, "") in of_robot]
     complete = [one for one in drives if there.issuperset(one.needs.values())] or drives
     if not complete:

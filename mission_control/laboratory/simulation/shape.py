@@ -50,7 +50,7 @@ class OwnerShape:
         console: True for consoles.
         minimum_runtime_s: Shortest useful time.
         maximum_runtime_s: End of extensions.
-        wish: Kind of RC → name.
+        wish: Role → name.
         usage: Use of the radio.
         begins_s: Mission time of its first claim.
         rests: True if it gives its ARC back in the calm at the end.

@@ -56,7 +56,15 @@ def test_a_kind_whose_hardware_is_missing_gives_way_to_a_smaller_one() -> None:
     assert arc_kind("scout1", Sight.PICTURES, TYPES, without_grabber) == "video_drive"
 
 
-@pytest.mark.parametrize(("robot", "told"), [("radio1", "robot of this name"), ("spot", "robot of this name")])
+def test_a_device_is_claimed_by_its_name_and_never_as_any_robot() -> None:
+    types = [*TYPES, arc("light", "lamp")]
+    hardware = [*HARDWARE, Resource("lamp1", "lamp")]
+    assert arc_kind("lamp1", Sight.PICTURES, types, hardware) == "light"
+    with pytest.raises(NoArcKind):
+        arc_kind("", Sight.PICTURES, [arc("light", "lamp")], [Resource("lamp1", "lamp")])
+
+
+@pytest.mark.parametrize(("robot", "told"), [("radio1", "body of kind radio"), ("spot", "robot of this name")])
 def test_without_a_kind_for_the_robot_the_claim_is_refused(robot: str, told: str) -> None:
     with pytest.raises(NoArcKind, match=told):
         arc_kind(robot, Sight.PICTURES, TYPES, HARDWARE)

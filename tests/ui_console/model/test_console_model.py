@@ -276,7 +276,7 @@ def test_an_older_word_on_a_stop_changes_nothing() -> None:
 
 def test_what_was_refused_is_told_once_and_counted_and_an_operators_stop_is_no_second_alarm() -> None:
     refused = CommandRefused(3.0, "arc.swapped_out", "holds nothing", "wait")
-    stopped = CommandRefused(3.0, "scout.emergency_stop", "stopped", "lift")
+    stopped = CommandRefused(3.0, "robot.emergency_stop", "stopped", "lift")
     shown = model(*[refused] * 20, stopped, LinkTrouble(4.0, "nobody"))
     assert [(alarm.line, alarm.count) for alarm in shown.alarm_views()] == [
         ("no answer: nobody", 1),
