@@ -69,7 +69,7 @@ def claim_parameters(
         path: Priority path from the mission's root, or of the console alone.
         minimum_runtime_s: Shortest useful time, seconds, above 0.
         maximum_runtime_s: End of extensions; 0: the minimum.
-        wish: Role → name of the RC (``{"scout": "scout2"}``, ``{ROBOT: "rover1"}``); roles left out: any.
+        wish: Role → name of the RC (``{"scout": "scout2"}``, ``{ROBOT: "scout2"}``); roles left out: any.
         features: Role → features the RC must have (``{"scout": ["camera"]}``).
         usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
             kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period.

@@ -123,6 +123,7 @@ class Robot(ResourceController[P], Generic[P]):
     async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
         """Send no further command; the radio sends the safe packet at its own disconnection."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
+        self.cease()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer operators, too, who need no grant to stop the robot."""
@@ -154,7 +155,7 @@ class Robot(ResourceController[P], Generic[P]):
         """Halt, or switch the transmitter."""
         match order:
             case Halt():
-                await self._load(hold, self._protocol.halt())
+                await self.halt(hold)
                 self._stands(hold)
                 return {}
             case SwitchTransmitter(on=on, frequency=frequency):
@@ -165,6 +166,14 @@ class Robot(ResourceController[P], Generic[P]):
                 return {"on": float(on)}
             case _:
                 return await super().obey(hold, order)
+
+    # ------------------------------------------------------------------ hooks
+    async def halt(self, hold: Hold) -> None:
+        """Bring the robot to rest. When: at ``Halt``, and in silence. Override if that takes more than a packet."""
+        await self._load(hold, self._protocol.halt())
+
+    def cease(self) -> None:
+        """Make no further packet by itself. When: at once at an emergency stop, and at the end of a hold."""
 
     # ------------------------------------------------------------------ for derived classes
     async def move(self, hold: Hold, order: Command, packet: bytes, *, is_moving: bool = True) -> None:
@@ -179,10 +188,13 @@ class Robot(ResourceController[P], Generic[P]):
         Raises:
             EmergencyStopped: The robot was stopped meanwhile, and perhaps freed again; the packet is not sent.
         """
-        # Before the packet is sent, because meanwhile the hold may end or the radio's answer may be lost.
+        self.watch_silence(is_moving=is_moving)  # first, because meanwhile the hold may end or the answer be lost
+        await self._move(hold, order, packet, lasts_s=COMMAND_TIMEOUT_S, afterwards=self._protocol.halt())
+
+    def watch_silence(self, *, is_moving: bool) -> None:
+        """Halt if no command follows within ``COMMAND_TIMEOUT_S``; with ``is_moving`` false, never: it stands."""
         self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if is_moving else None
         self._driven.set()
-        await self._move(hold, order, packet, lasts_s=COMMAND_TIMEOUT_S, afterwards=self._protocol.halt())
 
     async def move_once(self, hold: Hold, order: Command, packet: bytes, kind: str, *, goes_on: bool = False) -> None:
         """Send a packet that moves the robot once, in the stream of this kind; raises as ``move``.
@@ -210,6 +222,7 @@ class Robot(ResourceController[P], Generic[P]):
         is_new = self._latch.stop(by, reason, self.clock.now_s(), console)
         self._keep_stop()
         self._halt_at_s = None
+        self.cease()
         holder = self._holder
         if holder is not None:
             try:
@@ -317,7 +330,7 @@ class Robot(ResourceController[P], Generic[P]):
             self._timeouts += 1
             self.story.note(hold.arc, "sent no command for too long: the robot was halted")
             try:
-                await self._load(hold, self._protocol.halt())
+                await self.halt(hold)
             except (Refusal, LinkError) as error:  # swapped out, or no radio: the safe packet or the robot itself halts
                 self.story.note(hold.arc, f"halt not sent: {error}")
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-HEAVY = ("numpy", "cv2", "mujoco", "pydantic", "lxml", "rich", "typer", "textual")
+HEAVY = ("numpy", "cv2", "mujoco", "mink", "pydantic", "lxml", "rich", "typer", "textual")
 LIGHT = [
     "resource_pool.rcs.scout",
     "resource_pool.rcs.command_radio",
@@ -20,6 +20,7 @@ LIGHT = [
     "resource_pool.devices.monitor.rc",
     "resource_pool.devices.monitor.arcs",
     "resource_pool.arc_client",
+    "resource_pool.robots.walker.arcs",
     "resource_pool.robots.walker.body",
 ]
 

@@ -12,13 +12,18 @@ Source: https://github.com/kevinzakka/mink, differential inverse kinematics as a
 
 from __future__ import annotations
 
-import mink
 import mujoco
 import numpy as np
 
 from resource_pool.robots.walker.body import Walker
+from resource_pool.robots.walker.extra import NoMink
 from resource_pool.robots.walker.gait import LEGS, Feet
 from resource_pool.robots.walker.link import JOINTS, Angles
+
+try:
+    import mink
+except ImportError as error:  # an extra; before a mission starts, its check says what is missing
+    raise NoMink(f"the motion control of a walker needs mink: {error}") from error
 
 TOLERANCE_M = 1e-4  # chosen: a hundredth of a foot
 MOST_ROUNDS = 4  # chosen: from one step of the motion control to the next two suffice

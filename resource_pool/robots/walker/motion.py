@@ -63,6 +63,12 @@ class MotionControl:
         """
         self._gait.request(move)
 
+    def rest(self) -> None:
+        """Stand at once, because the legs were put down without this motion control; dead reckoning goes on."""
+        self._gait = Gait(self._gait.parameters)
+        self._stepped_s = None
+        self._joints_rad = self._kinematics.joints(self._gait.advance(0.0))
+
     def step(self, now_s: float) -> Angles:
         """Return the joint targets at this time, in the order of ``JOINTS``.
 

@@ -16,7 +16,7 @@ PRODUCT = ("backbone", "resource_pool", "mission_control", "ui_console", "scout_
 TEXTS = {".py", ".js", ".ts", ".html", ".css", ".json", ".xsd", ".xml", ".toml", ".svg", ".mjcf", ""}
 EXCEPTIONS: dict[str, str] = {}
 """File that may name the rover → why."""
-MOST_LINES = {"rc.py": 80, "arcs.py": 35}  # chosen: what is written for RC and ARCs in a morning, with docstrings
+MOST_LINES = {"rc.py": 90, "arcs.py": 35}  # chosen: what is written for RC and ARCs in a morning, with docstrings
 
 
 def product_files() -> Iterator[Path]:

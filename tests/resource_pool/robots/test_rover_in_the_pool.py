@@ -263,7 +263,12 @@ def test_each_value_of_its_report_can_be_a_gauge() -> None:
     assert {field.kind for field in reports} == {ValueKind.NUMBER, ValueKind.FLAG}
     assert all(field.doc for field in reports)
     units = {field.name: field.unit for field in reports}
-    assert [units[name] for name in ("sonar_3_m", "yaw_rad_s", "left_m_s2", "battery")] == ["m", "rad/s", "m/s²", ""]
+    assert [units[name] for name in ("sonar_3_m", "yaw_rad_s", "left_m_s2", "battery_share")] == [
+        "m",
+        "rad/s",
+        "m/s²",
+        "",
+    ]
 
 
 def test_its_answer_is_read_as_its_report() -> None:

@@ -136,5 +136,25 @@ def test_a_control_that_was_held_up_does_not_leap() -> None:
     assert held_up.step(61.0) == pytest.approx(on_time.step(1.0 + LONGEST_STEP_S), abs=1e-9)
 
 
+@settings(max_examples=15)
+@given(moves, st.integers(0, 60))
+def test_a_control_that_rests_begins_anew_from_the_standing_posture(move: TrunkSpeed, steps: int) -> None:
+    rested, new = MotionControl(), MotionControl()
+    rested.request(move)
+    for step in range(steps):
+        rested.step(step * STEP_S)
+    way = rested.state()
+    rested.rest()
+    state = rested.state()
+    assert state.is_resting
+    assert state.joints_rad == pytest.approx((0.0,) * 12, abs=0.005)
+    assert (state.x_m, state.y_m, state.heading_rad) == (way.x_m, way.y_m, way.heading_rad)
+    for control in (rested, new):
+        control.request(TrunkSpeed(0.3))
+    for step in range(20):
+        now_s = 100.0 + step * STEP_S
+        assert rested.step(now_s) == pytest.approx(new.step(now_s), abs=0.005)
+
+
 def test_legs_and_joints_have_one_order() -> None:
     assert [joint.rpartition("_")[0] for joint in JOINTS[::3]] == list(LEGS)

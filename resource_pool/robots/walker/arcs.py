@@ -1,0 +1,30 @@
+"""ARC kinds of a walker: drive it, or drive it and capture its video.
+
+Its packets are longer than a Scout's, so a claim declares a packet time of 3 ms, and a period of 50 ms: at 100 ms the
+trot keeps two thirds of its speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from resource_pool.arcs.capture import CaptureArc
+from resource_pool.arcs.drive import DriveArc
+from resource_pool.commands import Command, Halt, Move
+
+
+class WalkerDriveArc(DriveArc):
+    """A walker and a share of its command radio."""
+
+    roles: ClassVar[Sequence[str]] = ("walker", "command_radio")
+    commands: ClassVar[Mapping[type[Command], str]] = dict.fromkeys((Move, Halt), "walker")
+    body = "walker"
+
+
+class WalkerCaptureArc(CaptureArc):
+    """A walker, its radio and video frequency, and a framegrabber tuned to it."""
+
+    roles: ClassVar[Sequence[str]] = (*WalkerDriveArc.roles, "video_frequency", "framegrabber")
+    commands = WalkerDriveArc.commands
+    body = "walker"

@@ -1,0 +1,12 @@
+"""The extra ``walker``: what the motion control needs beyond the dependencies of every mission."""
+
+from __future__ import annotations
+
+from backbone.errors import Refusal
+
+
+class NoMink(Refusal):
+    """The inverse kinematics cannot be imported on this host."""
+
+    code = "walker.no_mink"
+    remedy = "Install it on each host that may run a walker's RC: pip install 'scout-backbone[walker]'."
