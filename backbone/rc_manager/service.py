@@ -35,6 +35,7 @@ from backbone.rc_manager.messages import (
     AskAttributes,
     AskRequest,
     AskSchedule,
+    AskUtilization,
     AskWhy,
     Beat,
     ChangeRuntime,
@@ -84,6 +85,8 @@ from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.shares import Shares
+from backbone.scheduling.views import Utilization
 from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope, Message
 
@@ -134,6 +137,7 @@ class RcManager(Component[RcManagerParameters]):
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
         self._trace = TraceFile("")
+        self._shares = Shares()
         self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
         self._recovery = Recovery(bus, clock)
         self._rcs = RcWatch(self, self._context_switch, self._recovery)
@@ -219,6 +223,9 @@ class RcManager(Component[RcManagerParameters]):
                 return self.answers.why(name, self.clock.now_s())
             case AskAttributes(name=name):
                 return self.answers.attributes(name)
+            case AskUtilization(periods=periods):
+                now_s = self.clock.now_s()
+                return Utilization(now_s, self._shares.utilizations(now_s, periods=periods))
             case _:
                 return await super().answer(asked)
         return Done()
@@ -294,6 +301,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _record(self, record: Record) -> None:
         line = dict(record.line)
+        self._shares.take(line)
         if not self._trace.write(line):
             self._trace_stopped()
         subject = str(line.get("arc") or line.get("id") or "")
@@ -344,6 +352,7 @@ class RcManager(Component[RcManagerParameters]):
         began_s = min((at_s for at_s, _ in adopted), default=self.clock.now_s())
         self._rcs.up.update(found.rcs)
         for resource in self._resources.values():
+            self._shares.know(resource.name, began_s)
             self.happened(rc_known(resource, found.rcs.get(resource.name)), began_s)
         for at_s, event in adopted:
             self._remember(event.request, tuple(event.epochs))
