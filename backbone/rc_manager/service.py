@@ -19,17 +19,18 @@ from pathlib import Path
 from typing import assert_never
 
 from backbone.addresses import DEPENDENCY_DATABASE, NAMESERVER
-from backbone.bus.interface import Bus, Clock
+from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
-from backbone.dependency_database.messages import AskResources, Resource, Resources
+from backbone.dependency_database.messages import HardwareChanged
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.beats import Beats
 from backbone.rc_manager.context_switch import ContextSwitch, in_pool
+from backbone.rc_manager.hardware import Hardware
 from backbone.rc_manager.messages import (
     RENEW_EVERY_S,
     AskAttributes,
@@ -82,7 +83,16 @@ from backbone.scheduling.events import (
 )
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.scheduling.requests import (
+    LEASE_S,
+    Lease,
+    PathNode,
+    RcUse,
+    Scheduled,
+    SchedulingRequest,
+    UnknownRc,
+    UnknownRequest,
+)
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.shares import Shares
@@ -129,7 +139,6 @@ class RcManager(Component[RcManagerParameters]):
             planner=load_planner(given.planner),
         )
         self.answers = Answers(self.manager)
-        self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}
         self._beats = Beats(clock.rate)
         self._requesting: Counter[str] = Counter()
@@ -137,10 +146,12 @@ class RcManager(Component[RcManagerParameters]):
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
         self._trace = TraceFile("")
-        self._shares = Shares()
+        self.shares = Shares()
         self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
         self._recovery = Recovery(bus, clock)
         self._rcs = RcWatch(self, self._context_switch, self._recovery)
+        self._hardware = Hardware(self, self._recovery, self._rcs, self._follow)
+        self._resources = self._hardware.resources
         self._found = Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
         self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
@@ -153,8 +164,7 @@ class RcManager(Component[RcManagerParameters]):
             self._trace_stopped()
         for record in self.manager.opening_lines():
             self._record(record)
-        found = await self._recovery.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
-        self._resources = self._rcs.resources = {resource.name: resource for resource in found.resources}
+        await self._hardware.learn()
         self._found = self._rcs.believed(await self._recovery.find(self._resources))
         await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
 
@@ -163,8 +173,9 @@ class RcManager(Component[RcManagerParameters]):
         self._take_over(self._found)
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_from_nameserver)
         self.bus.subscribe(f"{Subsystem.RESOURCE_POOL}/*", Conversation.BEAT, Beat, self._heard_beat)
-        for rc in self._resources:
-            self.bus.subscribe(in_pool(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
+        self.bus.subscribe(DEPENDENCY_DATABASE, Conversation.EVENTS, HardwareChanged, self._hardware_changed)
+        self._hardware.follow_all()
+        self._compare_hardware()
         self.bus.watch_link(self._link_changed)
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
@@ -225,7 +236,7 @@ class RcManager(Component[RcManagerParameters]):
                 return self.answers.attributes(name)
             case AskUtilization(periods=periods):
                 now_s = self.clock.now_s()
-                return Utilization(now_s, self._shares.utilizations(now_s, periods=periods))
+                return Utilization(now_s, self.shares.utilizations(now_s, periods=periods))
             case _:
                 return await super().answer(asked)
         return Done()
@@ -233,12 +244,25 @@ class RcManager(Component[RcManagerParameters]):
     async def _request(self, request: SchedulingRequest) -> Scheduled:
         self._requesting[request.arc] += 1
         try:
-            rcs = self.manager.choose(request)
+            rcs = await self._choose(request)
             await self._rcs.have_running(rcs)
             self._admit(request, rcs)
         finally:
             self._requesting[request.arc] -= 1
         return self.answers.scheduled(request.arc, self.clock.now_s())
+
+    async def _choose(self, request: SchedulingRequest) -> tuple[str, ...]:
+        try:
+            rcs = self.manager.choose(request)
+        except UnknownRc:  # it may have been added a moment ago
+            await self._hardware.compare()
+            rcs = self.manager.choose(request)
+        self._hardware.require(rcs)
+        return rcs
+
+    def is_choosing(self) -> bool:
+        """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
+        return self._requesting.total() > 0
 
     def _tell_paths(self, node: str) -> None:
         """Tell the ARCs at and below the node by which path they ask now: a later RC manager must hear of it."""
@@ -301,7 +325,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _record(self, record: Record) -> None:
         line = dict(record.line)
-        self._shares.take(line)
+        self.shares.take(line)
         if not self._trace.write(line):
             self._trace_stopped()
         subject = str(line.get("arc") or line.get("id") or "")
@@ -352,13 +376,13 @@ class RcManager(Component[RcManagerParameters]):
         began_s = min((at_s for at_s, _ in adopted), default=self.clock.now_s())
         self._rcs.up.update(found.rcs)
         for resource in self._resources.values():
-            self._shares.know(resource.name, began_s)
+            self.shares.know(resource.name, began_s)
             self.happened(rc_known(resource, found.rcs.get(resource.name)), began_s)
         for at_s, event in adopted:
             self._remember(event.request, tuple(event.epochs))
             self.happened(event, at_s)
         for arc, current in found.arcs.items():
-            if current.rcs and not found.holds_rightly(arc):
+            if current.rcs and self._resources.keys() >= {*current.rcs} and not found.holds_rightly(arc):
                 self._admit(current.request, tuple(current.rcs))
 
     def _heard_from_nameserver(self, envelope: Envelope[Message]) -> None:
@@ -371,6 +395,17 @@ class RcManager(Component[RcManagerParameters]):
     def _appeared(self, name: str, at: str) -> None:
         if name in self._resources and at.startswith("resource_pool/"):
             self._rcs.meet_again(name)
+        elif at == DEPENDENCY_DATABASE:
+            self._compare_hardware()
+
+    def _hardware_changed(self, _envelope: Envelope[HardwareChanged]) -> None:
+        self._compare_hardware()
+
+    def _compare_hardware(self) -> None:
+        self.start_task(self._hardware.compare(), "compare hardware")
+
+    def _follow(self, rc: str) -> Subscription:
+        return self.bus.subscribe(in_pool(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
 
     def _heard_rc(self, envelope: Envelope[RcState]) -> None:
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
@@ -406,6 +441,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _compare_with_nameserver(self) -> None:
         """Catch up with what happened while this process had no link."""
+        await self._hardware.compare()
         names = await self._recovery.present()
         for name in [*sorted(self._rcs.up), *self._uses]:
             if name not in names:
@@ -432,6 +468,8 @@ class RcManager(Component[RcManagerParameters]):
                 self._uses.pop(arc, None)
                 self.happened(Departed(arc, "silent"))
             self._publish_leases()
+            if self._hardware.let_go():
+                self._compare_hardware()
             self.changed()
             await self.clock.sleep_s(RENEW_EVERY_S * rate)
 
@@ -463,7 +501,7 @@ class RcManager(Component[RcManagerParameters]):
         current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
         if current is None or arc in self._uses or self._requesting[arc]:
             return
-        if current.rcs:
+        if current.rcs and self._resources.keys() >= {*current.rcs}:
             self._admit(current.request, tuple(current.rcs))
             return
         try:
