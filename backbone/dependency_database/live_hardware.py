@@ -148,17 +148,12 @@ def resource_like(like: Resource | None, name: str, kind: str, host: str, parame
         ('field', True, 0.5, 0.2)
     """
     sharing = msgspec.convert(parameters, _Sharing)
-    like = like if like is not None else Resource("", kind)
-    return Resource(
-        name,
-        kind,
+    return msgspec.structs.replace(
+        like if like is not None else Resource("", kind),
+        name=name,
+        type=kind,
         host=host,
-        sharable=sharing.sharable,
-        capacity=sharing.capacity,
-        connect_s=like.connect_s,
-        disconnect_s=like.disconnect_s,
-        driver=sharing.driver,
+        process="",
         parameters={key: value for key, value in parameters.items() if key not in _Sharing.__struct_fields__},
-        features=like.features,
-        links=sharing.links,
+        **msgspec.structs.asdict(sharing),
     )
