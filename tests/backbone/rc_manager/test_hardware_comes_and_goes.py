@@ -24,7 +24,8 @@ from backbone.dependency_database.service import COMPARE_EVERY_S, DependencyData
 from backbone.naming import Subsystem
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.rc_manager.messages import AskSchedule, AskUtilization
-from backbone.scheduling.requests import RequestState, UnknownRc
+from backbone.rc_manager.service import RcManager
+from backbone.scheduling.requests import RcUse, RequestState, UnknownRc
 from backbone.scheduling.views import Schedule, Utilization
 from backbone.wire import Envelope, Message
 
@@ -309,5 +310,38 @@ def test_an_rc_that_is_stopped_while_the_databases_are_away_is_gone_when_they_ar
             assert not arc.is_open
             schedule = await here.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=1)
             assert [one for one in schedule.requests if one.state is RequestState.RUNNING] == []
+
+    run_virtual(main())
+
+
+def test_an_arc_whose_rc_was_removed_while_the_rc_manager_was_away_gets_another_of_its_sets(mission: Begin) -> None:
+    async def main() -> None:
+        async with mission() as here:
+            third = await here.start()
+            arc = await here.pool.arc("one")
+            either = [{"third": RcUse()}, {"left": RcUse()}]
+            await arc.ask_for(msgspec.structs.replace(request("one", "third"), alternatives=either))
+            await here.pool.clock.sleep_s(1.0)
+            assert set(arc.epochs) == {"third"}
+            await here.end("manager")
+            await here.stop(third)
+            await here.begin("manager")
+            await here.pool.clock.sleep_s(2.0)
+            assert set(arc.epochs) == {"left"}
+
+    run_virtual(main())
+
+
+def test_a_claim_finds_an_rc_of_which_the_news_was_lost(mission: Begin, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RcManager, "_hardware_changed", lambda _manager, _lost: None)
+
+    async def main() -> None:
+        async with mission() as here:
+            await here.start()
+            await here.pool.clock.sleep_s(1.0)
+            assert "third" not in await here.rcs()
+            arc = await claimed(here, "third")
+            await here.pool.clock.sleep_s(A_MOMENT_S)
+            assert arc.is_open
 
     run_virtual(main())
