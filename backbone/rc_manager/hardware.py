@@ -7,15 +7,18 @@ lost message changes nothing for long. A removed RC is down at once. It stays kn
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable
 
 from backbone.addresses import DEPENDENCY_DATABASE
 from backbone.bus.interface import Subscription
-from backbone.dependency_database.messages import AskResources, Resource, Resources
+from backbone.dependency_database.messages import AskResources, HardwareChanged, Resource, Resources
+from backbone.keys import Conversation
+from backbone.rc_manager.context_switch import in_pool
+from backbone.rc_manager.messages import RcState
 from backbone.rc_manager.rc_watch import RcWatch, Service
 from backbone.rc_manager.recovery import Recovery, rc_known
 from backbone.scheduling.events import RcRemoved, RcWentDown
-from backbone.scheduling.requests import UnknownRc
+from backbone.scheduling.requests import SchedulingRequest, UnknownRc
+from backbone.wire import Envelope
 
 
 class Hardware:
@@ -25,19 +28,16 @@ class Hardware:
         resources: RC → its resource, also of removed ones that a request still names.
     """
 
-    def __init__(
-        self, service: Service, recovery: Recovery, rcs: RcWatch, follow: Callable[[str], Subscription]
-    ) -> None:
+    def __init__(self, service: Service, recovery: Recovery, rcs: RcWatch) -> None:
         """Begin without RCs.
 
         Args:
             service: The RC manager.
             recovery: Asks the dependency database.
             rcs: Checks RCs that appear; it gets the same resources.
-            follow: Subscribes to the published states of an RC.
         """
         self.resources: dict[str, Resource] = {}
-        self._service, self._recovery, self._rcs, self._follow = service, recovery, rcs, follow
+        self._service, self._recovery, self._rcs = service, recovery, rcs
         rcs.resources = self.resources
         self._removed: set[str] = set()
         self._followed: dict[str, Subscription] = {}
@@ -47,10 +47,16 @@ class Hardware:
         """Learn the hardware at the start."""
         self.resources.update(await self._present())
 
-    def follow_all(self) -> None:
-        """Subscribe to the states of all RCs."""
+    def follow(self) -> None:
+        """Subscribe to the states of all RCs and to changes of the hardware, and compare once."""
         for rc in self.resources:
-            self._followed[rc] = self._follow(rc)
+            self._follow_rc(rc)
+        self._service.bus.subscribe(DEPENDENCY_DATABASE, Conversation.EVENTS, HardwareChanged, self._heard_change)
+        self.compare_soon()
+
+    def compare_soon(self) -> None:
+        """Compare in a task of its own."""
+        self._service.start_task(self.compare(), "compare hardware")
 
     async def compare(self) -> None:
         """Add RCs that are new, and count removed ones as down."""
@@ -68,8 +74,24 @@ class Hardware:
             for rc in present.keys() - self.resources.keys():
                 self._add(present[rc])
 
-    def let_go(self) -> bool:
-        """Forget the removed RCs that no request names; return whether one was forgotten."""
+    async def choose(self, request: SchedulingRequest) -> tuple[str, ...]:
+        """Return the set of RCs this request should wait for; an RC that was added a moment ago counts.
+
+        Raises:
+            UnknownRc: An RC was removed, or did never exist.
+            SchedulingRefusal: As of ``ScheduleManager.choose``.
+        """
+        try:
+            rcs = self._service.manager.choose(request)
+        except UnknownRc:
+            await self.compare()
+            rcs = self._service.manager.choose(request)
+        for rc in self._removed.intersection(rcs):
+            raise UnknownRc(f"{rc} was removed from this mission", rc=rc)
+        return rcs
+
+    def let_go(self) -> None:
+        """Forget the removed RCs that no request names; another one of that name is added soon."""
         gone: list[str] = []
         for rc in sorted(self._removed) if not self._service.is_choosing() else ():
             self._service.happened(RcRemoved(rc))
@@ -80,16 +102,8 @@ class Hardware:
             del self.resources[rc]
             self._followed.pop(rc).close()
             self._service.shares.forget(rc)
-        return bool(gone)
-
-    def require(self, rcs: Iterable[str]) -> None:
-        """Return if none of these RCs was removed.
-
-        Raises:
-            UnknownRc: One was.
-        """
-        for rc in self._removed.intersection(rcs):
-            raise UnknownRc(f"{rc} was removed from this mission", rc=rc)
+        if gone:
+            self.compare_soon()
 
     async def _present(self) -> dict[str, Resource]:
         found = await self._recovery.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
@@ -101,8 +115,15 @@ class Hardware:
         service.shares.know(rc, service.clock.now_s())
         service.happened(rc_known(resource, None))
         service.story.note(rc, "was added to the hardware")
-        self._followed[rc] = self._follow(rc)
+        self._follow_rc(rc)
         self._rcs.meet_again(rc)
+
+    def _follow_rc(self, rc: str) -> None:
+        service = self._service
+        self._followed[rc] = service.bus.subscribe(in_pool(rc), Conversation.TELEMETRY, RcState, service.heard_rc)
+
+    def _heard_change(self, _change: Envelope[HardwareChanged]) -> None:
+        self.compare_soon()
 
     def _remove(self, rc: str) -> None:
         if rc not in self._removed:

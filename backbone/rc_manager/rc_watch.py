@@ -25,7 +25,7 @@ from backbone.rc_manager.recovery import Found, Recovery
 from backbone.scheduling.events import CapacityChanged, Event, RcCameBack, RcWentDown
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.shares import Shares
-from backbone.wire import MalformedMessage
+from backbone.wire import Envelope, MalformedMessage
 
 log = logging.getLogger(__name__)
 
@@ -44,6 +44,9 @@ class Service(Protocol):
 
     def happened(self, event: Event) -> None:
         """Pass the event to the schedule manager, and carry its instructions out."""
+
+    def heard_rc(self, envelope: Envelope[RcState]) -> None:
+        """Take in the published state of an RC."""
 
     def is_choosing(self) -> bool:
         """Return whether RCs were chosen for a request that the schedule manager does not have yet."""

@@ -19,11 +19,10 @@ from pathlib import Path
 from typing import assert_never
 
 from backbone.addresses import DEPENDENCY_DATABASE, NAMESERVER
-from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
-from backbone.dependency_database.messages import HardwareChanged
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Disappeared
@@ -90,7 +89,6 @@ from backbone.scheduling.requests import (
     RcUse,
     Scheduled,
     SchedulingRequest,
-    UnknownRc,
     UnknownRequest,
 )
 from backbone.scheduling.rules import SchedulingRules
@@ -150,7 +148,7 @@ class RcManager(Component[RcManagerParameters]):
         self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
         self._recovery = Recovery(bus, clock)
         self._rcs = RcWatch(self, self._context_switch, self._recovery)
-        self._hardware = Hardware(self, self._recovery, self._rcs, self._follow)
+        self._hardware = Hardware(self, self._recovery, self._rcs)
         self._resources = self._hardware.resources
         self._found = Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
@@ -173,9 +171,7 @@ class RcManager(Component[RcManagerParameters]):
         self._take_over(self._found)
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_from_nameserver)
         self.bus.subscribe(f"{Subsystem.RESOURCE_POOL}/*", Conversation.BEAT, Beat, self._heard_beat)
-        self.bus.subscribe(DEPENDENCY_DATABASE, Conversation.EVENTS, HardwareChanged, self._hardware_changed)
-        self._hardware.follow_all()
-        self._compare_hardware()
+        self._hardware.follow()
         self.bus.watch_link(self._link_changed)
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
@@ -244,21 +240,12 @@ class RcManager(Component[RcManagerParameters]):
     async def _request(self, request: SchedulingRequest) -> Scheduled:
         self._requesting[request.arc] += 1
         try:
-            rcs = await self._choose(request)
+            rcs = await self._hardware.choose(request)
             await self._rcs.have_running(rcs)
             self._admit(request, rcs)
         finally:
             self._requesting[request.arc] -= 1
         return self.answers.scheduled(request.arc, self.clock.now_s())
-
-    async def _choose(self, request: SchedulingRequest) -> tuple[str, ...]:
-        try:
-            rcs = self.manager.choose(request)
-        except UnknownRc:  # it may have been added a moment ago
-            await self._hardware.compare()
-            rcs = self.manager.choose(request)
-        self._hardware.require(rcs)
-        return rcs
 
     def is_choosing(self) -> bool:
         """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
@@ -396,18 +383,9 @@ class RcManager(Component[RcManagerParameters]):
         if name in self._resources and at.startswith("resource_pool/"):
             self._rcs.meet_again(name)
         elif at == DEPENDENCY_DATABASE:
-            self._compare_hardware()
+            self._hardware.compare_soon()
 
-    def _hardware_changed(self, _envelope: Envelope[HardwareChanged]) -> None:
-        self._compare_hardware()
-
-    def _compare_hardware(self) -> None:
-        self.start_task(self._hardware.compare(), "compare hardware")
-
-    def _follow(self, rc: str) -> Subscription:
-        return self.bus.subscribe(in_pool(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
-
-    def _heard_rc(self, envelope: Envelope[RcState]) -> None:
+    def heard_rc(self, envelope: Envelope[RcState]) -> None:
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
         state = envelope.body
         rc = state.name
@@ -468,8 +446,7 @@ class RcManager(Component[RcManagerParameters]):
                 self._uses.pop(arc, None)
                 self.happened(Departed(arc, "silent"))
             self._publish_leases()
-            if self._hardware.let_go():
-                self._compare_hardware()
+            self._hardware.let_go()
             self.changed()
             await self.clock.sleep_s(RENEW_EVERY_S * rate)
 

@@ -23,8 +23,8 @@ from backbone.dependency_database.messages import FindRcs, NoSuchHardware, RcSet
 from backbone.dependency_database.service import COMPARE_EVERY_S, DependencyDatabase
 from backbone.naming import Subsystem
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
+from backbone.rc_manager.hardware import Hardware
 from backbone.rc_manager.messages import AskSchedule, AskUtilization
-from backbone.rc_manager.service import RcManager
 from backbone.scheduling.requests import RcUse, RequestState, UnknownRc
 from backbone.scheduling.views import Schedule, Utilization
 from backbone.wire import Envelope, Message
@@ -161,7 +161,7 @@ def test_an_rc_that_is_started_by_hand_can_be_found_and_claimed_at_once(mission:
     run_virtual(main())
 
 
-def test_it_is_in_the_schedule_before_anybody_claims_it(mission: Begin) -> None:
+def test_it_is_in_the_schedule_before_a_claim(mission: Begin) -> None:
     async def main() -> None:
         async with mission() as here:
             assert "third" not in await here.rcs()
@@ -333,7 +333,7 @@ def test_an_arc_whose_rc_was_removed_while_the_rc_manager_was_away_gets_another_
 
 
 def test_a_claim_finds_an_rc_of_which_the_news_was_lost(mission: Begin, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(RcManager, "_hardware_changed", lambda _manager, _lost: None)
+    monkeypatch.setattr(Hardware, "_heard_change", lambda _hardware, _lost: None)
 
     async def main() -> None:
         async with mission() as here:
