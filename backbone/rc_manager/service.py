@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import assert_never
@@ -55,6 +55,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.rc_manager.rc_watch import RcWatch
 from backbone.rc_manager.recovery import Found, Recovery, rc_known
+from backbone.rc_manager.switch_times import SwitchTimes
 from backbone.rc_manager.trace_file import TraceFile
 from backbone.scheduling.events import (
     CapacityChanged,
@@ -101,7 +102,6 @@ from backbone.wire import Envelope, Message
 log = logging.getLogger(__name__)
 
 ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; after this it hangs or is gone
-SWITCHES_KEPT = 10_000  # chosen: half a day of 5 s slices, 80 kB
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
 
 
@@ -151,8 +151,7 @@ class RcManager(Component[RcManagerParameters]):
         self._hardware = Hardware(self, self._recovery, self._rcs)
         self._resources = self._hardware.resources
         self._found = Found({}, {})
-        self._revoked: dict[str, tuple[float, str]] = {}
-        self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
+        self._switch_times = SwitchTimes()
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
@@ -193,13 +192,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def statistics(self) -> dict[str, float]:
         """Count decisions and switches; switch times are from revoke to grant, settling not counted."""
-        times = sorted(self._switch_times_s)
-        return {
-            "switches": float(len(times)),
-            "switch_p50_s": times[len(times) // 2] if times else 0.0,
-            "switch_p99_s": times[min(len(times) - 1, len(times) * 99 // 100)] if times else 0.0,
-            "held": float(len(self.manager.leases())),
-        }
+        return {**self._switch_times.statistics(), "held": float(len(self.manager.leases()))}
 
     # ------------------------------------------------------------------ questions
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -290,7 +283,7 @@ class RcManager(Component[RcManagerParameters]):
             case ConnectArc(arc=arc):
                 self._switch(arc, lambda: self._connect(instruction))
             case RevokeArc(arc=arc, epochs=epochs):
-                self._revoked |= dict.fromkeys(epochs, (self.clock.now_s(), arc))
+                self._switch_times.revoked(epochs, arc, self.clock.now_s())
                 self._switch(arc, lambda: self._revoke(instruction))
             case RenewLeases():
                 self._publish_leases()
@@ -331,7 +324,7 @@ class RcManager(Component[RcManagerParameters]):
     async def _connect(self, order: ConnectArc) -> None:
         failed = await self._context_switch.connect(order, self._uses.get(order.arc, {}))
         if failed is None:
-            self._measure_switch(order)
+            self._switch_times.granted(order.epochs, order.arc, order.settle_s, self.clock.now_s())
             self.happened(Opened(order.arc))
             return
         self._rcs.failed(failed)
@@ -348,13 +341,6 @@ class RcManager(Component[RcManagerParameters]):
     def _may_leave(self, rc: str, arc: str) -> bool:
         """Say whether nobody but this ARC would lose anything if the RC were down."""
         return rc not in self._rcs.up or all(lease.rc != rc or lease.arc == arc for lease in self.manager.leases())
-
-    def _measure_switch(self, order: ConnectArc) -> None:
-        """Keep the time since these RCs were revoked from another ARC, settling not counted."""
-        revoked = [self._revoked.pop(rc) for rc in order.epochs if rc in self._revoked]
-        from_others = [at_s for at_s, arc in revoked if arc != order.arc]
-        if from_others:
-            self._switch_times_s.append(self.clock.now_s() - min(from_others) - order.settle_s)
 
     # ------------------------------------------------------------------ who is there
     def _take_over(self, found: Found) -> None:
