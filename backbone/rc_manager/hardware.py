@@ -1,7 +1,8 @@
 """Hardware: the RCs that the schedule may use are those that the dependency database has.
 
-It is compared when the database publishes a change, starts or comes back, and when a request names an unknown RC; so a
-lost message changes nothing for long. A removed RC is down at once. It stays known while a request names it.
+It is compared when the database publishes a change, starts or comes back, when a request names an unknown RC, and now
+and then; so a lost message changes nothing for long. A removed RC is down at once. It stays known while a request
+names it.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from backbone.rc_manager.recovery import Recovery, rc_known
 from backbone.scheduling.events import RcRemoved, RcWentDown
 from backbone.scheduling.requests import SchedulingRequest, UnknownRc
 from backbone.wire import Envelope
+
+COMPARE_EVERY_S = 20.0  # chosen: every known change is compared at once; this is for lost news
 
 
 class Hardware:
@@ -48,11 +51,16 @@ class Hardware:
         self.resources.update(await self._present())
 
     def follow(self) -> None:
-        """Subscribe to the states of all RCs and to changes of the hardware, and compare once."""
+        """Subscribe to the states of all RCs and to changes of the hardware."""
         for rc in self.resources:
             self._follow_rc(rc)
         self._service.bus.subscribe(DEPENDENCY_DATABASE, Conversation.EVENTS, HardwareChanged, self._heard_change)
-        self.compare_soon()
+
+    async def keep_comparing(self) -> None:
+        """Compare at once, because a change may have come before ``follow``, and then every ``COMPARE_EVERY_S``."""
+        while True:
+            await self.compare()
+            await self._service.clock.sleep_s(COMPARE_EVERY_S * self._service.clock.rate)
 
     def compare_soon(self) -> None:
         """Compare in a task of its own."""

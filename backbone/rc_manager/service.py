@@ -175,6 +175,7 @@ class RcManager(Component[RcManagerParameters]):
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
             loops.create_task(self._renew())
+            loops.create_task(self._hardware.keep_comparing())
 
     def parameters_changed(self) -> None:
         """Refuse: whoever waits was promised a place by the rules as they are.

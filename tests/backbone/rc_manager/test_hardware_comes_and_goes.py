@@ -332,16 +332,23 @@ def test_an_arc_whose_rc_was_removed_while_the_rc_manager_was_away_gets_another_
     run_virtual(main())
 
 
-def test_a_claim_finds_an_rc_of_which_the_news_was_lost(mission: Begin, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lost_news_of_a_new_rc_is_found_at_a_claim_and_of_a_removed_one_in_time(
+    mission: Begin, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(Hardware, "_heard_change", lambda _hardware, _lost: None)
 
     async def main() -> None:
         async with mission() as here:
-            await here.start()
+            third = await here.start()
             await here.pool.clock.sleep_s(1.0)
             assert "third" not in await here.rcs()
             arc = await claimed(here, "third")
             await here.pool.clock.sleep_s(A_MOMENT_S)
             assert arc.is_open
+            arc.end("its owner has left")
+            await here.stop(third)
+            assert (await here.rcs())["third"] == "down"
+            await here.pool.clock.sleep_s(COMPARE_EVERY_S)
+            assert "third" not in await here.rcs()
 
     run_virtual(main())
