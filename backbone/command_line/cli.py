@@ -29,8 +29,11 @@ from backbone.command_line.options import (
     complete_name,
     complete_person,
     complete_resource,
+    complete_type,
     finite,
     hub_endpoint,
+    json_or_text,
+    named_value,
     run,
 )
 from backbone.component.log_level import LogLevel
@@ -166,6 +169,44 @@ def status(
 
 
 @app.command()
+def components(
+    type_: Annotated[
+        str,
+        typer.Option(
+            "--type", metavar="TYPE", autocompletion=complete_type, help="Only this type, with commands and reports."
+        ),
+    ] = "",
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Show the component types of the mission: class, needs, how many may run and do; with --type the abilities."""
+    from backbone.command_line.inventory import print_types
+
+    where = chosen(mission, connect, secret_file)
+    run(lambda: print_types(where, type_, as_json=as_json, width=_width()))
+
+
+@app.command()
+def resources(
+    name: Annotated[str, typer.Argument(autocompletion=complete_resource, help="Only this resource.")] = "",
+    changes: Annotated[
+        bool, typer.Option("--changes", help="Also the shares before and after each of the last re-plannings.")
+    ] = False,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Show the resources: host, capacity, holder, utilization over 1 and 10 minutes."""
+    from backbone.command_line.inventory import print_resources
+
+    where = chosen(mission, connect, secret_file)
+    run(lambda: print_resources(where, name, changes=changes, as_json=as_json, width=_width()))
+
+
+@app.command()
 def why(
     name: NameOrCause,
     as_json: AsJson = False,
@@ -227,7 +268,9 @@ def log(
 
 @app.command()
 def start(
-    type_: Annotated[str, typer.Argument(metavar="TYPE", help="Component type of the mission.")],
+    type_: Annotated[
+        str, typer.Argument(metavar="TYPE", autocompletion=complete_type, help="Component type of the mission.")
+    ],
     name: Annotated[str, typer.Option("--name", help="Name; default: numbered by the placer.")] = "",
     host: Annotated[str, typer.Option("--host", help="The only possible host.")] = "",
     parameter: Annotated[
@@ -242,7 +285,7 @@ def start(
     from backbone.placer.messages import Start
 
     where = chosen(mission, connect, secret_file)
-    order = Start(type_, name, dict(map(_parameter, parameter or [])), host)
+    order = Start(type_, name, dict(map(named_value, parameter or [])), host)
     run(lambda: start_component(where, order))
 
 
@@ -286,7 +329,7 @@ def set_(
 
     where = chosen(mission, connect, secret_file)
     if parameter is not None and value is not None:
-        run(lambda: set_attribute(where, name, parameter, _value(value)))
+        run(lambda: set_attribute(where, name, parameter, json_or_text(value)))
     run(lambda: print_attributes(where, name, parameter, as_json=as_json))
 
 
@@ -340,20 +383,6 @@ def experiment(context: typer.Context) -> None:
 def _width() -> int | None:
     """Return the width of tables; None: the terminal's."""
     return None if sys.stdout.isatty() else PIPE_WIDTH
-
-
-def _parameter(given: str) -> tuple[str, object]:
-    name, equals, value = given.partition("=")
-    if not equals or not name:
-        raise typer.BadParameter(f"{given!r} is not NAME=VALUE")
-    return name, _value(value)
-
-
-def _value(text: str) -> object:
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError:
-        return text
 
 
 if __name__ == "__main__":

@@ -7,16 +7,21 @@ from __future__ import annotations
 
 import asyncio
 import os
+from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import TypeVar
 
 from backbone.authentication import read_secret_file
+from backbone.bus.interface import Bus, Clock
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.errors import BackboneError
 from backbone.launcher.mission_connection import connected
 from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.picture.look import look
+from backbone.picture.look import look, types_of
 from backbone.picture.mission import MissionPicture
+
+Answer = TypeVar("Answer")
 
 WITHIN_S = 1.5  # chosen: a person does not wait longer after Tab
 
@@ -48,16 +53,30 @@ def is_word(text: str) -> bool:
 
 def picture_now(mission: str | None, connect: str | None, secret_file: Path | None) -> MissionPicture | None:
     """Return the picture of a mission; None if no mission is up or it does not answer within ``WITHIN_S``."""
+    return _answer_now(mission, connect, secret_file, lambda bus, clock: look(bus, clock.now_s(), rate=clock.rate))
 
-    async def looked() -> MissionPicture:
+
+def types_now(mission: str | None, connect: str | None, secret_file: Path | None) -> list[str]:
+    """Return the names of a mission's component types; empty as ``picture_now``."""
+    types = _answer_now(mission, connect, secret_file, lambda bus, _: types_of(bus)) or []
+    return [one.component_type.name for one in types]
+
+
+def _answer_now(
+    mission: str | None,
+    connect: str | None,
+    secret_file: Path | None,
+    ask: Callable[[Bus, Clock], Awaitable[Answer]],
+) -> Answer | None:
+    async def answer() -> Answer:
         secret = read_secret_file(secret_file) if connect is not None and secret_file is not None else ""
         async with (
             asyncio.timeout(WITHIN_S),
             connected(mission, connect, f"ui_console/complete-{os.getpid()}", secret) as (bus, clock),
         ):
-            return await look(bus, clock.now_s(), rate=clock.rate)
+            return await ask(bus, clock)
 
     try:
-        return asyncio.run(looked())
+        return asyncio.run(answer())
     except (BackboneError, TimeoutError, OSError):
         return None

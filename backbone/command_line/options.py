@@ -5,6 +5,7 @@ A completion imports its modules when a shell asks for it, so that ``--help`` st
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Awaitable, Callable, Iterable
@@ -104,19 +105,27 @@ def complete_mission() -> list[str]:
         return []
 
 
+def typed_mission(ctx: typer.Context) -> tuple[str | None, str | None, Path | None] | None:
+    """Return name, endpoint and secret file of the mission that the typed words name; None if it is not up."""
+    mission, endpoint = ctx.params.get("mission"), ctx.params.get("connect")
+    can_ask = (mission and ENDPOINT.fullmatch(endpoint)) if endpoint is not None else complete_mission()
+    if not can_ask:
+        return None
+    secret_file = ctx.params.get("secret_file")
+    return mission, endpoint, Path(secret_file) if secret_file is not None else None
+
+
 def picture_for(ctx: typer.Context) -> Any:
     """Return the picture of the mission that the typed words name; None if it is not up.
 
     The bus is loaded only if a mission is up.
     """
-    mission, endpoint = ctx.params.get("mission"), ctx.params.get("connect")
-    can_ask = (mission and ENDPOINT.fullmatch(endpoint)) if endpoint is not None else complete_mission()
-    if not can_ask:
+    typed = typed_mission(ctx)
+    if typed is None:
         return None
     from backbone.command_line.completion import picture_now
 
-    secret_file = ctx.params.get("secret_file")
-    return picture_now(mission, endpoint, Path(secret_file) if secret_file is not None else None)
+    return picture_now(*typed)
 
 
 def complete_name(ctx: typer.Context) -> list[str]:
@@ -137,6 +146,16 @@ def complete_resource(ctx: typer.Context) -> list[str]:
     from backbone.command_line.completion import resources_of
 
     return resources_of(picture)
+
+
+def complete_type(ctx: typer.Context) -> list[str]:
+    """Return the component types of the mission that is up."""
+    typed = typed_mission(ctx)
+    if typed is None:
+        return []
+    from backbone.command_line.completion import types_now
+
+    return types_now(*typed)
 
 
 def complete_person(ctx: typer.Context) -> list[str]:
@@ -187,3 +206,19 @@ def finite(value: float | None) -> float | None:
     if value is not None and not math.isfinite(value):
         raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
     return value
+
+
+def named_value(given: str) -> tuple[str, object]:
+    """Return name and value of NAME=VALUE; for options that set parameters."""
+    name, equals, value = given.partition("=")
+    if not equals or not name:
+        raise typer.BadParameter(f"{given!r} is not NAME=VALUE")
+    return name, json_or_text(value)
+
+
+def json_or_text(text: str) -> object:
+    """Return the value of a text that is JSON; any other text as it is."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text

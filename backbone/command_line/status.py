@@ -66,7 +66,7 @@ async def _show(bus: Bus, clock: Clock, found: run_files.RunFile | None, shown: 
     pictures = _pictures(bus, clock, found, EVERY_S if shown.as_json else REDRAW_EVERY_S)
     async with contextlib.aclosing(pictures):
         if shown.watch and not shown.as_json:
-            console = _console(shown)
+            console = console_of_width(shown.width)
             with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
                 async for picture in pictures:
                     live.update(live_screen(picture, None, console.height), refresh=True)
@@ -121,12 +121,13 @@ def _print(picture: MissionPicture, shown: Shown) -> None:
     if shown.as_json:
         print(json.dumps(picture.to_json()), flush=True)
     else:
-        _console(shown).print(screen(picture))
+        console_of_width(shown.width).print(screen(picture))
 
 
-def _console(shown: Shown) -> Console:
+def console_of_width(width: int | None) -> Console:
+    """Return a console for tables; None: as wide as the terminal."""
     # What stands in a cell came over the bus: square brackets in it are text, and no markup.
-    return Console(width=shown.width, markup=False, emoji=False, highlight=False)
+    return Console(width=width, markup=False, emoji=False, highlight=False)
 
 
 def _exit_code(picture: MissionPicture) -> ExitCode:

@@ -80,7 +80,7 @@ class UnknownType(Refusal):
     """No component type of this name exists in this mission."""
 
     code = "component_database.unknown"
-    remedy = "Declare the type in the mission file, or use one that 'scout-backbone status' lists."
+    remedy = "Declare the type in the mission file, or use one that 'scout-backbone components' lists."
 
 
 class MultiplicityExceeded(Refusal):

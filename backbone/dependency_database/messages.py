@@ -59,6 +59,10 @@ class Resources(Message, frozen=True):
     resources: Annotated[list[Resource], MANY]
 
 
+class HardwareChanged(Message, frozen=True):
+    """Published under ``Conversation.EVENTS`` when hardware was added or removed: ask ``AskResources`` again."""
+
+
 class FindRcs(Message, frozen=True, tag="FindRcs/2"):
     """Ask for the sets of RCs that match.
 

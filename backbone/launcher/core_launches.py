@@ -43,6 +43,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
     """
     types = [msgspec.to_builtins(component_type) for component_type in description.types]
     resources = [msgspec.to_builtins(resource) for resource in description.resources]
+    kinds = sorted({kind for component_type in description.types for kind in component_type.needs.values()})
     trace = str(options.trace.absolute()) if options.trace else ""
     parameters: dict[str, Callable[[Host], dict[str, object]]] = {
         "component_database": lambda _: {"types": types},
@@ -52,7 +53,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
             "preload": arc_modules(description.types),
             "types": types,
         },
-        "dependency_database": lambda _: {"resources": resources},
+        "dependency_database": lambda _: {"resources": resources, "kinds": kinds},
         "rc_manager": lambda _: {
             **description.core_parameters("rc_manager"),
             "mission": description.name,

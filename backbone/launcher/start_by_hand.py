@@ -1,4 +1,8 @@
-"""``start``: completes an operator's order with the mission file's declaration of the component."""
+"""``start``: completes an operator's order with the mission file's declaration of the component.
+
+An RC that the file does not declare is completed with the declaration of another resource of its type: driver, sharing
+and links. Its own parameters (an address, a channel) are the operator's.
+"""
 
 from __future__ import annotations
 
@@ -36,13 +40,11 @@ def complete(order: Start, resources: list[Resource]) -> tuple[Start, str]:
 
     Example:
         >>> complete(Start("scout", "scout9"), [Resource("scout1", "scout")])[1]
-        'scout9 is not among the resources of the mission file: no ARC can hold it'
+        'scout9 is not in the mission file: it is like scout1, and can be claimed until it is stopped'
     """
     resource = next((each for each in resources if each.name == order.name), None)
     if resource is None:
-        kinds = {each.type for each in resources}
-        unknown = f"{order.name or 'it'} is not among the resources of the mission file: no ARC can hold it"
-        return order, unknown if order.type in kinds else ""
+        return _like_another(order, [each for each in resources if each.type == order.type])
     if resource.type != order.type:
         raise OtherType(f"{resource.name} is a {resource.type} in the mission file, not a {order.type}")
     whole = msgspec.structs.replace(
@@ -52,3 +54,12 @@ def complete(order: Start, resources: list[Resource]) -> tuple[Start, str]:
         process=order.process or resource.process,
     )
     return whole, ""
+
+
+def _like_another(order: Start, others: list[Resource]) -> tuple[Start, str]:
+    if not others:
+        return order, ""
+    model = msgspec.structs.replace(others[0], parameters={})
+    whole = msgspec.structs.replace(order, parameters={**model.rc_parameters(), **order.parameters})
+    name = order.name or "it"
+    return whole, f"{name} is not in the mission file: it is like {model.name}, and can be claimed until it is stopped"

@@ -11,9 +11,10 @@ from collections.abc import Iterable
 
 import msgspec
 
-from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
+from backbone.addresses import COMPONENT_DATABASE, LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.component.messages import Absence, AskTime, MissionTime
+from backbone.component_database.messages import ListTypes, TypeCount, Types
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import ListProcesses, Processes, ProcessState
 from backbone.errors import LinkError, Refusal
@@ -27,6 +28,7 @@ from backbone.spoken import counted
 from backbone.wire import Message
 
 LOOK_TIME_S = 1.0  # chosen: a person waits this long for a picture
+TYPES_WITHIN_S = 4.0  # chosen: the component database waits 3 s for the nameserver
 NAMES_SHOWN = 8  # chosen: a line of a terminal
 
 
@@ -71,6 +73,16 @@ async def look(
     missed = [*silent, *misses(picture.components.values(), kept, now_s, rate)]
     picture.missed = _remembered(missed, picture.missed)
     return picture
+
+
+async def types_of(bus: Bus) -> list[TypeCount]:
+    """Return the component types of a mission by name, each with the number of its running components.
+
+    Raises:
+        RunningUnknown: The nameserver did not answer.
+        LinkError: The component database did not answer.
+    """
+    return printable_all(await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=TYPES_WITHIN_S)).types
 
 
 def _gone_stale(picture: MissionPicture, silence: Absence, now_s: float) -> None:

@@ -35,7 +35,7 @@ _TROUBLES_SHARE = 4  # chosen: a quarter of the terminal; the rest still shows c
 _FRAME_LINES = 2  # a panel's upper and lower edge
 _EVENTS_MOST = 12  # chosen: more events than a glance takes in would push components off the picture
 _EVENTS_LEAST = 3
-_NUMBERS = ("pid", "restarts")
+_NUMBERS = ("pid", "restarts", "running", "1 min", "10 min")
 _NEXT_MOST = 3  # chosen: the schedule shows the further ones
 
 
@@ -181,14 +181,14 @@ def screen(picture: MissionPicture) -> RenderableType:
     return Group(*parts)
 
 
-def _table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> Table:
+def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> Table:
     """Return a table whose last column alone goes on below."""
-    table = Table(title=title, title_justify="left")
+    drawn = Table(title=title, title_justify="left")
     for column in columns:
-        table.add_column(column, justify="right" if column in _NUMBERS else "left", no_wrap=column != columns[-1])
+        drawn.add_column(column, justify="right" if column in _NUMBERS else "left", no_wrap=column != columns[-1])
     for row in rows:
-        table.add_row(*row)
-    return table
+        drawn.add_row(*row)
+    return drawn
 
 
 def _components_table(picture: MissionPicture) -> Table:
@@ -204,7 +204,7 @@ def _components_table(picture: MissionPicture) -> Table:
         for subsystem in Subsystem
         for number, one in enumerate(picture.of_subsystem(subsystem))
     )
-    return _table("components", ("subsystem", "component", "type", "host", "pid", "state", "restarts", "doing"), rows)
+    return table("components", ("subsystem", "component", "type", "host", "pid", "state", "restarts", "doing"), rows)
 
 
 def _rcs_table(schedule: Schedule) -> Table:
@@ -221,7 +221,7 @@ def _rcs_table(schedule: Schedule) -> Table:
         )
 
     columns = ("RC", "kind", "state", "holder", "epoch", "since", "until", "next")
-    return _table("resources", columns, map(row, schedule.rcs))
+    return table("resources", columns, map(row, schedule.rcs))
 
 
 def _coming(rc: RcView) -> list[str]:
@@ -241,7 +241,7 @@ def _requests_table(schedule: Schedule, now_s: float) -> Table:
         return one.arc, state, lasts, _when(one, now_s), str(one.turns), one.priority + _risen(one), _reason(one)
 
     columns = ("ARC", "state", "for", "until / expected", "turns", "priority", "why")
-    return _table("schedule", columns, (row(request) for request in schedule.requests))
+    return table("schedule", columns, (row(request) for request in schedule.requests))
 
 
 def _risen(request: RequestView) -> str:

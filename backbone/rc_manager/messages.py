@@ -5,7 +5,8 @@ Senders and receivers:
 * ARC → RC manager: ``SchedulingRequest``, ``Withdraw``, ``SetIdle``, ``ChangeRuntime``, ``Extend``.
 * RC manager → ARC: ``OpenGate``, ``CloseGate``, ``AskRequest``, ``TakePath``.
 * RC manager → RC: ``Connect``, ``Disconnect``, ``AskRc``; ``Leases`` as a publication.
-* any component → RC manager: ``AskSchedule``, ``AskWhy``, ``AskAttributes``, ``SetPriority``, ``MoveNode``.
+* any component → RC manager: ``AskSchedule``, ``AskWhy``, ``AskAttributes``, ``AskUtilization``, ``SetPriority``,
+  ``MoveNode``.
 """
 
 from __future__ import annotations
@@ -258,6 +259,16 @@ class AskWhy(Message, frozen=True):
     name: Mention
 
 
+class AskUtilization(Message, frozen=True):
+    """Ask for the utilization of each RC.
+
+    Attributes:
+        periods: True: also for the ARCs' shares between the last re-plannings.
+    """
+
+    periods: bool = False
+
+
 class AskAttributes(Message, frozen=True):
     """Ask for the requests of this ARC, of this decision process, or of all at and below this node."""
 
@@ -312,4 +323,5 @@ RcManagerQuestion = (
     | AskSchedule
     | AskWhy
     | AskAttributes
+    | AskUtilization
 )

@@ -24,7 +24,8 @@ from backbone.rc_manager.messages import AskRc, RcState
 from backbone.rc_manager.recovery import Found, Recovery
 from backbone.scheduling.events import CapacityChanged, Event, RcCameBack, RcWentDown
 from backbone.scheduling.schedule_manager import ScheduleManager
-from backbone.wire import MalformedMessage
+from backbone.scheduling.shares import Shares
+from backbone.wire import Envelope, MalformedMessage
 
 log = logging.getLogger(__name__)
 
@@ -39,9 +40,16 @@ class Service(Protocol):
     clock: Clock
     story: StoryBook
     manager: ScheduleManager
+    shares: Shares
 
     def happened(self, event: Event) -> None:
         """Pass the event to the schedule manager, and carry its instructions out."""
+
+    def heard_rc(self, envelope: Envelope[RcState]) -> None:
+        """Take in the published state of an RC."""
+
+    def is_choosing(self) -> bool:
+        """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
 
     def publish_event(self, subject: str, what: str, level: LogLevel) -> None:
         """Publish an event about the subject to the mission's log."""
@@ -109,6 +117,8 @@ class RcWatch:
             return False
         holds = [(rc, holder.arc, holder.epoch) for holder in state.holders]
         if rc not in self.up and not await self._context_switch.clear(rc, holds):
+            return False
+        if rc not in self.resources:  # removed meanwhile
             return False
         if rc not in self.up:
             if self._faults.pop(rc, ""):
@@ -198,7 +208,9 @@ class RcWatch:
 
     async def _ask(self, rc: str, given: int | None = None) -> RcState | None:
         """Return the RC's own report of its state; None if it does not answer, or is not credible and put aside."""
-        bus, clock = self._service.bus, self._service.clock
+        bus, clock, resource = self._service.bus, self._service.clock, self.resources.get(rc)
+        if resource is None:  # removed meanwhile
+            return None
         try:
             state = await bus.ask(in_pool(rc), AskRc(), RcState, within_s=RC_REPLY_S)
         except MalformedMessage as nonsense:
@@ -207,7 +219,7 @@ class RcWatch:
         except (Refusal, LinkError) as error:
             log.warning("%s did not answer with its state: %s", rc, error)
             return None
-        fault = contradiction(state, self.resources[rc], clock.now_s(), given)
+        fault = contradiction(state, resource, clock.now_s(), given)
         if fault:
             self._put_aside(rc, fault)
             return None

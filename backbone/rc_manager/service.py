@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import assert_never
@@ -23,18 +23,19 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
-from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.beats import Beats
 from backbone.rc_manager.context_switch import ContextSwitch, in_pool
+from backbone.rc_manager.hardware import Hardware
 from backbone.rc_manager.messages import (
     RENEW_EVERY_S,
     AskAttributes,
     AskRequest,
     AskSchedule,
+    AskUtilization,
     AskWhy,
     Beat,
     ChangeRuntime,
@@ -54,6 +55,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.rc_manager.rc_watch import RcWatch
 from backbone.rc_manager.recovery import Found, Recovery, rc_known
+from backbone.rc_manager.switch_times import SwitchTimes
 from backbone.rc_manager.trace_file import TraceFile
 from backbone.scheduling.events import (
     CapacityChanged,
@@ -81,16 +83,25 @@ from backbone.scheduling.events import (
 )
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.scheduling.requests import (
+    LEASE_S,
+    Lease,
+    PathNode,
+    RcUse,
+    Scheduled,
+    SchedulingRequest,
+    UnknownRequest,
+)
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.shares import Shares
+from backbone.scheduling.views import Utilization
 from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
 ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; after this it hangs or is gone
-SWITCHES_KEPT = 10_000  # chosen: half a day of 5 s slices, 80 kB
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
 
 
@@ -126,7 +137,6 @@ class RcManager(Component[RcManagerParameters]):
             planner=load_planner(given.planner),
         )
         self.answers = Answers(self.manager)
-        self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}
         self._beats = Beats(clock.rate)
         self._requesting: Counter[str] = Counter()
@@ -134,12 +144,14 @@ class RcManager(Component[RcManagerParameters]):
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
         self._trace = TraceFile("")
+        self.shares = Shares()
         self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
         self._recovery = Recovery(bus, clock)
         self._rcs = RcWatch(self, self._context_switch, self._recovery)
+        self._hardware = Hardware(self, self._recovery, self._rcs)
+        self._resources = self._hardware.resources
         self._found = Found({}, {})
-        self._revoked: dict[str, tuple[float, str]] = {}
-        self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
+        self._switch_times = SwitchTimes()
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
@@ -149,8 +161,7 @@ class RcManager(Component[RcManagerParameters]):
             self._trace_stopped()
         for record in self.manager.opening_lines():
             self._record(record)
-        found = await self._recovery.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
-        self._resources = self._rcs.resources = {resource.name: resource for resource in found.resources}
+        await self._hardware.learn()
         self._found = self._rcs.believed(await self._recovery.find(self._resources))
         await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
 
@@ -159,12 +170,12 @@ class RcManager(Component[RcManagerParameters]):
         self._take_over(self._found)
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_from_nameserver)
         self.bus.subscribe(f"{Subsystem.RESOURCE_POOL}/*", Conversation.BEAT, Beat, self._heard_beat)
-        for rc in self._resources:
-            self.bus.subscribe(in_pool(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
+        self._hardware.follow()
         self.bus.watch_link(self._link_changed)
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
             loops.create_task(self._renew())
+            loops.create_task(self._hardware.keep_comparing())
 
     def parameters_changed(self) -> None:
         """Refuse: whoever waits was promised a place by the rules as they are.
@@ -182,13 +193,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def statistics(self) -> dict[str, float]:
         """Count decisions and switches; switch times are from revoke to grant, settling not counted."""
-        times = sorted(self._switch_times_s)
-        return {
-            "switches": float(len(times)),
-            "switch_p50_s": times[len(times) // 2] if times else 0.0,
-            "switch_p99_s": times[min(len(times) - 1, len(times) * 99 // 100)] if times else 0.0,
-            "held": float(len(self.manager.leases())),
-        }
+        return {**self._switch_times.statistics(), "held": float(len(self.manager.leases()))}
 
     # ------------------------------------------------------------------ questions
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -219,6 +224,9 @@ class RcManager(Component[RcManagerParameters]):
                 return self.answers.why(name, self.clock.now_s())
             case AskAttributes(name=name):
                 return self.answers.attributes(name)
+            case AskUtilization(periods=periods):
+                now_s = self.clock.now_s()
+                return Utilization(now_s, self.shares.utilizations(now_s, periods=periods))
             case _:
                 return await super().answer(asked)
         return Done()
@@ -226,12 +234,16 @@ class RcManager(Component[RcManagerParameters]):
     async def _request(self, request: SchedulingRequest) -> Scheduled:
         self._requesting[request.arc] += 1
         try:
-            rcs = self.manager.choose(request)
+            rcs = await self._hardware.choose(request)
             await self._rcs.have_running(rcs)
             self._admit(request, rcs)
         finally:
             self._requesting[request.arc] -= 1
         return self.answers.scheduled(request.arc, self.clock.now_s())
+
+    def is_choosing(self) -> bool:
+        """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
+        return self._requesting.total() > 0
 
     def _tell_paths(self, node: str) -> None:
         """Tell the ARCs at and below the node by which path they ask now: a later RC manager must hear of it."""
@@ -272,7 +284,7 @@ class RcManager(Component[RcManagerParameters]):
             case ConnectArc(arc=arc):
                 self._switch(arc, lambda: self._connect(instruction))
             case RevokeArc(arc=arc, epochs=epochs):
-                self._revoked |= dict.fromkeys(epochs, (self.clock.now_s(), arc))
+                self._switch_times.revoked(epochs, arc, self.clock.now_s())
                 self._switch(arc, lambda: self._revoke(instruction))
             case RenewLeases():
                 self._publish_leases()
@@ -294,6 +306,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _record(self, record: Record) -> None:
         line = dict(record.line)
+        self.shares.take(line)
         if not self._trace.write(line):
             self._trace_stopped()
         subject = str(line.get("arc") or line.get("id") or "")
@@ -312,7 +325,7 @@ class RcManager(Component[RcManagerParameters]):
     async def _connect(self, order: ConnectArc) -> None:
         failed = await self._context_switch.connect(order, self._uses.get(order.arc, {}))
         if failed is None:
-            self._measure_switch(order)
+            self._switch_times.granted(order.epochs, order.arc, order.settle_s, self.clock.now_s())
             self.happened(Opened(order.arc))
             return
         self._rcs.failed(failed)
@@ -330,13 +343,6 @@ class RcManager(Component[RcManagerParameters]):
         """Say whether nobody but this ARC would lose anything if the RC were down."""
         return rc not in self._rcs.up or all(lease.rc != rc or lease.arc == arc for lease in self.manager.leases())
 
-    def _measure_switch(self, order: ConnectArc) -> None:
-        """Keep the time since these RCs were revoked from another ARC, settling not counted."""
-        revoked = [self._revoked.pop(rc) for rc in order.epochs if rc in self._revoked]
-        from_others = [at_s for at_s, arc in revoked if arc != order.arc]
-        if from_others:
-            self._switch_times_s.append(self.clock.now_s() - min(from_others) - order.settle_s)
-
     # ------------------------------------------------------------------ who is there
     def _take_over(self, found: Found) -> None:
         """Tell the schedule manager of all hardware, of the ARCs that hold it and of those that wait."""
@@ -344,12 +350,13 @@ class RcManager(Component[RcManagerParameters]):
         began_s = min((at_s for at_s, _ in adopted), default=self.clock.now_s())
         self._rcs.up.update(found.rcs)
         for resource in self._resources.values():
+            self.shares.know(resource.name, began_s)
             self.happened(rc_known(resource, found.rcs.get(resource.name)), began_s)
         for at_s, event in adopted:
             self._remember(event.request, tuple(event.epochs))
             self.happened(event, at_s)
         for arc, current in found.arcs.items():
-            if current.rcs and not found.holds_rightly(arc):
+            if current.rcs and self._resources.keys() >= {*current.rcs} and not found.holds_rightly(arc):
                 self._admit(current.request, tuple(current.rcs))
 
     def _heard_from_nameserver(self, envelope: Envelope[Message]) -> None:
@@ -362,8 +369,10 @@ class RcManager(Component[RcManagerParameters]):
     def _appeared(self, name: str, at: str) -> None:
         if name in self._resources and at.startswith("resource_pool/"):
             self._rcs.meet_again(name)
+        elif at == DEPENDENCY_DATABASE:
+            self._hardware.compare_soon()
 
-    def _heard_rc(self, envelope: Envelope[RcState]) -> None:
+    def heard_rc(self, envelope: Envelope[RcState]) -> None:
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
         state = envelope.body
         rc = state.name
@@ -397,6 +406,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _compare_with_nameserver(self) -> None:
         """Catch up with what happened while this process had no link."""
+        await self._hardware.compare()
         names = await self._recovery.present()
         for name in [*sorted(self._rcs.up), *self._uses]:
             if name not in names:
@@ -423,6 +433,7 @@ class RcManager(Component[RcManagerParameters]):
                 self._uses.pop(arc, None)
                 self.happened(Departed(arc, "silent"))
             self._publish_leases()
+            self._hardware.let_go()
             self.changed()
             await self.clock.sleep_s(RENEW_EVERY_S * rate)
 
@@ -454,7 +465,7 @@ class RcManager(Component[RcManagerParameters]):
         current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
         if current is None or arc in self._uses or self._requesting[arc]:
             return
-        if current.rcs:
+        if current.rcs and self._resources.keys() >= {*current.rcs}:
             self._admit(current.request, tuple(current.rcs))
             return
         try:

@@ -56,6 +56,8 @@ class ArcEvents:
     def requested(self, event: Requested) -> None:
         """Take in a request or a new version of it; a request for other RCs counts once the present ones are free."""
         request = event.request
+        if any(rc not in self._state.rcs for rc in event.rcs):
+            return  # removed since it was chosen
         known = self._state.arcs.get(request.arc)
         if known is None:
             self._add(event)
@@ -232,6 +234,11 @@ class ArcEvents:
         return min((arc.retry_s for arc in self._retrying.values() if arc.retry_s is not None), default=None)
 
     # Bookkeeping.
+
+    def ask_for(self, rc: str) -> bool:
+        """Return whether a request names this RC."""
+        coming = any(rc in event.rcs for event in self._successors.values())
+        return coming or any(rc in arc.uses for arc in self._state.arcs.values())
 
     def _add(self, event: Requested) -> ArcEntry:
         request = event.request

@@ -53,6 +53,13 @@ class RcWentDown:
 
 
 @dataclass(frozen=True, slots=True)
+class RcRemoved:
+    """The RC is no longer among the hardware. It counts until it is down and no request names it."""
+
+    rc: str
+
+
+@dataclass(frozen=True, slots=True)
 class RcCameBack:
     """The RC answers again, without holders."""
 
@@ -178,6 +185,7 @@ class Woken:
 Event = (
     RcKnown
     | RcWentDown
+    | RcRemoved
     | RcCameBack
     | CapacityChanged
     | Requested

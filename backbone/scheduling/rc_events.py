@@ -44,6 +44,13 @@ class RcEvents:
             if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
                 self._transitions.revoke(arc, "rc", name)
 
+    def removed(self, name: str) -> None:
+        """Remove an RC that is down and that no request names; others stay."""
+        rc = self._state.rcs.get(name)
+        if rc is not None and not rc.up:
+            self._state.remove_rc(rc)
+            self._transitions.trace.forget_rc(name)
+
     def came_back(self, name: str, last_epoch: int) -> None:
         """Count the RC as up: it answers, and has no holder."""
         rc = self._state.rcs.get(name)

@@ -158,7 +158,7 @@ class UnknownRc(SchedulingRefusal):
     """The request names an RC that is not in the mission."""
 
     code = "scheduling.unknown_rc"
-    remedy = "Use the names of 'scout-backbone status'."
+    remedy = "Use the names that 'scout-backbone resources' lists."
 
 
 class CapacityExceeded(SchedulingRefusal):

@@ -35,6 +35,7 @@ from backbone.scheduling.events import (
     PriorityChanged,
     RcCameBack,
     RcKnown,
+    RcRemoved,
     RcWentDown,
     Record,
     Requested,
@@ -139,6 +140,9 @@ class ScheduleManager:
                 self._rcs.known(event)
             case RcWentDown(rc=rc, fault=fault):
                 self._rcs.went_down(rc, fault=fault)
+            case RcRemoved(rc=rc):
+                if not self._arcs.ask_for(rc):
+                    self._rcs.removed(rc)
             case RcCameBack(rc=rc, last_epoch=last_epoch):
                 self._rcs.came_back(rc, last_epoch)
             case CapacityChanged(rc=rc, capacity=capacity):
@@ -229,6 +233,10 @@ class ScheduleManager:
             for ranks in [self._transitions.ranks(arc)]
             for rc, epoch in arc.epochs.items()
         ]
+
+    def knows(self, rc: str) -> bool:
+        """Return whether requests may name this RC."""
+        return rc in self._state.rcs
 
     def epoch_of(self, rc: str) -> int:
         """Return the largest epoch given for this RC so far; 0 if it is not known."""

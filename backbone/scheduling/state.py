@@ -62,6 +62,7 @@ class ScheduleState:
         self._rc_versions: dict[str, int] = {}
         self._changed: dict[str, None] = {}
         self._bits: dict[str, int] = {}
+        self._epochs_of_removed: dict[str, int] = {}
         self._levels: dict[Level, Level] = {}
         self._held_alone = 0
         self._ends: list[tuple[float, int, ArcEntry]] = []
@@ -96,7 +97,7 @@ class ScheduleState:
 
     def add_rc(self, known: RcKnown) -> RcEntry:
         """Take in an RC and return its entry."""
-        self._bits[known.rc] = 1 << len(self._bits)
+        self._bits.setdefault(known.rc, 1 << len(self._bits))
         entry = RcEntry(
             known.rc,
             known.kind,
@@ -105,11 +106,20 @@ class ScheduleState:
             known.connect_s,
             known.disconnect_s,
             known.up,
-            known.last_epoch,
+            max(known.last_epoch, self._epochs_of_removed.pop(known.rc, 0)),
             is_robot=known.is_robot,
         )
         self.rcs[known.rc] = entry
         return entry
+
+    def remove_rc(self, rc: RcEntry) -> None:
+        """Remove an RC that no ARC uses; its name may return for another one, whose epochs go on."""
+        self._epochs_of_removed[rc.name] = rc.epoch
+        del self.rcs[rc.name]
+        self._changed.pop(rc.name, None)
+        self.compatibility.service_changed([rc.name])
+        self._service_version += 1
+        self.version += 1
 
     def rc_down(self, rc: RcEntry, fault: str | None) -> bool:
         """Count the RC as down, put aside for this fault (None: as before); return whether it was up."""

@@ -31,6 +31,7 @@ class TraceWriter:
         """
         self._emit, self._goes_on = emit, goes_on
         self._is_up: dict[str, bool] = {}
+        self._removed: set[str] = set()
         self._nodes: dict[tuple[str, ...], tuple[str | None, int]] = {}
         self._ids: dict[tuple[str, ...], str] = {}
         self._story: deque[trace.Line] = deque(maxlen=STORY_LINES)
@@ -49,6 +50,11 @@ class TraceWriter:
     def has_introduced(self, rc: str) -> bool:
         """Return whether the RC was introduced."""
         return rc in self._is_up
+
+    def forget_rc(self, rc: str) -> None:
+        """Introduce an RC of this name anew: it is another one."""
+        if self._is_up.pop(rc, None) is not None:
+            self._removed.add(rc)
 
     def says_up(self, rc: str) -> bool | None:
         """Return whether the RC is up by the lines so far; None without such a line."""
@@ -71,8 +77,9 @@ class TraceWriter:
         )
         if not rc.up:
             self.record(trace.rc_state(now_s, rc.name, up=False), "not started yet")
-        elif self._goes_on:
+        elif self._goes_on or rc.name in self._removed:
             self.record(trace.rc_state(now_s, rc.name, up=True), "it answers this RC manager")
+        self._removed.discard(rc.name)
 
     def introduce_nodes(self, path: Path, now_s: float) -> None:
         """Introduce new nodes, new numbers and new parents on this path, parents first."""

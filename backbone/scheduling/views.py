@@ -101,6 +101,45 @@ class Why(Message, frozen=True):
     would_change: Text
 
 
+class Period(Message, frozen=True):
+    """Time between two re-plannings of an RC; its shares are those after the first and before the second.
+
+    Attributes:
+        until_s: Mission time of the second; negative: it has not come.
+        because: Cause of the first, for people.
+        shares: ARC → share of the time, or of the capacity, that it had.
+    """
+
+    since_s: Instant
+    until_s: Instant
+    because: Text
+    shares: Annotated[dict[Mention, Share], MANY]
+
+
+class RcUtilization(Message, frozen=True):
+    """Share of the time in which an RC was held; of a sharable one the share of its capacity that was given out.
+
+    Attributes:
+        since_s: Mission time at which counting began.
+        minute: Over the last minute, or since then.
+        ten_minutes: Over the last ten minutes, or since then.
+        periods: The last periods, oldest first, the present one last; empty unless asked for.
+    """
+
+    rc: Mention
+    since_s: Instant
+    minute: Share
+    ten_minutes: Share
+    periods: Annotated[list[Period], MANY] = []
+
+
+class Utilization(Message, frozen=True):
+    """Answer to ``AskUtilization``: all RCs."""
+
+    at_s: Instant
+    rcs: Annotated[list[RcUtilization], MANY]
+
+
 class RequestAttributes(Message, frozen=True):
     """The request of one ARC, as it counts now.
 

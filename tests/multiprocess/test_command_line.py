@@ -46,6 +46,8 @@ def test_a_broken_mission_file_is_refused_and_nothing_is_started(words: tuple[st
     "words",
     [
         ("scout-backbone", "status"),
+        ("scout-backbone", "components"),
+        ("scout-backbone", "resources"),
         ("scout-backbone", "why", "scout1"),
         ("scout-backbone", "story", "scout1"),
         ("scout-backbone", "start", "scout"),

@@ -22,8 +22,14 @@ def test_what_the_operator_says_goes_before_the_mission_file() -> None:
     assert (whole.host, whole.process, whole.parameters["network_id"]) == ("field", "alone", 7)
 
 
-def test_an_rc_that_no_arc_can_hold_is_remarked_on() -> None:
-    assert "no ARC can hold it" in complete(Start("scout", "scout9"), [SCOUT1])[1]
+def test_an_rc_that_the_mission_file_does_not_have_is_like_another_but_for_its_own_parameters() -> None:
+    radios = [Resource("radio1", "command_radio", sharable=True, capacity=0.8, parameters={"port": "/dev/ttyUSB0"})]
+    whole, remark = complete(Start("command_radio", "radio2", {"capacity": 0.5, "port": "/dev/ttyUSB1"}), radios)
+    assert whole.parameters == {
+        "driver": "simulated", "sharable": True, "capacity": 0.5, "links": {}, "port": "/dev/ttyUSB1"
+    }  # fmt: skip
+    assert remark == "radio2 is not in the mission file: it is like radio1, and can be claimed until it is stopped"
+    assert "port" not in complete(Start("command_radio", "radio2"), radios)[0].parameters
 
 
 def test_other_components_are_started_as_ordered() -> None:

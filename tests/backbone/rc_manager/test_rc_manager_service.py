@@ -30,6 +30,7 @@ from backbone.rc_manager.messages import (
     AskRc,
     AskRequest,
     AskSchedule,
+    AskUtilization,
     AskWhy,
     Beat,
     CloseGate,
@@ -63,7 +64,7 @@ from backbone.scheduling.requests import (
     UnknownRequest,
     Usage,
 )
-from backbone.scheduling.views import Schedule, Why
+from backbone.scheduling.views import Schedule, Utilization, Why
 from backbone.wire import Envelope, Message
 
 HARDWARE = [
@@ -243,6 +244,29 @@ def test_two_equals_share_a_frequency_five_seconds_each(pool: Any) -> None:
             gaps = [later - earlier for (earlier, _), (later, _) in pairwise(opens)]
             assert all(5.3 - 1e-6 <= gap <= 5.4 for gap in gaps), gaps
             assert next(by for what, by, _ in one.log if what == "slice") == "two"
+
+    run_virtual(main())
+
+
+def test_the_utilization_of_each_rc_and_the_shares_before_and_after_a_re_planning_can_be_asked(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            behavior, console = await here.arc("behavior"), await here.arc("console")
+            await here.clock.sleep_s(10.0 - here.clock.now_s())
+            await behavior.ask_for(request("behavior", "left", "radio"))
+            await here.clock.sleep_s(10.0)
+            await console.ask_for(request("console", "left", "radio", priority=100))
+            await here.clock.sleep_s(20.0)
+            answer = await console.bus.ask(RC_MANAGER, AskUtilization(periods=True), Utilization, within_s=1)
+            found = {one.rc: one for one in answer.rcs}
+            assert found["left"].minute == pytest.approx(30 / 40, abs=0.01)
+            assert found["radio"].ten_minutes == pytest.approx(30 / 40 * 0.04, abs=0.001)
+            assert found["right"].minute == 0.0
+            before, after = found["left"].periods[-2:]
+            assert (before.because, before.shares) == ("behavior asks", {"behavior": pytest.approx(1.0, abs=0.01)})
+            assert (after.because, after.shares["console"]) == ("console asks", pytest.approx(1.0, abs=0.01))
+            briefly = await console.bus.ask(RC_MANAGER, AskUtilization(), Utilization, within_s=1)
+            assert all(one.periods == [] for one in briefly.rcs)
 
     run_virtual(main())
 
