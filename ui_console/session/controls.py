@@ -10,10 +10,11 @@ from backbone.errors import LinkError, Refusal
 from backbone.mission_log.operators import OperatorAction
 from resource_pool.arc_client import EmergencyStopped
 from ui_console.model.driving import COMMAND_WORDS, Command, DeadMan, DriveSpan, DriveWish, HaltWish, JumpWish
-from ui_console.model.events import CommandApplied, LetGoNeeded, LinkTrouble, MomentBegan, failed
+from ui_console.model.events import AbilitiesKnown, CommandApplied, LetGoNeeded, LinkTrouble, MomentBegan, failed
 
 if TYPE_CHECKING:
     from resource_pool.arc_client import Applied, ArcClient
+    from ui_console.model.arc_abilities import ArcAbilities
     from ui_console.session.observer import AnyObserver
 
 
@@ -31,11 +32,18 @@ class Controls:
         self._is_held_back = False
         self._arc: ArcClient | None = None
         self._is_on = False
+        self.abilities: ArcAbilities | None = None
+        """What the operator can do with the ARC; None: not known."""
 
     # ------------------------------------------------------------------ the robot
     def connect(self, arc: ArcClient) -> None:
         """Send commands to this ARC from now on, as long as it is granted."""
         self._arc, self._is_on = arc, True
+
+    def know(self, abilities: ArcAbilities | None) -> None:
+        """Show what the operator can do with the ARC; None: not known."""
+        self.abilities = abilities
+        self._console.show(AbilitiesKnown(self._console.clock.now_s(), abilities))
 
     def switch_off(self) -> None:
         """Ignore keys until ``connect``, also keys held down; single commands still go."""

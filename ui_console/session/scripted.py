@@ -20,7 +20,7 @@ from ui_console.session.teleoperation import Teleoperation
 
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
-_FOR_SCREENS_ONLY = (events.Asked, events.MomentBegan, events.PictureSeen)
+_FOR_SCREENS_ONLY = (events.Asked, events.AbilitiesKnown, events.MomentBegan, events.PictureSeen)
 
 
 class ScriptDriver:

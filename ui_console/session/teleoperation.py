@@ -31,7 +31,7 @@ from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
 from ui_console.session.controls import Controls
 from ui_console.session.hand_over import AskHandOver, HandOver
-from ui_console.session.kind_finder import find_arc_kind
+from ui_console.session.kind_finder import KindFinder
 from ui_console.session.observer import Observer
 from ui_console.session.presence import Presence
 from ui_console.session.stop_ear import StopEar
@@ -89,6 +89,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._finding: asyncio.Task[None] | None = None
         self._decided = asyncio.Event()
         self._controls = Controls(self)
+        self._kinds = KindFinder(self, self._controls.know)
         self._consent = ConsentTalk(self, self.give_back)
         self._hand_over = HandOver(self, self.give_back)
         self._waiting = Waiting(self, self._hand_over, self._waits_for)
@@ -143,6 +144,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._decided.clear()
         self.acted(OperatorAction.TAKE, wished.robot or ANY_ROBOT, f"with priority {wished.priority}")
         self.show(events.Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
+        self._kinds.take(wished.kind)
         self._keeping = self.start_task(self._keep(arc, rested), "arc")
 
     async def switch(self, robot: str) -> None:
@@ -378,7 +380,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def _find_kind_and_take(self) -> None:
         wished = self.parameters
         try:
-            kind = await find_arc_kind(self.bus, self.clock, wished.robot, wished.sight)
+            kind = await self._kinds.find(wished.robot, wished.sight)
         except Refusal as refusal:
             self._claim_refused(refusal)
             return
