@@ -28,9 +28,10 @@ from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, St
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, watch_stops
 from scout_model.radio_link import encode_drive
+from scout_model.scout import wheels_rad_s
 from ui_console.model.consent import CONSENT_WITHIN_S
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import STICK_LASTS_S, DriveWish
+from ui_console.model.driving import STICK_LASTS_S, MoveWish
 from ui_console.session.teleoperation import Teleoperation
 
 PEOPLE = ("anna", "ben", "cleo")
@@ -86,7 +87,7 @@ class Person:
         self.console = Teleoperation(
             launch, bus, stage.pool.clock, show=self.model.apply, takes=False, keeps_arc=True, user=name
         )
-        self.drive: DriveWish | None = None
+        self.drive: MoveWish | None = None
 
     async def hands(self) -> None:
         """Repeat the held controls, for ever."""
@@ -119,11 +120,11 @@ class Stage:
         watch_stops(ear, lambda state: self.stops.append((pool.clock.now_s(), state)))
         ear.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
 
-    def new_press(self) -> DriveWish:
-        """Return wheel speeds that no other press has."""
+    def new_press(self) -> MoveWish:
+        """Return speeds that no other press has."""
         number = len(self.presses)
-        drive = DriveWish(1.0 + number % 100 / 20, 1.0 + number // 100 / 20)
-        self.presses[encode_drive(drive.left_rad_s, drive.right_rad_s)] = self.pool.clock.now_s()
+        drive = MoveWish(0.02 + number % 100 / 1000, number // 100 / 20)
+        self.presses[encode_drive(*wheels_rad_s(drive.forward_m_s, drive.turn_rad_s))] = self.pool.clock.now_s()
         return drive
 
     def begin(self, work: Any) -> None:

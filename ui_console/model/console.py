@@ -20,6 +20,7 @@ from backbone.scheduling.views import Why
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop, Suspended
 from ui_console.model import events, views
 from ui_console.model.alarms import AlarmBook
+from ui_console.model.applied import command_line
 from ui_console.model.arc_abilities import SLOW, ArcAbilities, Reach
 from ui_console.model.consent import Settled, Sought, Topic
 from ui_console.model.lifting import question_line
@@ -168,7 +169,7 @@ class ConsoleModel:
             epoch=max(held.epochs.values(), default=0) if held is not None else 0,
             until_s=held.until_s if held is not None else views.NONE_S,
             taken_because=self._why_lost(self.lost) if self.lost is not None else "",
-            applied=_applied_line(self.applied),
+            applied=command_line(self.applied.command, self.applied.values) if self.applied is not None else "",
             stop=self.team.robots.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
             away_since_s=self.team.alarms.away_since_s,
             consent=self.consent(now_s),
@@ -387,10 +388,3 @@ def _question_line(sought: Sought) -> str:
     if sought.topic is Topic.LIFT:
         return question_line(sought.user, sought.robot, sought.why)
     return f"{sought.user} asks for {sought.robot}{f': {sought.why}' if sought.why else ''}"
-
-
-def _applied_line(applied: events.CommandApplied | None) -> str:
-    if applied is None:
-        return ""
-    values = " ".join(f"{value:+.1f}" for value in applied.values.values())
-    return f"{applied.command} {values}".strip()

@@ -88,7 +88,7 @@ class CommandApplied(Event):
     Attributes:
         rc: The robot.
         epoch: Of the grant.
-        command: ``drive``, ``halt`` or ``jump``.
+        command: Its word.
         values: After clipping.
         took_s: From the wish to the answer, seconds of the machine; negative: not measured.
     """

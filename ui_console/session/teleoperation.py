@@ -23,8 +23,9 @@ from backbone.mission_log.operators import OperatorAction
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events
+from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import AskConsent, Consent
-from ui_console.model.driving import Command, DriveWish, HaltWish, JumpWish
+from ui_console.model.driving import Command, GiveWish, HaltWish, Motion
 from ui_console.model.lifting import AskLift
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
@@ -110,6 +111,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         return self._keeping is not None and self._arc is not None and self._arc.granted is not None
 
     @property
+    def arc_abilities(self) -> ArcAbilities | None:
+        """What the operator can do with the ARC; None: not known."""
+        return self._controls.abilities
+
+    @property
     def is_ready(self) -> bool:
         """True while verbs can be called."""
         return self.state is LifeState.READY
@@ -188,7 +194,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self.refusal is not None:
             raise self.refusal
 
-    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
+    def hold(self, drive: Motion, lasts_s: float | None = None) -> None:
         """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
         Args:
@@ -202,10 +208,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Stop the wheels now; sticks, pads and pages report their release by this call."""
         self._controls.stop()
 
-    def jump(self) -> None:
-        """Take in that the key for one jump is down: jump, unless it has to be let go first."""
-        if self._controls.press_jump() and self.is_held:
-            self.start_task(self._jump(), "jump")
+    def give(self, wish: GiveWish) -> None:
+        """Take in that the control for one command is pressed: give it, unless the control has to be let go first."""
+        self.touch()
+        if self._controls.press_once(wish.word) and self.is_held:
+            self.start_task(self._give(wish), "command")
 
     async def do(self, command: Command) -> bool:
         """Send one command and show its outcome; return True if it was applied."""
@@ -414,14 +421,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.show(events.PictureSeen(self.clock.now_s(), frame.captured_s, frame.robot))
             self._see(frame)
 
-    # ------------------------------------------------------------------ away, and jumps
+    # ------------------------------------------------------------------ away, and single commands
     async def _go_away(self) -> None:
         """Let the robot go on with useful work while its operator is away."""
         self.leave()
         await self.give_back(f"{self.user} is away", wanted=False)
 
-    async def _jump(self) -> None:
-        await self.do(JumpWish())
+    async def _give(self, wish: GiveWish) -> None:
+        await self.do(wish)
 
     async def _work_and_end(self, work: Callable[[Teleoperation], Awaitable[None]]) -> None:
         await work(self)

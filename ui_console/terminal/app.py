@@ -13,7 +13,7 @@ from textual.widgets import Input
 
 from backbone.errors import Refusal
 from backbone.launcher.endings import ExitCode
-from ui_console.model.driving import Direction, drive_towards
+from ui_console.model.driving import DIRECTIONS, STICK_LASTS_S, Direction, faster
 from ui_console.model.views import AlarmView
 from ui_console.session.gamepad import buttons_help
 from ui_console.terminal.dialogs import Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker
@@ -24,7 +24,6 @@ from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
 from ui_console.terminal.tables import FIXED, PanelName
 from ui_console.terminal.widgets import DrivePad, Panel
 
-SPEED_STEP_RAD_S, SPEED_MOST_RAD_S = 1.0, 15.0  # chosen: fine steps, a Scout's most
 A = TypeVar("A")
 
 
@@ -62,11 +61,11 @@ class ConsoleApp(ConsoleDisplay):
 
     def action_drive(self, direction: Direction) -> None:
         """Drive while the key is held; the session ends it when no repeat comes."""
-        self._session.hold(drive_towards(direction, self.speed_rad_s))
+        self._session.steer(*DIRECTIONS[direction], self.speed)
 
     def on_drive_pad_dragged(self, message: DrivePad.Dragged) -> None:
         """Drive by the pad."""
-        self._session.hold(message.drive, message.lasts_s)
+        self._session.steer(message.forward, message.right, self.speed, STICK_LASTS_S)
 
     def on_drive_pad_released(self, _message: DrivePad.Released) -> None:
         """Stop the wheels now."""
@@ -82,8 +81,7 @@ class ConsoleApp(ConsoleDisplay):
 
     def action_faster(self, steps: int) -> None:
         """Change the speed of the drive keys."""
-        wanted = self.speed_rad_s + steps * SPEED_STEP_RAD_S
-        self.speed_rad_s = min(max(wanted, SPEED_STEP_RAD_S), SPEED_MOST_RAD_S)
+        self.speed = faster(self.speed, steps)
         self.redraw()
 
     def action_release(self) -> None:

@@ -111,10 +111,9 @@ class TerminalSession(Session):
         await play_gamepad(
             device,
             Stick(ranges),
-            hold=self.hold,
+            hold=lambda forward, right, lasts_s: self.steer(forward, right, screen.speed, lasts_s),
             stop=self.stop,
             wish=lambda wish: self._begin_wish(wish, screen),
-            speed_rad_s=lambda: screen.speed_rad_s,
         )
 
     def _begin_wish(self, wish: PadWish, screen: ConsoleApp) -> None:

@@ -15,7 +15,6 @@ from ui_console.model.consent import MAX_WHY
 from ui_console.web.login import BeatRequest, Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
-MOST_RAD_S = 15.0  # a Scout's most; robots clip to what they can
 
 Numbered = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
@@ -26,12 +25,15 @@ class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
     Attributes:
         moment: ``OwnView.moment`` as the page showed it when the press began; at a later one the press moves nothing.
+        forward: −1 (full backward) to 1.
+        right: −1 (full left) to 1.
+        speed: Share of the robot's most at full stick.
     """
 
     moment: Numbered
     forward: Share
     right: Share
-    speed_rad_s: Annotated[float, msgspec.Meta(ge=0.0, le=MOST_RAD_S)]
+    speed: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 
 
 class StopWheels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop"):

@@ -12,7 +12,7 @@ import web_browser
 from web_browser import SIZES
 from web_stage import Stage
 
-from resource_pool.commands import Drive, Halt
+from resource_pool.commands import Halt, Move
 
 QUIET_S = 0.6  # twice what the server counts a drive for
 
@@ -83,7 +83,7 @@ class Wheels:
         self._seen = len(self._stage.drives(self._robot))
 
     async def wait_turning(self) -> None:
-        await wait_until(lambda: any(isinstance(one, Drive) for one in self.news), "the wheels turn")
+        await wait_until(lambda: any(isinstance(one, Move) for one in self.news), "the wheels turn")
 
     async def wait_halted(self) -> None:
         await wait_until(lambda: self.news and isinstance(self.news[-1], Halt), "the wheels stop")
@@ -92,7 +92,7 @@ class Wheels:
         """Nothing turns them for a while."""
         self.forget()
         await asyncio.sleep(QUIET_S)
-        assert not any(isinstance(one, Drive) for one in self.news), why
+        assert not any(isinstance(one, Move) for one in self.news), why
 
 
 class Key:

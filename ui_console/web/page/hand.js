@@ -4,7 +4,7 @@ import { find } from "./dom.js";
 import { lasting, set } from "./text.js";
 
 /** @import { Driving } from "./driving.js" */
-/** @import { OwnView } from "./messages.d.ts" */
+/** @import { ArcAbilities, OwnView } from "./messages.d.ts" */
 /** @import { Act } from "./types.d.ts" */
 
 const MEMORY = "held";
@@ -17,6 +17,8 @@ export class Hand {
     this.driving = driving;
     /** @type {OwnView | null} */
     this.own = null;
+    /** @type {ArcAbilities | null} */
+    this.abilities = null;
     this.now_s = 0;
     this.memory = new Memory();
     find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
@@ -51,17 +53,32 @@ export class Hand {
   }
 
   get speed() {
-    return Number(find("speed", HTMLInputElement).value);
+    return Number(find("speed", HTMLInputElement).value) / 100;
   }
 
-  /** @param {number} step */
-  change(step) {
-    find("speed", HTMLInputElement).value = String(this.speed + step);
+  /** @param {number} steps */
+  change(steps) {
+    const slider = find("speed", HTMLInputElement);
+    if (steps > 0) slider.stepUp(steps);
+    else slider.stepDown(-steps);
     this.showSpeed();
   }
 
+  /** @param {ArcAbilities | null} abilities */
+  know(abilities) {
+    this.abilities = abilities;
+    this.showSpeed();
+    if (this.own !== null) this.driving.turn(this.own.is_held && this.canMove);
+  }
+
+  get canMove() {
+    return this.abilities === null || this.abilities.reach !== null;
+  }
+
   showSpeed() {
-    set(find("speed-shown"), find("speed", HTMLInputElement).value);
+    const most = this.abilities?.reach?.forward_m_s;
+    const there = most === undefined ? "" : ` (${(most * this.speed).toFixed(2)} m/s)`;
+    set(find("speed-shown"), `${find("speed", HTMLInputElement).value} %${there}`);
   }
 
   /**
@@ -90,7 +107,7 @@ export class Hand {
     if (isOther(before, own))
       this.driving.letGo(own.is_held); // a held control was meant for an earlier moment
     else if (own.moment !== before?.moment) this.driving.letGo();
-    this.driving.turn(own.is_held);
+    this.driving.turn(own.is_held && this.canMove);
     if (own.is_asked) this.memory.forget();
     set(find("own"), own.status);
     set(find("taken"), own.taken_because ? `Taken from you: ${own.taken_because}` : "");

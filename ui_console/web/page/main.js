@@ -99,6 +99,7 @@ function heard(message) {
     document.title = `${mission} – Scout console`;
   }
   if (changes.now_s !== undefined) set(find("clock"), seconds(changes.now_s));
+  if (changes.abilities !== undefined) hand.know(changes.abilities);
   if (changes.own) {
     hand.show(changes.own, view.now_s ?? 0);
     const down_s = changes.own.link_down_s;
