@@ -81,6 +81,7 @@ WRITING = (
 )
 DRIVING = (
     Place("picture alone", "action_bare", "v", close="v"),
+    Place("dialog of commands", "action_command", "o", "which command", "Escape"),
     Place("dialog of robots", "action_pick", "p Down Down", "which robot", "Escape"),
     Place("field of a reason", "action_ask_consent_because", "M", "may I have it", "Escape"),
 )

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 
 import msgspec
 
-from backbone.component.abilities import CommandForm, FieldForm
+from backbone.component.abilities import CommandForm, FieldForm, ValueKind
 from backbone.component_database.messages import ComponentType
+from ui_console.model.fields import label_of
 
 MOVE, HALT = "move", "halt"
 BY_STICK = frozenset({MOVE, "drive", HALT})
@@ -39,12 +40,14 @@ class RoleCommand(msgspec.Struct, frozen=True):
     Attributes:
         role: Role of the RC that obeys it.
         title: For people: its words, and the role if several RCs of the ARC obey it.
-        form: Its fields.
+        form: Its fields, without those that a person cannot be asked for.
+        labels: Of the fields, with range and unit, for people.
     """
 
     role: str
     title: str
     form: CommandForm
+    labels: list[str]
 
 
 class ArcAbilities(msgspec.Struct, frozen=True):
@@ -53,12 +56,16 @@ class ArcAbilities(msgspec.Struct, frozen=True):
     Attributes:
         reach: Most speeds of its body; None: it cannot move.
         can_halt: True if it takes a command to halt.
-        commands: Commands without those of the stick, in the order of their declaration.
+        commands: Commands that a person can give, without those of the stick, in the order of their declaration.
     """
 
     reach: Reach | None
     can_halt: bool
     commands: list[RoleCommand]
+
+    def takes(self, word: str) -> bool:
+        """Return whether a person can give this command."""
+        return any(command.form.word == word for command in self.commands)
 
     def moves(self, word: str) -> bool:
         """Return whether a stopped robot refuses this command; True if the ARC does not declare the command."""
@@ -79,12 +86,23 @@ def arc_abilities(kind: str, types: Sequence[ComponentType]) -> ArcAbilities | N
         return None
     declared = arc.abilities.commands
     commands = [
-        RoleCommand(role, _title(form, role), _limited(arc, form, role, by_name))
+        _asked(role, _title(form, role), _limited(arc, form, role, by_name))
         for form in declared
         for role in form.roles
-        if form.word not in BY_STICK
+        if form.word not in BY_STICK and not any(_is_odd(field) and field.is_required for field in form.fields)
     ]
     return ArcAbilities(_reach(arc, by_name), any(form.word == HALT for form in declared), commands)
+
+
+def _asked(role: str, title: str, form: CommandForm) -> RoleCommand:
+    fields = [field for field in form.fields if not _is_odd(field)]
+    asked = msgspec.structs.replace(form, fields=fields)
+    return RoleCommand(role, title, asked, [label_of(field) for field in fields])
+
+
+def _is_odd(field: FieldForm) -> bool:
+    """Return whether a person cannot be asked for this field."""
+    return field.kind is ValueKind.OTHER
 
 
 def _title(form: CommandForm, role: str) -> str:

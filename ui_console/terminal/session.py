@@ -120,7 +120,7 @@ class TerminalSession(Session):
         self.touch()
         match wish:
             case PadWish.JUMP:
-                self.jump()
+                screen.action_jump()
             case PadWish.TAKE:
                 self.take()
             case PadWish.RELEASE:

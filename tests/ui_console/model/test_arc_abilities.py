@@ -82,6 +82,18 @@ def test_a_body_whose_limits_are_not_declared_is_slow(with_rc: bool) -> None:
     assert made("walk", types).reach == SLOW
 
 
+def test_what_a_person_cannot_be_asked_for_is_not_offered() -> None:
+    odd, plain = FieldForm("path", ValueKind.OTHER, is_required=True), FieldForm("path", ValueKind.OTHER)
+    commands = [
+        CommandForm("follow", [odd], roles=["eye"]),
+        CommandForm("look", [plain, number("pan", 1.0)], roles=["eye"]),
+    ]
+    arc = Abilities(commands=commands)
+    [look] = made("eyes", [ComponentType("eyes", "x:Y", Subsystem.RESOURCE_POOL, abilities=arc)]).commands
+    assert [field.name for field in look.form.fields] == ["pan"]
+    assert look.labels == ["pan, -1 to 1"]
+
+
 def test_an_undeclared_command_counts_as_one_that_moves() -> None:
     assert made("drive", TYPES).moves("somersault")
 

@@ -7,16 +7,17 @@ from typing import Any
 
 import pytest
 from fake_resource_pool import FakeArc, FakePlacer
+from known_arcs import serve_types
 
 from backbone.addresses import COMPONENT_DATABASE
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.abilities import Abilities, CommandForm
 from backbone.component.launch import Launch
-from backbone.component_database.messages import ComponentType, ListTypes, TypeCount, Types
+from backbone.component_database.messages import ComponentType
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
-from backbone.wire import Envelope, Message
+from backbone.wire import Message
 from resource_pool.commands import Halt, Move
 from resource_pool.messages import GiveCommand
 from ui_console.model.console import ConsoleModel
@@ -40,13 +41,7 @@ class Stage:
         forms = [CommandForm(word, moves=word in ("move", "jump"), roles=["body"]) for word in words]
         able = Abilities(body="body", commands=forms)
         kind = ComponentType("drive", "x:Y", Subsystem.RESOURCE_POOL, needs={"body": "any"}, abilities=able)
-
-        async def answer(_asked: Envelope[Message]) -> Message:
-            return Types([TypeCount(kind, 1)])
-
-        database = network.join(COMPONENT_DATABASE, self.placer.clock)
-        database.serve(COMPONENT_DATABASE, ListTypes, answer)
-        database.declare_alive(COMPONENT_DATABASE)
+        serve_types(network.join(COMPONENT_DATABASE, self.placer.clock), [kind])
         parameters = {"robot": "scout1", "kind": "drive", "priority": 100}
         launch = Launch("local", Subsystem.UI_CONSOLE, "console-7", "console", "x:Y", "local", "", 0.0, 1.0, parameters)
         bus = network.join(launch.address, self.placer.clock)

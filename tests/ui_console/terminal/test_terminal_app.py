@@ -60,6 +60,7 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("space", ["stop"]),
     ("escape", ["stop"]),
     ("j", [GiveWish("jump")]),
+    ("o", []),
     ("r", ["release"]),
     ("t", ["take"]),
     ("m", [("may I", "")]),

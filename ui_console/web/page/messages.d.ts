@@ -291,6 +291,7 @@ export interface RoleCommand {
   role: string;
   title: string;
   form: CommandForm;
+  labels: string[];
 }
 
 export interface SetAnswer {
