@@ -98,8 +98,8 @@ class Operator:
                 pass  # the ARC has no body that moves
             case protocol.StopWheels():
                 self.stop()
-            case protocol.JumpOnce(moment):
-                self._by_press(moment, lambda console: console.give(GiveWish("jump")))
+            case protocol.GiveRequest(moment, word, values, role):
+                self._give(moment, GiveWish(word, values, role))
             case protocol.Drawn(robot, number):
                 self._drawn(robot, number)
             case protocol.Watch(robots):
@@ -197,6 +197,13 @@ class Operator:
         """Move the robot unless the press is from an earlier moment, also if the page's message was late."""
         if moment == self.model.moment:
             self._with_robot(act)
+
+    def _give(self, moment: int, wish: GiveWish) -> None:
+        """Give a command, unless the robot was stopped, freed, granted or lost since the page showed it."""
+        if moment == self.model.moment:
+            self._with_robot(lambda console: console.give(wish))
+        else:
+            self._answer({"refused": f"{wish.word} was not given: the robot's state has changed; press again"})
 
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)

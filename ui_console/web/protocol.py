@@ -10,12 +10,16 @@ from typing import Annotated, Any
 import msgspec
 
 from backbone.mission_log.question import LogQuestion
-from backbone.ranges import EXACT
+from backbone.ranges import EXACT, LONGEST_LINE
 from ui_console.model.consent import MAX_WHY
 from ui_console.web.login import BeatRequest, Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
 
+ShortLine = Annotated[str, msgspec.Meta(max_length=LONGEST_LINE)]
+MOST_FIELDS = 64  # chosen: more than a person fills in
+
+GivenValue = Annotated[int, msgspec.Meta(ge=-EXACT, le=EXACT)] | float | bool | ShortLine
 Numbered = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
@@ -40,14 +44,20 @@ class StopWheels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fi
     """The control was let go."""
 
 
-class JumpOnce(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="jump"):
-    """Jump.
+class GiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="give"):
+    """Give one command to the robot in hand.
 
     Attributes:
         moment: As in ``Steer``.
+        word: The command's.
+        values: Field → value; the ARC checks them.
+        role: Role of the RC that obeys it.
     """
 
     moment: Numbered
+    word: ShortText
+    values: Annotated[dict[ShortText, GivenValue], msgspec.Meta(max_length=MOST_FIELDS)]
+    role: ShortText
 
 
 class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="take"):
@@ -163,7 +173,7 @@ class Here(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="d
 Intent = (
     Steer
     | StopWheels
-    | JumpOnce
+    | GiveRequest
     | TakeOver
     | ReleaseRequest
     | MayI

@@ -76,7 +76,7 @@ async def test_a_press_from_before_a_stop_moves_nothing_after_the_lift(stage: St
         await anna.wait(lambda: not anna.view["own"]["stop"], "free")
         count = len(stage.drives())
         await anna.say(do="drive", moment=pressed_at, forward=1.0, right=0.0, speed=0.5)
-        await anna.say(do="jump", moment=pressed_at)
+        await anna.say(do="give", moment=pressed_at, word="jump", values={}, role="")
         await anna.drive(forward=1.0, right=0.0, speed=0.25)
         await stage.placer.wait(lambda: len(stage.drives()) > count)
         assert stage.drives()[count][1] == Move(0.025, 0.0, after_stop=1), "it was pressed after the lift"

@@ -24,6 +24,24 @@ Object.defineProperty(navigator, "getGamepads", { value: () => [pad()] });
 """
 SHOULDER = 5
 
+COVERED = """() => {
+  const ends = [0, document.documentElement.scrollHeight];
+  const controls = [...document.querySelectorAll("button, input, select, [tabindex]")];
+  const isAt = (one, box, share) => {
+    const found = document.elementFromPoint(box.x + box.width / 2, box.y + share * box.height);
+    return found === one || one.contains(found) || found?.contains(one);
+  };
+  return controls.filter((one) => one.checkVisibility() && !one.disabled).flatMap((one) => ends.flatMap((end) => {
+    document.activeElement.blur();
+    scrollTo(0, end);
+    one.focus();
+    const box = one.getBoundingClientRect();
+    const isSeen = [0.2, 0.5, 0.8].some((share) => isAt(one, box, share));
+    return isSeen ? [] : [`${one.id || one.textContent || one.className}, from ${end}`];
+  }));
+}"""
+"""What gets the focus somewhere and cannot be seen there."""
+
 
 @asynccontextmanager
 async def page_at(stage: Stage, size: str = "desktop", **options: Any) -> AsyncIterator[Any]:

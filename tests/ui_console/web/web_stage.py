@@ -11,10 +11,11 @@ from typing import Any
 
 import pytest
 from fake_resource_pool import FakeArc, FakePlacer
+from known_arcs import lit_types, serve_types
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from backbone.addresses import LAUNCHER, RC_MANAGER
+from backbone.addresses import COMPONENT_DATABASE, LAUNCHER, RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
@@ -157,7 +158,7 @@ class Stage:
         self.port = 0
         self.robots: dict[str, FakeRobot] = {}
         self._network = network
-        self._launchers: list[Bus] = []
+        self._others: list[Bus] = []
 
     @property
     def address(self) -> str:
@@ -171,6 +172,12 @@ class Stage:
             self.robots[name] = FakeRobot(bus, self.clock, name, self._stop_changed)
         self.publish_schedule(**dict.fromkeys(names, ""))
 
+    def know_commands(self) -> None:
+        """Add a component database: each robot is held with a lamp beside it."""
+        bus = self._network.join(COMPONENT_DATABASE, self.clock)
+        serve_types(bus, lit_types("capture"))
+        self._others.append(bus)
+
     def keep_log(self, events: Iterable[StoryEvent]) -> None:
         """Add a launcher that has kept these events."""
         log, bus = MissionLog(), self._network.join(LAUNCHER, self.clock)
@@ -181,7 +188,7 @@ class Stage:
             return log.answer(asked.body) if isinstance(asked.body, AskLog) else PeopleKnown({})
 
         bus.serve(LAUNCHER, AskLog | AskPeople, answer)
-        self._launchers.append(bus)
+        self._others.append(bus)
 
     def _stop_changed(self, latch: StopLatch) -> None:
         """Let the ARCs of a stopped robot refuse commands that move it."""
@@ -193,8 +200,8 @@ class Stage:
                 arc.refusal = refusal if state.is_stopped else None
 
     async def close(self) -> None:
-        for launcher in self._launchers:
-            await launcher.close()
+        for other in self._others:
+            await other.close()
         for robot in self.robots.values():
             await robot.bus.close()
 

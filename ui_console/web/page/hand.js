@@ -3,6 +3,7 @@
 import { find } from "./dom.js";
 import { lasting, set } from "./text.js";
 
+/** @import { Commands } from "./commands.js" */
 /** @import { Driving } from "./driving.js" */
 /** @import { ArcAbilities, OwnView } from "./messages.d.ts" */
 /** @import { Act } from "./types.d.ts" */
@@ -11,10 +12,11 @@ const MEMORY = "held";
 
 /** Shows `own` of the view; `act(what, name)` carries out a person's action. */
 export class Hand {
-  /** @param {{ act: Act, driving: Driving }} given */
-  constructor({ act, driving }) {
+  /** @param {{ act: Act, driving: Driving, commands: Commands }} given */
+  constructor({ act, driving, commands }) {
     this.act = act;
     this.driving = driving;
+    this.commands = commands;
     /** @type {OwnView | null} */
     this.own = null;
     /** @type {ArcAbilities | null} */
@@ -26,7 +28,6 @@ export class Hand {
     find("may-i").addEventListener("click", () => act("may_i"));
     find("stop-mine").addEventListener("click", () => act("stop_mine"));
     find("halt").addEventListener("click", () => act("halt"));
-    find("jump").addEventListener("click", () => act("jump"));
     find("consent-yes").addEventListener("click", () => act("consent", "yes"));
     find("consent-no").addEventListener("click", () => act("consent", "no"));
     find("retake").addEventListener("click", () => {
@@ -67,6 +68,7 @@ export class Hand {
   /** @param {ArcAbilities | null} abilities */
   know(abilities) {
     this.abilities = abilities;
+    this.commands.know(abilities);
     this.showSpeed();
     if (this.own !== null) this.driving.turn(this.own.is_held && this.canMove);
   }
@@ -92,6 +94,7 @@ export class Hand {
     set(find("own"), this.held ? `You held ${this.held} when the connection ended.` : "Not connected.");
     this.own = null;
     this.driving.turn(false);
+    this.commands.turn(false);
     document.body.dataset.held = "";
     document.body.classList.remove("is-asking");
   }
@@ -118,7 +121,8 @@ export class Hand {
     find("may-i", HTMLButtonElement).disabled = !own.is_asked || own.is_held;
     find("release", HTMLButtonElement).disabled = !own.is_asked;
     find("take", HTMLButtonElement).disabled = own.is_asked;
-    find("halt", HTMLButtonElement).disabled = find("jump", HTMLButtonElement).disabled = !own.is_held;
+    find("halt", HTMLButtonElement).disabled = !own.is_held;
+    this.commands.turn(own.is_held);
     find("stop-mine").hidden = !own.is_held;
     set(find("stop-mine"), `Stop ${own.robot}`);
     document.body.dataset.held = this.held;

@@ -418,6 +418,14 @@ export interface Drawn {
   number: number;
 }
 
+export interface GiveRequest {
+  do: "give";
+  moment: number;
+  word: string;
+  values: Record<string, number | number | boolean | string>;
+  role: string;
+}
+
 export interface Hello {
   do: "hello";
   token: string;
@@ -429,11 +437,6 @@ export interface Hello {
 export interface Here {
   do: "here";
   is_there: boolean;
-}
-
-export interface JumpOnce {
-  do: "jump";
-  moment: number;
 }
 
 export interface LiftRequest {
@@ -531,7 +534,7 @@ export type Said =
   | BeatRequest
   | Steer
   | StopWheels
-  | JumpOnce
+  | GiveRequest
   | TakeOver
   | ReleaseRequest
   | MayI
