@@ -15,17 +15,15 @@ from typing import Any
 
 import pytest
 from cut_network import CutNetwork
-from pool_on_local_network import ARC_CLASSES, Pool, a_pool
+from pool_on_local_network import Pool, a_pool
+from pool_placer import PoolPlacer
 
-from backbone.addresses import PLACER
 from backbone.bus.clock import run_virtual
 from backbone.component.launch import Launch
-from backbone.creator.messages import EndedBy
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
-from backbone.naming import Subsystem, address
-from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, Started, StopComponent
-from backbone.wire import Envelope, Message
+from backbone.naming import Subsystem
+from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, watch_stops
 from scout_model.radio_link import encode_drive
 from scout_model.scout import wheels_rad_s
@@ -42,37 +40,6 @@ STEPS = 16
 OFTEN = {"press": 8, "let go": 8, "lift": 6, "take": 3, "double press": 2, "release": 2}
 SELDOM = {"stop": 1, "double stop": 1, "cut": 1}
 DOES = [what for what, times in {**OFTEN, **SELDOM}.items() for _time in range(times)]
-
-
-class PoolPlacer:
-    """Starts and ends ARCs in the pool."""
-
-    def __init__(self, pool: Pool) -> None:
-        self._pool = pool
-        self.bus = pool.network.join(PLACER, pool.clock)
-        self.bus.serve(PLACER, PlacerQuestion, self._answer)
-        self.bus.declare_alive(PLACER)
-
-    async def _answer(self, asked: Envelope[Any]) -> Message:
-        match asked.body:
-            case Start(type=kind, name=name, parameters=parameters):
-                if name in self._pool.running:
-                    await self._end(name)
-                await self._pool.start(ARC_CLASSES[kind], name, parameters, kind=kind)
-                return Started(address(Subsystem.RESOURCE_POOL, name), "local", 1, [])
-            case StopComponent(name=name):
-                if name not in self._pool.running:
-                    raise NotPlaced(f"{name} does not run")
-                await self._end(name)
-                return Ended(name, EndedBy.ASKING)
-            case _:
-                raise NotPlaced("not here")
-
-    async def _end(self, name: str) -> None:
-        if self._pool.is_alive(name):
-            await self._pool.end(name)
-        else:
-            await self._pool.outcome(name)
 
 
 class Person:
