@@ -24,6 +24,8 @@ def label_of(field: FieldForm) -> str:
     Example:
         >>> label_of(FieldForm("turn_rad_s", ValueKind.NUMBER, "rad/s", -7.143, 7.143))
         'turn, -7.14 to 7.14 rad/s'
+        >>> label_of(FieldForm("for_s", ValueKind.NUMBER, "s", least=0.0))
+        'for, at least 0 s'
         >>> label_of(FieldForm("on", ValueKind.FLAG)), label_of(FieldForm("gait", ValueKind.TEXT, choices=["trot"]))
         ('on, yes or no', 'gait: trot')
     """
@@ -34,6 +36,9 @@ def label_of(field: FieldForm) -> str:
         return f"{words}: {', '.join(field.choices)}"
     if has_range(field):
         return f"{words}, {field.least:.3g} to {field.most:.3g}{unit}"
+    if field.least > -UNLIMITED or field.most < UNLIMITED:
+        limit = f"at least {field.least:.3g}" if field.least > -UNLIMITED else f"at most {field.most:.3g}"
+        return f"{words}, {limit}{unit}"
     return f"{words},{unit}" if unit else words
 
 
@@ -44,7 +49,7 @@ def has_range(field: FieldForm) -> bool:
 
 
 def default_text(field: FieldForm) -> str:
-    """Return the text of a field that nobody has changed; empty if it needs a value."""
+    """Return the text that a field has at first; empty if it needs a value."""
     if field.is_required:
         return ""
     if isinstance(field.default, bool):

@@ -17,6 +17,7 @@ from ui_console.model.arc_abilities import ArcAbilities, arc_abilities
 from ui_console.model.arc_kinds import NoArcKind, Sight, arc_kind
 
 if TYPE_CHECKING:
+    from ui_console.session.claim import TeleoperationParameters
     from ui_console.session.observer import AnyObserver
 
 Reply = TypeVar("Reply", bound=Message)
@@ -39,13 +40,39 @@ class KindFinder:
         self._taken = ""
         self._known: tuple[str, ArcAbilities | None] = ("", None)
         self._is_new = False
+        self._finding: asyncio.Task[None] | None = None
 
-    async def find(self, robot: str, sight: Sight) -> str:
-        """Return the kind of ARC for this robot; see ``arc_kind``.
+    @property
+    def is_finding(self) -> bool:
+        """True while a kind is sought."""
+        return self._finding is not None and not self._finding.done()
 
-        Raises:
-            NoArcKind: The mission has no kind for the robot, or a database did not answer within ``WITHIN_S``.
-        """
+    def begin(
+        self,
+        wished: TeleoperationParameters,
+        found: Callable[[TeleoperationParameters, str], None],
+        refused: Callable[[Refusal], None],
+    ) -> None:
+        """Ask for the kind of ARC for a wish, then call one of these; see ``arc_kind``."""
+
+        async def find() -> None:
+            try:
+                kind = await self._find(wished.robot, wished.sight)
+            except Refusal as refusal:
+                refused(refusal)
+                return
+            self._finding = None
+            found(wished, kind)
+
+        self._finding = self._console.start_task(find(), "kind of ARC")
+
+    def cancel(self) -> None:
+        """Seek no kind any more."""
+        if self._finding is not None:
+            self._finding.cancel()
+            self._finding = None
+
+    async def _find(self, robot: str, sight: Sight) -> str:
         try:
             types, hardware = await asyncio.gather(
                 self._ask(COMPONENT_DATABASE, ListTypes(), Types),

@@ -87,7 +87,6 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._asked_s = 0.0
         self._grants = 0
         self._finds_kind = not self.parameters.kind
-        self._finding: asyncio.Task[None] | None = None
         self._decided = asyncio.Event()
         self._controls = Controls(self)
         self._kinds = KindFinder(self, self._controls.know)
@@ -129,9 +128,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._is_asking:
             return
         if not self.parameters.kind:
-            if self._finding is None or self._finding.done():
+            if not self._kinds.is_finding:
                 self._decided.clear()
-                self._finding = self.start_task(self._find_kind_and_take(), "kind of ARC")
+                self._kinds.begin(self.parameters, self._kind_found, self._claim_refused)
             return
         wished, rested = self.parameters, self._arc
         claim = (wished.kind, wished.claim(self.address))
@@ -231,9 +230,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             wanted: False if the operator did not ask for it.
         """
         async with self._giving_back:
-            if self._finding is not None:
-                self._finding.cancel()
-                self._finding = None
+            self._kinds.cancel()
             if self._arc is not None and (self._is_asking or for_good):
                 await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
         if self._takes_next and self.is_ready:
@@ -384,14 +381,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not self._watches and state.number > 0:  # 0: it never was stopped
             self.show(events.Heard(self.clock.now_s(), state))
 
-    async def _find_kind_and_take(self) -> None:
-        wished = self.parameters
-        try:
-            kind = await self._kinds.find(wished.robot, wished.sight)
-        except Refusal as refusal:
-            self._claim_refused(refusal)
-            return
-        self._finding = None
+    def _kind_found(self, wished: TeleoperationParameters, kind: str) -> None:
         if self.parameters == wished:
             self.parameters = msgspec.structs.replace(wished, kind=kind)
             self.take()

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import pytest
 from axe import serious_findings
-from web_page import COVERED, Wheels, page_at, take, wait_stopped, wait_until
+from web_page import COVERED, Wheels, page_at, take, wait_free, wait_stopped, wait_until
 from web_stage import Stage
 
+from backbone.component.abilities import Abilities, CommandForm, FieldForm, ValueKind
+from backbone.component_database.messages import ComponentType
+from backbone.naming import Subsystem
 from resource_pool.messages import GiveCommand
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
@@ -35,6 +38,40 @@ async def test_a_lamp_is_dimmed_by_a_slider_by_hand_and_by_keyboard_and_what_was
         await wheels.assert_still("the arrows are the slider's")
         await page.keyboard.press("x")
         await wait_until(lambda: stage.robots["scout1"].is_stopped, "x stops with the focus on a slider")
+
+
+FIELDS = [
+    FieldForm("gait", ValueKind.TEXT, default="walk", choices=["walk", "trot"]),
+    FieldForm("lit", ValueKind.FLAG, default=True),
+    FieldForm("steps", ValueKind.WHOLE, least=1, most=9, is_required=True),
+    FieldForm("for_s", ValueKind.NUMBER, "s", least=0.0, default=2.5),
+    FieldForm("said", ValueKind.TEXT, default="", doc="Read aloud."),
+]
+
+
+async def test_each_kind_of_field_has_its_control_and_an_arc_without_a_body_has_no_stick(stage: Stage) -> None:
+    able = Abilities(commands=[CommandForm("show_off", FIELDS, roles=["dog"])])
+    stage.know_commands(
+        [ComponentType("capture", "x:Y", Subsystem.RESOURCE_POOL, needs={"dog": "dog"}, abilities=able)]
+    )
+    async with page_at(stage) as page:
+        await take(page)
+        await page.get_by_role("combobox", name="gait: walk, trot").select_option("trot")
+        await page.get_by_role("switch", name="lit, yes or no").click()
+        await page.get_by_role("slider", name="steps, 1 to 9").fill("4")
+        assert await page.get_by_role("spinbutton", name="for, at least 0 s").input_value() == "2.5"
+        await page.get_by_role("textbox", name="said").fill("hello")
+        await page.keyboard.press("x")
+        await wait_until(lambda: stage.robots["scout1"].is_stopped, "x is not written")
+        stage.robots["scout1"].free()
+        await wait_free(page)
+        wheels = Wheels(stage)
+        await page.get_by_role("button", name="Show off").click()
+        values = {"gait": "trot", "lit": False, "steps": 4, "for_s": 2.5, "said": "hello"}
+        await wait_until(lambda: given(stage) == [GiveCommand("show_off", values, "dog", after_stop=1)], "given")
+        await page.keyboard.press("ArrowUp")
+        assert await page.locator("#pad").get_attribute("aria-disabled") == "true"
+        await wheels.assert_still("it has no body that moves")
 
 
 async def test_commands_count_while_a_robot_is_held_and_the_speed_tells_the_robots_own(stage: Stage) -> None:

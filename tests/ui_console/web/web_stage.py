@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import struct
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -20,6 +20,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
+from backbone.component_database.messages import ComponentType
 from backbone.keys import Conversation
 from backbone.mission_log.log import AskLog, AskPeople, MissionLog, PeopleKnown
 from backbone.naming import Subsystem, address
@@ -172,10 +173,10 @@ class Stage:
             self.robots[name] = FakeRobot(bus, self.clock, name, self._stop_changed)
         self.publish_schedule(**dict.fromkeys(names, ""))
 
-    def know_commands(self) -> None:
-        """Add a component database: each robot is held with a lamp beside it."""
+    def know_commands(self, types: Sequence[ComponentType] = ()) -> None:
+        """Add a component database with these types; none: each robot is held with a lamp beside it."""
         bus = self._network.join(COMPONENT_DATABASE, self.clock)
-        serve_types(bus, lit_types("capture"))
+        serve_types(bus, types or lit_types("capture"))
         self._others.append(bus)
 
     def keep_log(self, events: Iterable[StoryEvent]) -> None:
