@@ -81,6 +81,7 @@ WRITING = (
 )
 DRIVING = (
     Place("picture alone", "action_bare", "v", close="v"),
+    Place("dialog of commands", "action_command", "o", "which command", "Escape"),
     Place("dialog of robots", "action_pick", "p Down Down", "which robot", "Escape"),
     Place("field of a reason", "action_ask_consent_because", "M", "may I have it", "Escape"),
 )
@@ -126,7 +127,7 @@ CARD = {
     "enlarge": ".enlarge",
     "lift": ".lift",
 }
-CONTROLS = ("theme", "stop-all", "pad", "stop-mine", "halt", "jump", "take", "may-i", "release", "speed", "panel")
+CONTROLS = ("theme", "stop-all", "pad", "stop-mine", "halt", "take", "may-i", "release", "speed", "panel")
 CLOSE = "document.getElementById('reading').close()"
 PAGE = (
     Place("nothing has the focus", "body"),
@@ -154,6 +155,7 @@ PAGE = (
         "(document.querySelector('#panel input') ?? document.body).focus() || document.activeElement.matches('input')",
         "document.activeElement.blur(); document.getElementById('tab-alarms').click()",
     ),
+    Place("command's button", "#commands", "document.querySelector('#commands button')?.focus()"),
     Place("alarm's buttons", "#alarm-bar", "document.querySelector('#alarm-bar button')?.focus()"),
 )
 

@@ -30,7 +30,7 @@ from backbone.placer.messages import (
 )
 from backbone.wire import Envelope, Message
 from resource_pool.arc_request import ROBOT
-from resource_pool.commands import Command, Drive, Halt, Jump
+from resource_pool.commands import Command, Drive, Halt, Jump, Move
 from resource_pool.messages import (
     Accepted,
     Applied,
@@ -38,6 +38,7 @@ from resource_pool.messages import (
     ArcState,
     AskArc,
     Frame,
+    GiveCommand,
     Noted,
     Release,
     Resumed,
@@ -65,7 +66,7 @@ class FakeArc:
         self.wishes: list[Message] = []
         wish = parameters["wish"]
         self.rcs = {"scout": wish.get(ROBOT) or wish.get("scout", "scout3"), "framegrabber": "grabber1"}
-        bus.serve(self.address, ArcQuestion | Drive | Halt | Jump | Stop, self._answer)
+        bus.serve(self.address, ArcQuestion | Move | Drive | Halt | Jump | Stop, self._answer)
         bus.declare_alive(self.address)
 
     @property
@@ -116,13 +117,13 @@ class FakeArc:
                 owner = self.parameters["owner"]
                 robot = self.rcs["scout"]
                 return ArcState(self.name, "fake", owner, self.rcs, self.granted, epochs, "slice", "other", -1.0, robot)
-            case Command() as command:
+            case Command() | GiveCommand() as command:
                 return self._command(command)
             case wish:
                 self.wishes.append(wish)
                 return Accepted()
 
-    def _command(self, command: Command) -> Applied:
+    def _command(self, command: Command | GiveCommand) -> Applied:
         if not self.granted:
             raise SwappedOut(f"{self.name} holds nothing", reason="slice", by="other", expected_start_s=-1.0)
         if self.refusal is not None:
@@ -130,10 +131,15 @@ class FakeArc:
         if not isinstance(command, Halt):
             self.require(command)
         self.commands.append((self.clock.now_s(), self.epoch, command))
-        values = (
-            {"left_rad_s": command.left_rad_s, "right_rad_s": command.right_rad_s} if isinstance(command, Drive) else {}
-        )
-        return Applied(self.rcs["scout"], self.epoch, self.clock.now_s(), command.word(), values)
+        word, values = command.word if isinstance(command, GiveCommand) else command.word(), {}
+        match command:
+            case Drive(left_rad_s=left, right_rad_s=right):
+                values = {"left_rad_s": left, "right_rad_s": right}
+            case Move(forward_m_s=forward, turn_rad_s=turn):
+                values = {"forward_m_s": forward, "turn_rad_s": turn}
+            case GiveCommand(values=given):
+                values = {name: float(value) for name, value in given.items() if isinstance(value, int | float)}
+        return Applied(self.rcs["scout"], self.epoch, self.clock.now_s(), word, values)
 
 
 class FakePlacer:

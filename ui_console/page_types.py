@@ -29,6 +29,7 @@ from ui_console.design.views import (
     RehearsalView,
 )
 from ui_console.model import views
+from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.timeline import TimelineView
 from ui_console.web.login import BeatRequest, Hello
 from ui_console.web.protocol import Intent
@@ -75,6 +76,7 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     welcome: Welcomed
     own: views.OwnView
+    abilities: ArcAbilities | None
     robots: list[views.RobotView]
     links: list[views.LinkView]
     alarms: list[views.AlarmView]

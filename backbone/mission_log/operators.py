@@ -22,7 +22,7 @@ class OperatorAction(StrEnum):
     RELEASE = "release"  # gave it back
     DRIVE_BEGIN = "drive_begin"  # the first command of a drive was applied
     DRIVE_END = "drive_end"  # the drive ended, or the robot was lost or given back
-    JUMP = "jump"
+    COMMAND = "command"  # gave a command that is none of driving
     STOP_ROBOT = "stop_robot"  # emergency stop
     STOP_ALL = "stop_all"
     LIFT_STOP = "lift_stop"
@@ -47,7 +47,7 @@ _SENTENCES = {
     OperatorAction.RELEASE: "was given back by {user}",
     OperatorAction.DRIVE_BEGIN: "is driven by {user}",
     OperatorAction.DRIVE_END: "is no longer driven by {user}",
-    OperatorAction.JUMP: "jumps for {user}",
+    OperatorAction.COMMAND: "{user} commands it",
     OperatorAction.STOP_ROBOT: "{user} stops it",
     OperatorAction.STOP_ALL: "{user} stops all",
     OperatorAction.LIFT_STOP: "{user} lifts its stop",

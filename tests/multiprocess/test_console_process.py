@@ -25,7 +25,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.component.launch import Launch
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem
-from resource_pool.commands import Drive, Halt
+from resource_pool.commands import Halt, Move
 
 pytestmark = pytest.mark.processes
 
@@ -41,6 +41,9 @@ class ZenohNetwork:
 
     def join(self, source: str, clock: Clock) -> Bus:
         return ZenohBus.open(MISSION, source, clock, client_config(self.endpoint))
+
+
+ATTACH = ("attach", "scout1", "--kind", "capture")  # no database is there to ask for the kind
 
 
 @asynccontextmanager
@@ -79,8 +82,7 @@ async def console(*arguments: str, stdin: int | None = asyncio.subprocess.DEVNUL
         sys.executable,
         "-m",
         "ui_console.cli",
-        "attach",
-        "scout1",
+        *ATTACH,
         *arguments,
         stdin=stdin,
         stdout=asyncio.subprocess.PIPE,
@@ -160,8 +162,7 @@ async def test_on_a_terminal_keys_drive_pictures_are_drawn_and_q_gives_the_robot
                 sys.executable,
                 "-m",
                 "ui_console.cli",
-                "attach",
-                "scout1",
+                *ATTACH,
                 stdin=theirs,
                 stdout=theirs,
                 stderr=theirs,
@@ -185,7 +186,7 @@ async def test_on_a_terminal_keys_drive_pictures_are_drawn_and_q_gives_the_robot
             assert not placer.arcs
     loop.remove_reader(ours)
     os.close(ours)
-    assert any(isinstance(command, Drive) for _at_s, _epoch, command in arc.commands)
+    assert any(isinstance(command, Move) for _at_s, _epoch, command in arc.commands)
 
 
 async def test_a_terminal_that_goes_away_ends_the_console_and_gives_the_robot_back(
@@ -199,7 +200,7 @@ async def test_a_terminal_that_goes_away_ends_the_console_and_gives_the_robot_ba
     async with placer_behind_a_hub(tmp_path, monkeypatch, beside) as placer:
         placer.on_arc = grant_at_once(placer)
         async with asyncio.timeout(WITHIN_S):
-            command = (sys.executable, "-m", "ui_console.cli", "attach", "scout1")
+            command = (sys.executable, "-m", "ui_console.cli", *ATTACH)
             process = await asyncio.create_subprocess_exec(
                 *command, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True
             )

@@ -105,7 +105,7 @@ class Program:
         with contextlib.suppress(ConnectionClosed):
             while True:
                 moment = self.view["own"]["moment"]
-                await self.say(do="drive", moment=moment, forward=0, right=1, speed_rad_s=6)
+                await self.say(do="drive", moment=moment, forward=0, right=1, speed=0.4)
                 await asyncio.sleep(0.05)
 
     async def wait(self, is_so: Callable[[], Any], what: str, within_s: float = WITHIN_S) -> None:

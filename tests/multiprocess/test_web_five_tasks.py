@@ -90,7 +90,8 @@ async def drive(one: Person, robot: str) -> None:
     one.touches += 1
     finger = Finger(one.page)
     await finger.push_right()
-    await one.page.locator("#applied", has_text="drive +1.8").wait_for(state="attached")  # a phone has no room for it
+    applied = one.page.locator("#applied", has_text="move left +2.0")
+    await applied.wait_for(state="attached")  # a phone has no room for it
     await finger.lift()
 
 

@@ -15,22 +15,21 @@ from typing import Any
 
 import pytest
 from cut_network import CutNetwork
-from pool_on_local_network import ARC_CLASSES, Pool, a_pool
+from pool_on_local_network import Pool, a_pool
+from pool_placer import PoolPlacer
 
-from backbone.addresses import PLACER
 from backbone.bus.clock import run_virtual
 from backbone.component.launch import Launch
-from backbone.creator.messages import EndedBy
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
-from backbone.naming import Subsystem, address
-from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, Started, StopComponent
-from backbone.wire import Envelope, Message
+from backbone.naming import Subsystem
+from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, watch_stops
 from scout_model.radio_link import encode_drive
+from scout_model.scout import wheels_rad_s
 from ui_console.model.consent import CONSENT_WITHIN_S
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import STICK_LASTS_S, DriveWish
+from ui_console.model.driving import STICK_LASTS_S, MoveWish
 from ui_console.session.teleoperation import Teleoperation
 
 PEOPLE = ("anna", "ben", "cleo")
@@ -41,37 +40,6 @@ STEPS = 16
 OFTEN = {"press": 8, "let go": 8, "lift": 6, "take": 3, "double press": 2, "release": 2}
 SELDOM = {"stop": 1, "double stop": 1, "cut": 1}
 DOES = [what for what, times in {**OFTEN, **SELDOM}.items() for _time in range(times)]
-
-
-class PoolPlacer:
-    """Starts and ends ARCs in the pool."""
-
-    def __init__(self, pool: Pool) -> None:
-        self._pool = pool
-        self.bus = pool.network.join(PLACER, pool.clock)
-        self.bus.serve(PLACER, PlacerQuestion, self._answer)
-        self.bus.declare_alive(PLACER)
-
-    async def _answer(self, asked: Envelope[Any]) -> Message:
-        match asked.body:
-            case Start(type=kind, name=name, parameters=parameters):
-                if name in self._pool.running:
-                    await self._end(name)
-                await self._pool.start(ARC_CLASSES[kind], name, parameters, kind=kind)
-                return Started(address(Subsystem.RESOURCE_POOL, name), "local", 1, [])
-            case StopComponent(name=name):
-                if name not in self._pool.running:
-                    raise NotPlaced(f"{name} does not run")
-                await self._end(name)
-                return Ended(name, EndedBy.ASKING)
-            case _:
-                raise NotPlaced("not here")
-
-    async def _end(self, name: str) -> None:
-        if self._pool.is_alive(name):
-            await self._pool.end(name)
-        else:
-            await self._pool.outcome(name)
 
 
 class Person:
@@ -86,7 +54,7 @@ class Person:
         self.console = Teleoperation(
             launch, bus, stage.pool.clock, show=self.model.apply, takes=False, keeps_arc=True, user=name
         )
-        self.drive: DriveWish | None = None
+        self.drive: MoveWish | None = None
 
     async def hands(self) -> None:
         """Repeat the held controls, for ever."""
@@ -119,11 +87,11 @@ class Stage:
         watch_stops(ear, lambda state: self.stops.append((pool.clock.now_s(), state)))
         ear.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
 
-    def new_press(self) -> DriveWish:
-        """Return wheel speeds that no other press has."""
+    def new_press(self) -> MoveWish:
+        """Return speeds that no other press has."""
         number = len(self.presses)
-        drive = DriveWish(1.0 + number % 100 / 20, 1.0 + number // 100 / 20)
-        self.presses[encode_drive(drive.left_rad_s, drive.right_rad_s)] = self.pool.clock.now_s()
+        drive = MoveWish(0.02 + number % 100 / 1000, number // 100 / 20)
+        self.presses[encode_drive(*wheels_rad_s(drive.forward_m_s, drive.turn_rad_s))] = self.pool.clock.now_s()
         return drive
 
     def begin(self, work: Any) -> None:

@@ -15,7 +15,7 @@ from backbone.mission_log.log import AskLog, Log
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import DriveWish
+from ui_console.model.driving import GiveWish, MoveWish
 from ui_console.model.events import ConsoleEvent
 from ui_console.terminal.verbs import Session
 
@@ -39,8 +39,8 @@ class WrittenSession(Session):
     def now_s(self) -> float:
         return 12.0
 
-    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
-        self.wanted.append(drive if lasts_s is None else (drive, lasts_s))
+    def hold(self, move: MoveWish, lasts_s: float | None = None) -> None:
+        self.wanted.append(move if lasts_s is None else (move, lasts_s))
 
     def stop(self) -> None:
         self.wanted.append("stop")
@@ -55,8 +55,8 @@ class WrittenSession(Session):
     def closed(self) -> None:
         self.is_closed = True
 
-    def jump(self) -> None:
-        self.wanted.append("jump")
+    def give(self, wish: GiveWish) -> None:
+        self.wanted.append(wish)
 
     def take(self) -> None:
         self.wanted.append("take")

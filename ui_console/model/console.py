@@ -20,6 +20,8 @@ from backbone.scheduling.views import Why
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop, Suspended
 from ui_console.model import events, views
 from ui_console.model.alarms import AlarmBook
+from ui_console.model.applied import command_line
+from ui_console.model.arc_abilities import SLOW, ArcAbilities, Reach
 from ui_console.model.consent import Settled, Sought, Topic
 from ui_console.model.lifting import question_line
 from ui_console.model.team import TeamModel
@@ -61,6 +63,8 @@ class ConsoleModel:
         self.asked: events.Asked | None = None
         self.why: Why | None = None
         self.applied: events.CommandApplied | None = None
+        self.abilities: ArcAbilities | None = None
+        """What the operator can do with the ARC that is asked for or held; None: not known."""
         self.sees = sees
         """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
         self._address = f"{Subsystem.UI_CONSOLE}/{name}"
@@ -123,6 +127,11 @@ class ConsoleModel:
         self._went = None
 
     # ------------------------------------------------------------------ views out
+    @property
+    def reach(self) -> Reach | None:
+        """Most speeds of the body of the ARC; ``SLOW`` while they are not known; None: it cannot move."""
+        return SLOW if self.abilities is None else self.abilities.reach
+
     def view(self, now_s: float) -> views.ConsoleView:
         """Return everything a screen shows."""
         self.look(now_s)
@@ -143,6 +152,7 @@ class ConsoleModel:
             components=team.components(),
             log=self.log(),
             health=team.health(now_s),
+            abilities=self.abilities,
         )
 
     def own(self, now_s: float) -> views.OwnView:
@@ -159,7 +169,7 @@ class ConsoleModel:
             epoch=max(held.epochs.values(), default=0) if held is not None else 0,
             until_s=held.until_s if held is not None else views.NONE_S,
             taken_because=self._why_lost(self.lost) if self.lost is not None else "",
-            applied=_applied_line(self.applied),
+            applied=command_line(self.applied.command, self.applied.values) if self.applied is not None else "",
             stop=self.team.robots.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
             away_since_s=self.team.alarms.away_since_s,
             consent=self.consent(now_s),
@@ -281,6 +291,8 @@ class ConsoleModel:
                 self._asked_whom = self._went = None
                 self._refused = ""
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
+            case events.AbilitiesKnown(abilities=abilities):
+                self.abilities = abilities if self.asked is not None else None
             case events.Granted(robot=robot):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
                 alarms.mended((views.AlarmKind.TAKEN, views.AlarmKind.REFUSED, views.AlarmKind.NO_ANSWER))
@@ -301,6 +313,7 @@ class ConsoleModel:
             case events.GivenBack(at_s=at_s, reason=reason, confirmed=confirmed, wanted=wanted):
                 self._went = None if wanted else views.LostView(self.robot, reason, at_s, False)
                 self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
+                self.abilities = None
                 self._pictures.clear()
                 if not confirmed:
                     line = f"{self.robot} was given back, but its ARC did not confirm it"
@@ -375,10 +388,3 @@ def _question_line(sought: Sought) -> str:
     if sought.topic is Topic.LIFT:
         return question_line(sought.user, sought.robot, sought.why)
     return f"{sought.user} asks for {sought.robot}{f': {sought.why}' if sought.why else ''}"
-
-
-def _applied_line(applied: events.CommandApplied | None) -> str:
-    if applied is None:
-        return ""
-    values = " ".join(f"{value:+.1f}" for value in applied.values.values())
-    return f"{applied.command} {values}".strip()

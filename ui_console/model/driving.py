@@ -9,9 +9,11 @@ a moment after the last press and ends by itself (dead-man).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
+from ui_console.model.arc_abilities import Reach
 from ui_console.model.grip import Grip
 
 FIRST_HOLD_S = 0.5  # chosen: bridges the pause of usual keyboards before they repeat; a press moves 0.5 s at most
@@ -22,8 +24,21 @@ REPEAT_EVERY_S = 0.1  # chosen: 10 Hz; commands end by themselves after 0.5 s at
 
 
 @dataclass(frozen=True, slots=True)
+class MoveWish:
+    """Move at these speeds: what stick, pad, keys and page wish of any body.
+
+    Attributes:
+        forward_m_s: Backward is negative.
+        turn_rad_s: To the left; to the right is negative.
+    """
+
+    forward_m_s: float
+    turn_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class DriveWish:
-    """Turn the wheels at these speeds, rad/s, forward is positive."""
+    """Turn the two wheels at these speeds, rad/s, forward is positive; for scripts."""
 
     left_rad_s: float
     right_rad_s: float
@@ -31,12 +46,22 @@ class DriveWish:
 
 @dataclass(frozen=True, slots=True)
 class HaltWish:
-    """Stop the wheels."""
+    """Stop all motion."""
 
 
 @dataclass(frozen=True, slots=True)
-class JumpWish:
-    """Jump once."""
+class GiveWish:
+    """Give one command by its word.
+
+    Attributes:
+        word: As the ARC declares it.
+        values: Field → value; fields left out have their defaults.
+        role: Role of the RC that obeys it; empty: the only one.
+    """
+
+    word: str
+    values: Mapping[str, object] = field(default_factory=dict)
+    role: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,58 +84,79 @@ class StopAll:
     reason: str = ""
 
 
-Command = DriveWish | HaltWish | JumpWish
-COMMAND_WORDS: dict[type[Command], str] = {DriveWish: "drive", HaltWish: "halt", JumpWish: "jump"}
+Motion = MoveWish | DriveWish
+Command = Motion | HaltWish | GiveWish
 Wish = Command | GiveBack | StopRobot | StopAll
 
 Direction = Literal["forward", "backward", "left", "right"]
+DIRECTIONS: dict[Direction, tuple[float, float]] = {
+    "forward": (1.0, 0.0),
+    "backward": (-1.0, 0.0),
+    "left": (0.0, -1.0),
+    "right": (0.0, 1.0),
+}
+"""Direction of a key → forward and right, as of a stick."""
 
 STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages send their wish
+SPEED, SPEED_LEAST, SPEED_MOST = 0.25, 0.05, 1.0  # chosen: shares of a robot's reach; a quarter of most is a walk
+SPEED_STEP = 0.05  # chosen: 19 key presses from the slowest to the fastest
 
 
-def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> DriveWish:
-    """Return the wheel speeds for a stick or a drag pad.
+def word_of(command: Command) -> str:
+    """Return the word of a command.
+
+    Example:
+        >>> word_of(HaltWish()), word_of(GiveWish("jump"))
+        ('halt', 'jump')
+    """
+    match command:
+        case MoveWish():
+            return "move"
+        case DriveWish():
+            return "drive"
+        case HaltWish():
+            return "halt"
+        case GiveWish(word=word):
+            return word
+
+
+def faster(speed: float, steps: int) -> float:
+    """Return another speed, within its bounds.
+
+    Example:
+        >>> faster(0.25, 1), faster(0.25, -9)
+        (0.3, 0.05)
+    """
+    return min(max(round(speed + steps * SPEED_STEP, 2), SPEED_LEAST), SPEED_MOST)
+
+
+def move_by_stick(forward: float, right: float, speed: float, reach: Reach) -> MoveWish:
+    """Return the motion for a stick, a drag pad or a direction key.
+
+    Law: the shares of forward speed and of turn rate together are at most the speed, so neither wheel of a robot with
+    two wheels turns faster than this share of its most. A turn on the spot has half of it.
 
     Args:
         forward: −1 (full backward) to 1 (full forward); beyond is clipped.
         right: −1 (full left) to 1 (full right).
-        speed_rad_s: Of the wheels at full forward.
+        speed: Share of the reach at full stick.
+        reach: Of the body.
 
     Example:
-        >>> drive_by_stick(1.0, 0.0, 4.0)
-        DriveWish(left_rad_s=4.0, right_rad_s=4.0)
-        >>> drive_by_stick(0.0, 1.0, 4.0)
-        DriveWish(left_rad_s=2.0, right_rad_s=-2.0)
+        >>> move_by_stick(1.0, 0.0, 0.25, Reach(0.4, 6.0))
+        MoveWish(forward_m_s=0.1, turn_rad_s=0.0)
+        >>> move_by_stick(0.0, -1.0, 0.25, Reach(0.4, 6.0))
+        MoveWish(forward_m_s=0.0, turn_rad_s=0.75)
     """
-    forward, right = min(max(forward, -1.0), 1.0), min(max(right, -1.0), 1.0)
-    left_share, right_share = forward + right / 2, forward - right / 2
-    most = max(1.0, abs(left_share), abs(right_share))
-    return DriveWish(speed_rad_s * left_share / most, speed_rad_s * right_share / most)
-
-
-def drive_towards(direction: Direction, speed_rad_s: float) -> DriveWish:
-    """Return the wheel speeds for a direction key; turns are on the spot, at half the speed.
-
-    Example:
-        >>> drive_towards("left", 4.0)
-        DriveWish(left_rad_s=-2.0, right_rad_s=2.0)
-    """
-    turn = speed_rad_s / 2
-    match direction:
-        case "forward":
-            return DriveWish(speed_rad_s, speed_rad_s)
-        case "backward":
-            return DriveWish(-speed_rad_s, -speed_rad_s)
-        case "left":
-            return DriveWish(-turn, turn)
-        case "right":
-            return DriveWish(turn, -turn)
+    forward, left = min(max(forward, -1.0), 1.0), min(max(-right, -1.0), 1.0) / 2
+    share = speed / max(1.0, abs(forward) + abs(left))
+    return MoveWish(share * reach.forward_m_s * forward, share * reach.turn_rad_s * left + 0.0)  # no negative zero
 
 
 class DriveSpan:
     """Finds where one drive of an operator begins and ends among the commands that were applied.
 
-    Laws: begin and end take turns, a begin first; only a drive begins one.
+    Laws: begin and end take turns, a begin first; only a motion begins one.
     """
 
     def __init__(self) -> None:
@@ -118,7 +164,7 @@ class DriveSpan:
 
     def begins(self, command: Command, at_s: float) -> bool:
         """Take in an applied command; return True if a drive begins with it."""
-        if self._began_s is not None or not isinstance(command, DriveWish):
+        if self._began_s is not None or not isinstance(command, Motion):
             return False
         self._began_s = at_s
         return True
@@ -137,14 +183,14 @@ class DeadMan:
     """
 
     def __init__(self) -> None:
-        self._held: DriveWish | None = None
+        self._held: Motion | None = None
         self._pressed_s = self._until_s = self._next_s = 0.0
         self._repeats = 0
         self._must_halt = False
-        self._keys, self._stick, self._jump = Grip(), Grip(), Grip()
+        self._keys, self._stick, self._once = Grip(), Grip(), Grip()
 
     # ------------------------------------------------------------------ controls
-    def press(self, drive: DriveWish, now_s: float, lasts_s: float | None = None) -> bool:
+    def press(self, drive: Motion, now_s: float, lasts_s: float | None = None) -> bool:
         """Take in that a key is down, for the first time or again; return whether that counts.
 
         Args:
@@ -171,9 +217,9 @@ class DeadMan:
         self._must_halt = False  # the new press replaces the halt, and ends with one
         return True
 
-    def press_jump(self, now_s: float) -> bool:
-        """Take in that the key for one jump is down, for the first time or again; return whether that counts."""
-        return self._jump.press(now_s, KEYS_LET_GO_S)
+    def press_once(self, now_s: float) -> bool:
+        """Take in that a control for one command that moves the robot is pressed; return whether that counts."""
+        return self._once.press(now_s, KEYS_LET_GO_S)
 
     def stop(self) -> None:
         """Take in that all controls are released: a halt is due at once, also if none was held.
@@ -195,7 +241,7 @@ class DeadMan:
         return any(grip.is_held_back(now_s) for grip in self._grips)
 
     # ------------------------------------------------------------------ commands to send
-    def due(self, now_s: float) -> DriveWish | HaltWish | None:
+    def due(self, now_s: float) -> Motion | HaltWish | None:
         """Return the command to send now, if one is due; asking counts as sending."""
         if self._held is not None and now_s >= self._until_s:
             self._held, self._must_halt = None, True
@@ -221,4 +267,4 @@ class DeadMan:
 
     @property
     def _grips(self) -> tuple[Grip, Grip, Grip]:
-        return self._keys, self._stick, self._jump
+        return self._keys, self._stick, self._once

@@ -23,6 +23,7 @@ from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
 from resource_pool.arc_client import StopState, Suspended
+from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import Settled, Sought, Topic
 
 
@@ -41,6 +42,17 @@ class Asked(Event):
     robot: str
     kind: str
     priority: int
+
+
+@dataclass(frozen=True, slots=True)
+class AbilitiesKnown(Event):
+    """What the operator can do with the ARC that was asked for is known, or has to be asked for.
+
+    Attributes:
+        abilities: None: not known.
+    """
+
+    abilities: ArcAbilities | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +88,7 @@ class CommandApplied(Event):
     Attributes:
         rc: The robot.
         epoch: Of the grant.
-        command: ``drive``, ``halt`` or ``jump``.
+        command: Its word.
         values: After clipping.
         took_s: From the wish to the answer, seconds of the machine; negative: not measured.
     """
@@ -259,6 +271,7 @@ class LinkHeard(Event):
 
 OwnEvent = (
     Asked
+    | AbilitiesKnown
     | Granted
     | CommandApplied
     | CommandRefused
@@ -277,6 +290,7 @@ TeamEvent = Heard | LinkHeard
 ConsoleEvent = OwnEvent | TeamEvent
 
 _WORDS: dict[type[object], str] = {
+    AbilitiesKnown: "abilities",
     Suspended: "suspended",
     CommandApplied: "applied",
     CommandRefused: "refused",

@@ -1,9 +1,11 @@
 """Driving by a script: one JSON object a line, each with the time since the grant from which it applies.
 
-``{"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}`` drives until the next line, ``{"at_s": 1, "halt":
-true}`` stops, ``{"at_s": 2, "jump": true}`` jumps, ``{"at_s": 3, "release": true}`` gives the robot
-back. The end of the script releases too. ``{"stop_robot": "scout2", "reason": "a child"}`` and ``{"stop_all": true}``
-are emergency stops; without ``at_s`` they count as soon as they are read from a pipe, also before the grant.
+``{"at_s": 0.5, "forward_m_s": 0.1, "turn_rad_s": 1}`` moves until the next line, and so does ``{"at_s": 0.7,
+"left_rad_s": 4, "right_rad_s": 4}`` by two wheels. ``{"at_s": 1, "halt": true}`` stops, ``{"at_s": 2, "give": "shine",
+"values": {"brightness": 0.5}, "role": ""}`` gives any command of the ARC, ``"jump": true`` is short for one.
+``{"at_s": 3, "release": true}`` gives the robot back; the end of the script releases too. ``{"stop_robot": "scout2",
+"reason": "a child"}`` and ``{"stop_all": true}`` are emergency stops; without ``at_s`` they count as soon as they are
+read from a pipe, also before the grant.
 
 Rules of this file: no bus, no clock, no files. Times are mission seconds since the grant.
 """
@@ -12,12 +14,24 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import msgspec
 
 from backbone.errors import Refusal
-from ui_console.model.driving import REPEAT_EVERY_S, DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot, Wish
+from ui_console.model.driving import (
+    REPEAT_EVERY_S,
+    DriveWish,
+    GiveBack,
+    GiveWish,
+    HaltWish,
+    Motion,
+    MoveWish,
+    StopAll,
+    StopRobot,
+    Wish,
+)
 
 
 class WrongScript(Refusal):
@@ -25,17 +39,23 @@ class WrongScript(Refusal):
 
     code = "script.line"
     remedy = (
-        'Write one JSON object a line: {"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}, or with "halt", "jump", '
-        '"release" or "stop_all": true, or "stop_robot": NAME; at_s never decreases.'
+        'Write one JSON object a line: {"at_s": 0.5, "forward_m_s": 0.1, "turn_rad_s": 1}, or with "left_rad_s" and '
+        '"right_rad_s", or with "halt", "jump", "release" or "stop_all": true, or "give": COMMAND with its "values" '
+        'and "role", or "stop_robot": NAME; at_s never decreases.'
     )
 
 
 class _Line(msgspec.Struct, forbid_unknown_fields=True):
     at_s: float | None = None
+    forward_m_s: float | None = None
+    turn_rad_s: float | None = None
     left_rad_s: float | None = None
     right_rad_s: float | None = None
     halt: bool = False
     jump: bool = False
+    give: str = ""
+    values: dict[str, int | float | bool | str] = {}
+    role: str = ""
     release: bool = False
     stop_robot: str = ""
     stop_all: bool = False
@@ -87,25 +107,39 @@ class ScriptReader:
         return Step(at_s, wish, line.at_s is None)
 
     def _wish(self, line: _Line) -> Wish:
+        moves = (line.forward_m_s, line.turn_rad_s) != (None, None)
         drives = (line.left_rad_s, line.right_rad_s) != (None, None)
-        wished = [drives, line.halt, line.jump, line.release, bool(line.stop_robot), line.stop_all]
-        if wished.count(True) != 1:
-            raise self._wrong("exactly one of: both wheel speeds, halt, jump, release, stop_robot, stop_all")
+        wished = [moves, drives, line.halt, line.jump, bool(line.give), line.release, bool(line.stop_robot)]
+        if [*wished, line.stop_all].count(True) != 1:
+            can = "forward_m_s and turn_rad_s, both wheel speeds, halt, jump, give, release, stop_robot, stop_all"
+            raise self._wrong(f"exactly one of: {can}")
+        if (line.values or line.role) and not line.give:
+            raise self._wrong("values and role belong to a command by give")
         if line.stop_robot:
             return StopRobot(line.stop_robot, line.reason)
         if line.stop_all:
             return StopAll(line.reason)
         if line.halt:
             return HaltWish()
-        if line.jump:
-            return JumpWish()
+        if line.jump or line.give:
+            return GiveWish(line.give or "jump", line.values, line.role)
         if line.release:
             return GiveBack()
+        return self._motion(line)
+
+    def _motion(self, line: _Line) -> Motion:
+        if (line.forward_m_s, line.turn_rad_s) != (None, None):
+            move = MoveWish(line.forward_m_s or 0.0, line.turn_rad_s or 0.0)
+            self._require_finite(move.forward_m_s, move.turn_rad_s, "speed")
+            return move
         if line.left_rad_s is None or line.right_rad_s is None:
             raise self._wrong("left_rad_s and right_rad_s belong together")
-        if not (math.isfinite(line.left_rad_s) and math.isfinite(line.right_rad_s)):
-            raise self._wrong("a wheel speed is not finite")
+        self._require_finite(line.left_rad_s, line.right_rad_s, "wheel speed")
         return DriveWish(line.left_rad_s, line.right_rad_s)
+
+    def _require_finite(self, one: float, other: float, what: str) -> None:
+        if not (math.isfinite(one) and math.isfinite(other)):
+            raise self._wrong(f"a {what} is not finite")
 
     def _wrong(self, what: str) -> WrongScript:
         return WrongScript(f"script line {self._number}: {what}", line=self._number)
@@ -128,22 +162,27 @@ def read_script(text: str) -> list[Step]:
 class ScriptPlayer:
     """Turns steps and time into commands.
 
-    Laws: no command before its time; a drive is repeated until the next line, as commands end by
-    themselves at the robot; nothing after ``GiveBack``, which comes exactly once; after ``require_let_go`` no drive and
-    no jump before a halt: in a script this line stands for letting go of a control.
+    Laws: no command before its time; a motion is repeated until the next line, as commands end by
+    themselves at the robot; nothing after ``GiveBack``, which comes exactly once; after ``require_let_go`` no command
+    that moves the robot before a halt: in a script this line stands for letting go of a control.
+
+    Args:
+        steps: The whole script; None: they are added.
+        moves: Returns whether a command by its word moves the robot; None: each does.
     """
 
-    def __init__(self, steps: list[Step] | None = None) -> None:
+    def __init__(self, steps: list[Step] | None = None, moves: Callable[[str], bool] | None = None) -> None:
+        self._moves = moves or (lambda _word: True)
         self._steps = deque(steps or [])
         self._ended = steps is not None
-        self._drive: DriveWish | None = None
+        self._drive: Motion | None = None
         self._next_s = 0.0
         self._over = self.must_let_go = False
         self.held_back = 0
         """How many lines were left out because no halt came before them."""
 
     def require_let_go(self) -> None:
-        """Ignore drives and jumps until a line halts."""
+        """Ignore commands that move the robot until a line halts."""
         self._drive, self.must_let_go = None, True
 
     @property
@@ -169,12 +208,12 @@ class ScriptPlayer:
         while self._steps and self._steps[0].at_s <= since_grant_s and not self._over:
             wish = self._steps.popleft().wish
             self.must_let_go = self.must_let_go and not isinstance(wish, HaltWish)
-            if self.must_let_go and isinstance(wish, DriveWish | JumpWish):
+            if self.must_let_go and self._is_motion(wish):
                 self.held_back += 1
                 continue
             self._over = isinstance(wish, GiveBack)
-            if isinstance(wish, DriveWish | HaltWish | GiveBack):
-                self._drive = wish if isinstance(wish, DriveWish) else None
+            if isinstance(wish, Motion | HaltWish | GiveBack):
+                self._drive = wish if isinstance(wish, Motion) else None
             self._next_s = since_grant_s + REPEAT_EVERY_S
             wishes.append(wish)
         if self._ended and not self._steps and not self._over:
@@ -184,6 +223,9 @@ class ScriptPlayer:
             self._next_s = since_grant_s + REPEAT_EVERY_S
             wishes.append(self._drive)
         return wishes
+
+    def _is_motion(self, wish: Wish) -> bool:
+        return isinstance(wish, Motion) or (isinstance(wish, GiveWish) and self._moves(wish.word))
 
     @property
     def next_s(self) -> float | None:

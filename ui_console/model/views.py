@@ -14,6 +14,7 @@ from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.creator.messages import HostLoad
 from backbone.scheduling.views import RequestView
 from backbone.wire import plain
+from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.timeline import TimelineView
 
 NONE_S = -1.0
@@ -376,6 +377,7 @@ class ConsoleView(msgspec.Struct, frozen=True):
     components: list[ComponentState]
     log: list[StoryEvent]
     health: HealthView | None = None
+    abilities: ArcAbilities | None = None
 
 
 def view_json(view: object) -> bytes:

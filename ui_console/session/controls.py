@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Awaitable
 from typing import TYPE_CHECKING
 
 from backbone.errors import LinkError, Refusal
 from backbone.mission_log.operators import OperatorAction
 from resource_pool.arc_client import EmergencyStopped
-from ui_console.model.driving import COMMAND_WORDS, Command, DeadMan, DriveSpan, DriveWish, HaltWish, JumpWish
-from ui_console.model.events import CommandApplied, LetGoNeeded, LinkTrouble, MomentBegan, failed
+from ui_console.model.applied import command_line, values_line
+from ui_console.model.driving import (
+    Command,
+    DeadMan,
+    DriveSpan,
+    DriveWish,
+    GiveWish,
+    HaltWish,
+    Motion,
+    MoveWish,
+    word_of,
+)
+from ui_console.model.events import AbilitiesKnown, CommandApplied, LetGoNeeded, LinkTrouble, MomentBegan, failed
 
 if TYPE_CHECKING:
     from resource_pool.arc_client import Applied, ArcClient
+    from ui_console.model.arc_abilities import ArcAbilities
     from ui_console.session.observer import AnyObserver
 
 
@@ -31,11 +44,18 @@ class Controls:
         self._is_held_back = False
         self._arc: ArcClient | None = None
         self._is_on = False
+        self.abilities: ArcAbilities | None = None
+        """What the operator can do with the ARC; None: not known."""
 
     # ------------------------------------------------------------------ the robot
     def connect(self, arc: ArcClient) -> None:
         """Send commands to this ARC from now on, as long as it is granted."""
         self._arc, self._is_on = arc, True
+
+    def know(self, abilities: ArcAbilities | None) -> None:
+        """Show what the operator can do with the ARC; None: not known."""
+        self.abilities = abilities
+        self._console.show(AbilitiesKnown(self._console.clock.now_s(), abilities))
 
     def switch_off(self) -> None:
         """Ignore keys until ``connect``, also keys held down; single commands still go."""
@@ -54,7 +74,7 @@ class Controls:
         self._console.show(MomentBegan(self._console.clock.now_s()))
 
     # ------------------------------------------------------------------ the operator's controls
-    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
+    def hold(self, drive: Motion, lasts_s: float | None = None) -> None:
         """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
         Args:
@@ -64,9 +84,11 @@ class Controls:
         self._dead_man.press(drive, asyncio.get_running_loop().time(), lasts_s)
         self._pressed.set()
 
-    def press_jump(self) -> bool:
-        """Take in that the key for one jump is down; return whether that counts."""
-        counts = self._dead_man.press_jump(asyncio.get_running_loop().time())
+    def press_once(self, word: str) -> bool:
+        """Take in that the control for one command is pressed; return whether that counts, see ``DeadMan``."""
+        if self.abilities is not None and not self.abilities.moves(word):
+            return True
+        counts = self._dead_man.press_once(asyncio.get_running_loop().time())
         self._pressed.set()
         return counts
 
@@ -106,16 +128,13 @@ class Controls:
         """Send one command and show its outcome; return True if it was applied."""
         if self._arc is None:
             return False
+        sending = self._sending(self._arc, command)
+        if sending is None:
+            return True
         show, now_s = self._console.show, self._console.clock.now_s
         wanted_s = time.perf_counter()
         try:
-            match command:
-                case DriveWish(left_rad_s, right_rad_s):
-                    applied = await self._arc.drive(left_rad_s, right_rad_s)
-                case HaltWish():
-                    applied = await self._arc.halt()
-                case JumpWish():
-                    applied = await self._arc.jump()
+            applied = await sending
         except Refusal as refusal:
             if isinstance(refusal, EmergencyStopped):
                 self.require_let_go()
@@ -123,12 +142,26 @@ class Controls:
             return False
         except LinkError as error:
             self.require_let_go()  # an operator who is cut off for a moment does not see the robot's next moves
-            show(LinkTrouble(now_s(), str(error), COMMAND_WORDS[type(command)]))
+            show(LinkTrouble(now_s(), str(error), word_of(command)))
             return False
         took_s = time.perf_counter() - wanted_s
         self._record_applied(command, applied)
         show(CommandApplied(applied.at_s, applied.rc, applied.epoch, applied.command, applied.values, took_s))
         return True
+
+    def _sending(self, arc: ArcClient, command: Command) -> Awaitable[Applied] | None:
+        """Return the sending of a command; None: the ARC has nothing to halt."""
+        match command:
+            case MoveWish(forward_m_s, turn_rad_s):
+                return arc.move(forward_m_s, turn_rad_s)
+            case DriveWish(left_rad_s, right_rad_s):
+                return arc.drive(left_rad_s, right_rad_s)
+            case GiveWish(word, values, role):
+                return arc.give(word, values, role)
+            case HaltWish() if self.abilities is None or self.abilities.can_halt:
+                return arc.halt()
+            case HaltWish():
+                return None if self.abilities.reach is None else arc.move(0.0)
 
     # ------------------------------------------------------------------ the record
     def record_drive_end(self, robot: str, why: str = "") -> None:
@@ -140,9 +173,8 @@ class Controls:
 
     def _record_applied(self, command: Command, applied: Applied) -> None:
         if self._span.begins(command, applied.at_s):
-            speeds = ", ".join(f"{name.partition('_')[0]} {value:+.1f}" for name, value in applied.values.items())
-            self._console.acted(OperatorAction.DRIVE_BEGIN, applied.rc, f"{speeds} rad/s")
-        elif isinstance(command, JumpWish):
-            self._console.acted(OperatorAction.JUMP, applied.rc)
+            self._console.acted(OperatorAction.DRIVE_BEGIN, applied.rc, values_line(applied.values))
+        elif isinstance(command, GiveWish):
+            self._console.acted(OperatorAction.COMMAND, applied.rc, command_line(command.word, applied.values))
         elif isinstance(command, HaltWish):
             self.record_drive_end(applied.rc)

@@ -1,7 +1,7 @@
 """Driving by a gamepad: a stick that counts only while the dead-man button is held.
 
-``Stick`` is pure: events of the device go in, drive commands come out. ``play_gamepad`` is the loop around it. The
-device is read through evdev, which is an extra (``pip install 'scout-backbone[gamepad]'``, Linux only).
+``Stick`` is pure: events of the device go in, positions of the stick come out. ``play_gamepad`` is the loop around it.
+The device is read through evdev, which is an extra (``pip install 'scout-backbone[gamepad]'``, Linux only).
 
 A gamepad reports when a button is let go; a gamepad that is unplugged or out of range reports nothing, so the drive
 command is repeated every ``SAY_EVERY_S`` and ends by itself.
@@ -17,7 +17,7 @@ from typing import Protocol
 
 from backbone.errors import Refusal
 from backbone.waiting import end_tasks, set_within
-from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S
 
 try:
     import evdev
@@ -76,7 +76,7 @@ class Gamepad(Protocol):
 
 
 class Stick:
-    """Turns events of the device into drive commands.
+    """Turns events of the device into positions of the stick.
 
     Law: without the dead-man button the robot does not drive, in any position of the stick.
 
@@ -104,11 +104,9 @@ class Stick:
             return BUTTONS.get(event.code)
         return None
 
-    def wanted(self, speed_rad_s: float) -> DriveWish | None:
-        """Return the drive command now; None: the dead-man button is not held."""
-        if not self._held:
-            return None
-        return drive_by_stick(-self._at[ABS_Y], self._at[ABS_X], speed_rad_s)
+    def wanted(self) -> tuple[float, float] | None:
+        """Return forward and right now, each −1 to 1; None: the dead-man button is not held."""
+        return (-self._at[ABS_Y], self._at[ABS_X]) if self._held else None
 
 
 def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
@@ -133,20 +131,18 @@ async def play_gamepad(
     device: Gamepad,
     stick: Stick,
     *,
-    hold: Callable[[DriveWish, float], None],
+    hold: Callable[[float, float, float], None],
     stop: Callable[[], None],
     wish: Callable[[PadWish], None],
-    speed_rad_s: Callable[[], float],
 ) -> None:
     """Drive by the device until it is gone or this is cancelled; the wheels stop then.
 
     Args:
         device: Already open.
         stick: Fresh.
-        hold: Called repeatedly while the dead-man button is held, with the time a call counts.
+        hold: Called repeatedly while the dead-man button is held: forward, right, and the time a call counts.
         stop: Called when the button is let go.
         wish: Called for each button pressed.
-        speed_rad_s: Returns the speed of the wheels at full forward.
     """
     changed = asyncio.Event()
 
@@ -162,9 +158,9 @@ async def play_gamepad(
     was_held = False
     try:
         while not feeling.done():
-            drive = stick.wanted(speed_rad_s())
+            drive = stick.wanted()
             if drive is not None:
-                hold(drive, STICK_LASTS_S)
+                hold(*drive, STICK_LASTS_S)
             elif was_held:
                 stop()
             was_held = drive is not None

@@ -1,38 +1,108 @@
-"""Kind finder: asks the mission for its kinds of ARC, when an operator claims a robot without naming a kind."""
+"""Kind finder: asks the mission for its kinds of ARC, and what an operator can do with one of them."""
 
 from __future__ import annotations
 
 import asyncio
-from typing import TypeVar
+import logging
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
 
 from backbone.addresses import COMPONENT_DATABASE, DEPENDENCY_DATABASE
-from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component_database.messages import ListTypes, Types
 from backbone.dependency_database.messages import AskResources, Resources
-from backbone.errors import LinkError
+from backbone.errors import LinkError, Refusal
 from backbone.wire import Message
+from ui_console.model.arc_abilities import ArcAbilities, arc_abilities
 from ui_console.model.arc_kinds import NoArcKind, Sight, arc_kind
+
+if TYPE_CHECKING:
+    from ui_console.session.claim import TeleoperationParameters
+    from ui_console.session.observer import AnyObserver
 
 Reply = TypeVar("Reply", bound=Message)
 ASK_AGAIN = "Take the robot again in a moment; 'scout-backbone status' names what is absent."
 EACH_S, WITHIN_S = 1.0, 5.0  # chosen: a restarted core service is back within a second or two; mission seconds
 
+log = logging.getLogger(__name__)
 
-async def find_arc_kind(bus: Bus, clock: Clock, robot: str, sight: Sight) -> str:
-    """Return the kind of ARC for this robot; see ``arc_kind``.
 
-    Raises:
-        NoArcKind: The mission has no kind for the robot, or a database did not answer within ``WITHIN_S``.
+class KindFinder:
+    """Asks once for each take, and keeps the newest answer for a take of the same kind.
+
+    Args:
+        console: The console.
+        know: Called with what an operator can do with the kind that is taken; None: not known yet.
     """
 
-    async def ask(of: str, question: Message, reply: type[Reply]) -> Reply:
-        return await ask_until_answered(bus, clock, of, question, reply, each_s=EACH_S, within_s=WITHIN_S)
+    def __init__(self, console: AnyObserver, know: Callable[[ArcAbilities | None], None]) -> None:
+        self._console, self._know = console, know
+        self._taken = ""
+        self._known: tuple[str, ArcAbilities | None] = ("", None)
+        self._is_new = False
+        self._finding: asyncio.Task[None] | None = None
 
-    try:
-        types, hardware = await asyncio.gather(
-            ask(COMPONENT_DATABASE, ListTypes(), Types), ask(DEPENDENCY_DATABASE, AskResources(), Resources)
-        )
-    except LinkError as error:
-        raise NoArcKind(f"the kinds of ARC are not known: {error}", remedy=ASK_AGAIN) from error
-    return arc_kind(robot, sight, [one.component_type for one in types.types], hardware.resources)
+    @property
+    def is_finding(self) -> bool:
+        """True while a kind is sought."""
+        return self._finding is not None and not self._finding.done()
+
+    def begin(
+        self,
+        wished: TeleoperationParameters,
+        found: Callable[[TeleoperationParameters, str], None],
+        refused: Callable[[Refusal], None],
+    ) -> None:
+        """Ask for the kind of ARC for a wish, then call one of these; see ``arc_kind``."""
+
+        async def find() -> None:
+            try:
+                kind = await self._find(wished.robot, wished.sight)
+            except Refusal as refusal:
+                refused(refusal)
+                return
+            self._finding = None
+            found(wished, kind)
+
+        self._finding = self._console.start_task(find(), "kind of ARC")
+
+    def cancel(self) -> None:
+        """Seek no kind any more."""
+        if self._finding is not None:
+            self._finding.cancel()
+            self._finding = None
+
+    async def _find(self, robot: str, sight: Sight) -> str:
+        try:
+            types, hardware = await asyncio.gather(
+                self._ask(COMPONENT_DATABASE, ListTypes(), Types),
+                self._ask(DEPENDENCY_DATABASE, AskResources(), Resources),
+            )
+        except LinkError as error:
+            raise NoArcKind(f"the kinds of ARC are not known: {error}", remedy=ASK_AGAIN) from error
+        known = [one.component_type for one in types.types]
+        kind = arc_kind(robot, sight, known, hardware.resources)
+        self._known, self._is_new = (kind, arc_abilities(kind, known)), True
+        return kind
+
+    def take(self, kind: str) -> None:
+        """Show what an operator can do with this kind, and ask anew unless it was just found; wait for nothing."""
+        before, abilities = self._known
+        is_new, self._is_new, self._taken = self._is_new and before == kind, False, kind
+        self._know(abilities if before == kind else None)
+        if not is_new:
+            self._console.start_task(self._ask_again(kind), "abilities")
+
+    async def _ask_again(self, kind: str) -> None:
+        try:
+            types = await self._ask(COMPONENT_DATABASE, ListTypes(), Types)
+        except (LinkError, Refusal) as error:
+            log.info("the commands of %s are not known: %s", kind, error)
+            return
+        if kind == self._taken:
+            self._known = (kind, arc_abilities(kind, [one.component_type for one in types.types]))
+            self._know(self._known[1])
+
+    async def _ask(self, of: str, question: Message, reply: type[Reply]) -> Reply:
+        bus, clock = self._console.bus, self._console.clock
+        return await ask_until_answered(bus, clock, of, question, reply, each_s=EACH_S, within_s=WITHIN_S)

@@ -14,13 +14,13 @@ from backbone.rc_manager.messages import StaleEpoch
 from backbone.waiting import set_within
 from resource_pool.arc_client import StopState, Suspended, SwappedOut
 from ui_console.model import events
-from ui_console.model.driving import DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot
+from ui_console.model.driving import GiveBack, GiveWish, HaltWish, Motion, StopAll, StopRobot
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.session.teleoperation import Teleoperation
 
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
-_FOR_SCREENS_ONLY = (events.Asked, events.MomentBegan, events.PictureSeen)
+_FOR_SCREENS_ONLY = (events.Asked, events.AbilitiesKnown, events.MomentBegan, events.PictureSeen)
 
 
 class ScriptDriver:
@@ -36,7 +36,7 @@ class ScriptDriver:
         self, write: Callable[[bytes], None], steps: list[Step] | None = None, *, within_s: float = 0.0
     ) -> None:
         self._write, self._within_s = write, within_s
-        self._player = ScriptPlayer(steps)
+        self._player = ScriptPlayer(steps, self._moves)
         self._reader = ScriptReader()
         self._news = asyncio.Event()
         self._granted = self._failed = False
@@ -61,8 +61,13 @@ class ScriptDriver:
 
     @property
     def must_halt(self) -> bool:
-        """Whether drives and jumps are ignored until a line halts."""
+        """Whether commands that move the robot are ignored until a line halts."""
         return self._player.must_let_go
+
+    def _moves(self, word: str) -> bool:
+        """Return whether a command moves the robot; True as long as that is not known."""
+        abilities = self._console.arc_abilities if self._console is not None else None
+        return abilities is None or abilities.moves(word)
 
     def _is_repeated(self, event: events.ConsoleEvent) -> bool:
         """Note a missing answer, and the next answer; return True for a missing answer after another one."""
@@ -132,9 +137,11 @@ class ScriptDriver:
                         return
                     case StopRobot() | StopAll():
                         await self._stop(console, wish)
-                    case JumpWish():
+                    case GiveWish():
                         await console.do(wish)
-                    case DriveWish() | HaltWish() if console.is_held:
+                    case HaltWish() if console.is_held:
+                        await console.do(wish)
+                    case _ if isinstance(wish, Motion) and console.is_held:
                         await console.do(wish)
             await self._wait_news(console, granted_s)
 

@@ -23,15 +23,16 @@ from backbone.mission_log.operators import OperatorAction
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events
+from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import AskConsent, Consent
-from ui_console.model.driving import Command, DriveWish, HaltWish, JumpWish
+from ui_console.model.driving import Command, GiveWish, HaltWish, Motion
 from ui_console.model.lifting import AskLift
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
 from ui_console.session.controls import Controls
 from ui_console.session.hand_over import AskHandOver, HandOver
-from ui_console.session.kind_finder import find_arc_kind
+from ui_console.session.kind_finder import KindFinder
 from ui_console.session.observer import Observer
 from ui_console.session.presence import Presence
 from ui_console.session.stop_ear import StopEar
@@ -86,9 +87,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._asked_s = 0.0
         self._grants = 0
         self._finds_kind = not self.parameters.kind
-        self._finding: asyncio.Task[None] | None = None
         self._decided = asyncio.Event()
         self._controls = Controls(self)
+        self._kinds = KindFinder(self, self._controls.know)
         self._consent = ConsentTalk(self, self.give_back)
         self._hand_over = HandOver(self, self.give_back)
         self._waiting = Waiting(self, self._hand_over, self._waits_for)
@@ -109,6 +110,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         return self._keeping is not None and self._arc is not None and self._arc.granted is not None
 
     @property
+    def arc_abilities(self) -> ArcAbilities | None:
+        """What the operator can do with the ARC; None: not known."""
+        return self._controls.abilities
+
+    @property
     def is_ready(self) -> bool:
         """True while verbs can be called."""
         return self.state is LifeState.READY
@@ -122,9 +128,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._is_asking:
             return
         if not self.parameters.kind:
-            if self._finding is None or self._finding.done():
+            if not self._kinds.is_finding:
                 self._decided.clear()
-                self._finding = self.start_task(self._find_kind_and_take(), "kind of ARC")
+                self._kinds.begin(self.parameters, self._kind_found, self._claim_refused)
             return
         wished, rested = self.parameters, self._arc
         claim = (wished.kind, wished.claim(self.address))
@@ -143,6 +149,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._decided.clear()
         self.acted(OperatorAction.TAKE, wished.robot or ANY_ROBOT, f"with priority {wished.priority}")
         self.show(events.Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
+        self._kinds.take(wished.kind)
         self._keeping = self.start_task(self._keep(arc, rested), "arc")
 
     async def switch(self, robot: str) -> None:
@@ -186,7 +193,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self.refusal is not None:
             raise self.refusal
 
-    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
+    def hold(self, drive: Motion, lasts_s: float | None = None) -> None:
         """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
         Args:
@@ -200,10 +207,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Stop the wheels now; sticks, pads and pages report their release by this call."""
         self._controls.stop()
 
-    def jump(self) -> None:
-        """Take in that the key for one jump is down: jump, unless it has to be let go first."""
-        if self._controls.press_jump() and self.is_held:
-            self.start_task(self._jump(), "jump")
+    def give(self, wish: GiveWish) -> None:
+        """Take in that the control for one command is pressed: give it, unless the control has to be let go first."""
+        self.touch()
+        if self._controls.press_once(wish.word) and self.is_held:
+            self.start_task(self._give(wish), "command")
 
     async def do(self, command: Command) -> bool:
         """Send one command and show its outcome; return True if it was applied."""
@@ -222,9 +230,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             wanted: False if the operator did not ask for it.
         """
         async with self._giving_back:
-            if self._finding is not None:
-                self._finding.cancel()
-                self._finding = None
+            self._kinds.cancel()
             if self._arc is not None and (self._is_asking or for_good):
                 await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
         if self._takes_next and self.is_ready:
@@ -375,14 +381,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not self._watches and state.number > 0:  # 0: it never was stopped
             self.show(events.Heard(self.clock.now_s(), state))
 
-    async def _find_kind_and_take(self) -> None:
-        wished = self.parameters
-        try:
-            kind = await find_arc_kind(self.bus, self.clock, wished.robot, wished.sight)
-        except Refusal as refusal:
-            self._claim_refused(refusal)
-            return
-        self._finding = None
+    def _kind_found(self, wished: TeleoperationParameters, kind: str) -> None:
         if self.parameters == wished:
             self.parameters = msgspec.structs.replace(wished, kind=kind)
             self.take()
@@ -412,14 +411,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.show(events.PictureSeen(self.clock.now_s(), frame.captured_s, frame.robot))
             self._see(frame)
 
-    # ------------------------------------------------------------------ away, and jumps
+    # ------------------------------------------------------------------ away, and single commands
     async def _go_away(self) -> None:
         """Let the robot go on with useful work while its operator is away."""
         self.leave()
         await self.give_back(f"{self.user} is away", wanted=False)
 
-    async def _jump(self) -> None:
-        await self.do(JumpWish())
+    async def _give(self, wish: GiveWish) -> None:
+        await self.do(wish)
 
     async def _work_and_end(self, work: Callable[[Teleoperation], Awaitable[None]]) -> None:
         await work(self)

@@ -13,10 +13,11 @@ from textual.widgets import Input
 
 from backbone.errors import Refusal
 from backbone.launcher.endings import ExitCode
-from ui_console.model.driving import Direction, drive_towards
+from ui_console.model.arc_abilities import ArcAbilities
+from ui_console.model.driving import DIRECTIONS, STICK_LASTS_S, Direction, faster
 from ui_console.model.views import AlarmView
 from ui_console.session.gamepad import buttons_help
-from ui_console.terminal.dialogs import Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker
+from ui_console.terminal.dialogs import CommandDialog, Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker
 from ui_console.terminal.display import ConsoleDisplay
 from ui_console.terminal.keys import keys_help, stop_meant
 from ui_console.terminal.lines import robot_rows
@@ -24,22 +25,33 @@ from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
 from ui_console.terminal.tables import FIXED, PanelName
 from ui_console.terminal.widgets import DrivePad, Panel
 
-SPEED_STEP_RAD_S, SPEED_MOST_RAD_S = 1.0, 15.0  # chosen: fine steps, a Scout's most
 A = TypeVar("A")
 
 
 class ConsoleApp(ConsoleDisplay):
     """One console's screen, and its keys."""
 
-    def _open(self, dialog: Dialog[A], answered: Callable[[A], object] | None = None) -> None:
-        """Open a dialog; a key held at its opening or closing drives no more until it was let go."""
+    def _open(self, dialog: Dialog[A], answered: Callable[[A], object] | None = None, *, stale: str = "") -> None:
+        """Open a dialog; a key held at its opening or closing drives no more until it was let go.
+
+        Args:
+            dialog: The dialog.
+            answered: Called with its answer.
+            stale: If given, shown instead of that if the robot was stopped, freed, granted or lost meanwhile.
+        """
 
         def closed(answer: A | None) -> None:
+            has_changed = self._session.model.moment != opened_at
             self._session.require_let_go()
-            if answered is not None and answer is not None:
+            if answered is None or answer is None:
+                return
+            if stale and has_changed:
+                self.notify(stale, severity="warning")
+            else:
                 answered(answer)
 
         self._session.require_let_go()
+        opened_at = self._session.model.moment
         self.push_screen(dialog, closed)
 
     @work
@@ -62,11 +74,11 @@ class ConsoleApp(ConsoleDisplay):
 
     def action_drive(self, direction: Direction) -> None:
         """Drive while the key is held; the session ends it when no repeat comes."""
-        self._session.hold(drive_towards(direction, self.speed_rad_s))
+        self._session.steer(*DIRECTIONS[direction], self.speed)
 
     def on_drive_pad_dragged(self, message: DrivePad.Dragged) -> None:
         """Drive by the pad."""
-        self._session.hold(message.drive, message.lasts_s)
+        self._session.steer(message.forward, message.right, self.speed, STICK_LASTS_S)
 
     def on_drive_pad_released(self, _message: DrivePad.Released) -> None:
         """Stop the wheels now."""
@@ -77,13 +89,31 @@ class ConsoleApp(ConsoleDisplay):
         self._session.stop()
 
     def action_jump(self) -> None:
-        """Jump once."""
+        """Jump once, if the robot can."""
+        if self._abilities is not None and not self._abilities.takes("jump"):
+            self.notify("this robot cannot jump; o lists its commands", severity="warning")
+            return
         self._session.jump()
+
+    def action_command(self) -> None:
+        """Choose one of the robot's other commands, and give it."""
+        if self._session.model.held is None:
+            self.notify("you hold no robot: take one first", severity="warning")
+        elif self._abilities is None or not self._abilities.commands:
+            what = "has no other commands" if self._abilities is not None else "has not told its commands yet"
+            self.notify(f"{self._session.model.robot or 'the ARC'} {what}", severity="warning")
+        else:
+            stale = "not given: the robot was stopped, freed, granted or lost meanwhile. Press o again."
+            dialog = CommandDialog(self._session.model.robot, self._abilities.commands)
+            self._open(dialog, self._session.give, stale=stale)
+
+    @property
+    def _abilities(self) -> ArcAbilities | None:
+        return self._session.model.abilities
 
     def action_faster(self, steps: int) -> None:
         """Change the speed of the drive keys."""
-        wanted = self.speed_rad_s + steps * SPEED_STEP_RAD_S
-        self.speed_rad_s = min(max(wanted, SPEED_STEP_RAD_S), SPEED_MOST_RAD_S)
+        self.speed = faster(self.speed, steps)
         self.redraw()
 
     def action_release(self) -> None:

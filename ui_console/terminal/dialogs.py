@@ -1,4 +1,4 @@
-"""Dialogs over the screen: pick a robot, read a reason, change a parameter, lift a stop.
+"""Dialogs over the screen: pick a robot, read a reason, change a parameter, give a command, lift a stop.
 
 Drive keys do nothing meanwhile, so the wheels stop by themselves. The keys of the emergency stop work here too, also
 while a line is typed.
@@ -18,6 +18,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from ui_console.model.arc_abilities import RoleCommand
+from ui_console.model.driving import GiveWish
+from ui_console.model.fields import WrongValue, default_text, read_fields
 from ui_console.model.views import StopView
 from ui_console.terminal.keys import STOP_KEYS
 from ui_console.terminal.lines import Row, lift_lines
@@ -136,6 +139,69 @@ class LineQuestion(Dialog[str]):
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Answer."""
         self.answer(event.value)
+
+
+class CommandDialog(Dialog[GiveWish]):
+    """Choose one of the robot's commands, then fill in its fields; answers with the command.
+
+    Args:
+        robot: The robot.
+        commands: To choose from.
+    """
+
+    def __init__(self, robot: str, commands: Sequence[RoleCommand]) -> None:
+        super().__init__()
+        self._robot, self._commands = robot, commands
+        self._chosen: RoleCommand | None = None
+
+    @property
+    def subject(self) -> str:
+        """The robot."""
+        return self._robot
+
+    def compose(self) -> ComposeResult:
+        """Lay out the list."""
+        with Vertical(id="command") as box:
+            box.border_title = f"which command for {self._robot}? (enter chooses it)"
+            yield OptionList(*(Option(_line(command)) for command in self._commands))
+
+    async def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Answer, or ask for the command's fields first."""
+        chosen = self._commands[event.option_index]
+        if self._chosen is None and not chosen.form.fields:
+            self.answer(GiveWish(chosen.form.word, {}, chosen.role))
+        elif self._chosen is None:
+            self._chosen = chosen
+            await self._ask(chosen)
+
+    async def _ask(self, chosen: RoleCommand) -> None:
+        box = self.query_one("#command", Vertical)
+        await box.remove_children()
+        box.border_title = f"{chosen.title} (enter gives it)"
+        for label, form in zip(chosen.labels, chosen.form.fields, strict=True):
+            field = Field(default_text(form), select_on_focus=True)
+            field.cursor_blink = False
+            await box.mount(Static(Text(f"{label}{f'  {form.doc}' if form.doc else ''}")), field)
+        await box.mount(Static(Text(FIELD_REMARK), classes="remark", id="fault"))
+        self.query(Field).first().focus()
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Go to the next field; after the last one answer, or say which value is wrong."""
+        fields = list(self.query(Field))
+        following = fields[fields.index(event.input) + 1 :] if isinstance(event.input, Field) else []
+        if following:
+            following[0].focus()
+        elif (chosen := self._chosen) is not None:
+            try:
+                values = read_fields(chosen.form.fields, [field.value for field in fields])
+            except WrongValue as wrong:
+                self.query_one("#fault", Static).update(Text(f"{wrong.detail}. {wrong.remedy}", "bold red"))
+                return
+            self.answer(GiveWish(chosen.form.word, values, chosen.role))
+
+
+def _line(command: RoleCommand) -> Text:
+    return Text.assemble((command.title, "bold"), f"  {command.form.doc}" if command.form.doc else "")
 
 
 class LiftQuestion(Dialog[int]):

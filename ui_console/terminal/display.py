@@ -16,6 +16,7 @@ from textual.events import Resize, Unmount
 from textual.screen import Screen
 from textual.widgets import Static
 
+from ui_console.model.driving import SPEED
 from ui_console.model.profile import Profile
 from ui_console.model.views import ConsoleView
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
@@ -33,7 +34,6 @@ REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and 
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
 LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which an old view must be marked
-SPEED_RAD_S = 4.0  # chosen: a walk
 NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are both too small
 
 
@@ -101,7 +101,7 @@ class ConsoleDisplay(EndingApp):
         super().__init__()
         self._session, self.profile, self._has_pixels, self._begins_bare = session, profile, has_pixels, is_bare
         self._has_gamepad = has_gamepad
-        self.speed_rad_s = SPEED_RAD_S
+        self.speed = SPEED
         self.chosen = PanelName.ROBOTS
         self._turn = PanelName.SCHEDULE
         self._found: LogResult | None = None
@@ -120,7 +120,7 @@ class ConsoleDisplay(EndingApp):
         with Horizontal(id="body"):
             with Vertical(id="left"):
                 yield Video(self._session.picture, has_pixels=self._has_pixels)
-                yield DrivePad(lambda: self.speed_rad_s)
+                yield DrivePad()
             with Vertical(id="side"):
                 yield Panel(PanelName.ROBOTS)
                 yield Panel("turn")
@@ -157,6 +157,7 @@ class ConsoleDisplay(EndingApp):
         view = self._view = self._session.model.view(self._session.now_s())
         main.set_class(view.own.link_down_s >= 0, "-unlinked")
         self._show_head(main, view)
+        main.query_one(DrivePad).disabled = self._session.model.reach is None
         for name in FIXED:
             self._show(name, main.query_one(f"#{name}", Panel), view)
         turn = main.query_one("#turn", Panel)
@@ -198,7 +199,7 @@ class ConsoleDisplay(EndingApp):
         return has(self.profile, action)
 
     def _show_head(self, main: Screen[object], view: ConsoleView) -> None:
-        first = head(view, self.size.width, self.profile, self.speed_rad_s)
+        first = head(view, self.size.width, self.profile, self.speed)
         main.query_one("#status", Static).update(first.status, layout=False)
         say = main.query_one("#say", Static)
         say.display = bool(first.says)

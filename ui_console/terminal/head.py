@@ -53,16 +53,16 @@ class _Fact:
     short: Text
 
 
-def head(view: ConsoleView, columns: int, profile: Profile, speed_rad_s: float) -> Head:
+def head(view: ConsoleView, columns: int, profile: Profile, speed: float) -> Head:
     """Return the first lines of a console.
 
     Args:
         view: Its content.
         columns: Its width.
         profile: Its look.
-        speed_rad_s: Of the drive keys.
+        speed: Of the drive keys, as a share of the robot's most.
     """
-    facts = list(_facts(view, profile, speed_rad_s))
+    facts = list(_facts(view, profile, speed))
     status, is_told_whole = _fitted(facts, columns)
     says = list(_says(view, profile))
     if not is_told_whole:
@@ -70,7 +70,7 @@ def head(view: ConsoleView, columns: int, profile: Profile, speed_rad_s: float) 
     return Head(status, says)
 
 
-def _facts(view: ConsoleView, profile: Profile, speed_rad_s: float) -> Iterator[_Fact]:
+def _facts(view: ConsoleView, profile: Profile, speed: float) -> Iterator[_Fact]:
     own = view.own
     is_alarming = own.stop is not None or own.link_down_s >= 0
     style = ALARMING if is_alarming else "bold black on green" if own.is_held else "bold"
@@ -90,7 +90,7 @@ def _facts(view: ConsoleView, profile: Profile, speed_rad_s: float) -> Iterator[
     if own.taken_because and not own.is_held:
         yield _Fact(4, *_texts(f"taken: {own.taken_because}", "taken", "yellow"))
     if profile is not Profile.MONITOR:
-        yield _Fact(3, *_texts(f"speed {speed_rad_s:g} rad/s", f"{speed_rad_s:g} rad/s"))
+        yield from _speed(view, speed)
         yield from (_picture(video) for video in view.videos if video.robot == own.robot)
 
 
@@ -115,6 +115,14 @@ def _says(view: ConsoleView, profile: Profile) -> Iterator[Text]:
         yield Text("let go, then press anew", ASKING)
     if own.away_since_s >= 0:
         yield Text("you are away: press any key", ASKING)
+
+
+def _speed(view: ConsoleView, speed: float) -> Iterator[_Fact]:
+    """Yield the speed of the drive keys, in meters per second too if that is known; nothing for what cannot move."""
+    reach = view.abilities.reach if view.abilities is not None else None
+    if view.abilities is None or reach is not None:
+        most = f" ({speed * reach.forward_m_s:.2f} m/s)" if reach is not None else ""
+        yield _Fact(3, *_texts(f"speed {speed:.0%}".replace("%", " %") + most, f"{speed:.0%}".replace("%", " %")))
 
 
 def _lost_keys(lost: LostView, profile: Profile) -> str:

@@ -42,7 +42,8 @@ KEYS = [
     Binding("M", "ask_consent_because", "the same, with a reason you type"),
     Binding("g", "decide(True)", "say yes to the operator who asks for the robot, or to lift your stop"),
     Binding("n", "decide(False)", "say no"),
-    Binding("j", "jump", "jump"),
+    Binding("o", "command", "give another command of the robot, from a list"),
+    Binding("j", "jump", "jump, if the robot can"),
     Binding("plus,equals_sign", "faster(1)", "faster"),
     Binding("minus", "faster(-1)", "slower"),
     Binding("tab", "panel(1)", "next table", priority=True),
@@ -71,6 +72,7 @@ DRIVES = frozenset(
         "drive",
         "stop",
         "jump",
+        "command",
         "faster",
         "release",
         "take",
@@ -196,7 +198,11 @@ def _hands(view: ConsoleView, profile: Profile) -> Iterator[Hint]:
     yield Hint("p", "pick robot", "pick", 3)
     if own.is_held:
         yield Hint("+ -", "speed", "", 2)
-        yield Hint("j", "jump", "jump", 1)
+        can = view.abilities
+        if can is None or can.takes("jump"):
+            yield Hint("j", "jump", "jump", 1)
+        if can is not None and can.commands:
+            yield Hint("o", "command", "command", 1)
 
 
 def key_lines(found: Sequence[Hint], columns: int, rows: int) -> Text:

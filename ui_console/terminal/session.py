@@ -111,17 +111,16 @@ class TerminalSession(Session):
         await play_gamepad(
             device,
             Stick(ranges),
-            hold=self.hold,
+            hold=lambda forward, right, lasts_s: self.steer(forward, right, screen.speed, lasts_s),
             stop=self.stop,
             wish=lambda wish: self._begin_wish(wish, screen),
-            speed_rad_s=lambda: screen.speed_rad_s,
         )
 
     def _begin_wish(self, wish: PadWish, screen: ConsoleApp) -> None:
         self.touch()
         match wish:
             case PadWish.JUMP:
-                self.jump()
+                screen.action_jump()
             case PadWish.TAKE:
                 self.take()
             case PadWish.RELEASE:

@@ -14,7 +14,7 @@ from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import DriveWish
+from ui_console.model.driving import GiveWish, MoveWish, move_by_stick
 from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 
@@ -43,17 +43,26 @@ class Session:
         """Return the mission time."""
         return self._console.clock.now_s() if self._console is not None else 0.0
 
-    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
+    def steer(self, forward: float, right: float, speed: float, lasts_s: float | None = None) -> None:
+        """Take in that a stick, pad or drive key is held; do nothing if the ARC has no body that moves."""
+        if (reach := self.model.reach) is not None:
+            self.hold(move_by_stick(forward, right, speed, reach), lasts_s)
+
+    def hold(self, move: MoveWish, lasts_s: float | None = None) -> None:
         """Take in that a drive key is down."""
-        self._with_robot(lambda console: console.hold(drive, lasts_s))
+        self._with_robot(lambda console: console.hold(move, lasts_s))
 
     def stop(self) -> None:
         """Stop the wheels now."""
         self._with_robot(Teleoperation.stop)
 
+    def give(self, wish: GiveWish) -> None:
+        """Give one command."""
+        self._with_robot(lambda console: console.give(wish))
+
     def jump(self) -> None:
-        """Jump once."""
-        self._with_robot(Teleoperation.jump)
+        """Jump once, if the ARC has such a command."""
+        self.give(GiveWish("jump"))
 
     def take(self) -> None:
         """Ask for the robot."""

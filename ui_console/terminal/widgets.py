@@ -17,7 +17,6 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from backbone.spoken import counted
-from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
 from ui_console.terminal.keys import Hint, key_lines
 from ui_console.terminal.lines import Row, laid_out
 from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send
@@ -170,24 +169,25 @@ class DrivePad(Widget):
     """A square to drag in with the mouse: farther up is faster, sideways turns; letting go stops the wheels.
 
     The only control of a terminal that reports its release, apart from a gamepad.
-
-    Args:
-        speed_rad_s: Returns the speed at the upper edge.
     """
 
     class Dragged(Message):
-        """The pad is being dragged; repeated every ``SAY_EVERY_S``."""
+        """The pad is being dragged; repeated every ``SAY_EVERY_S``.
 
-        def __init__(self, drive: DriveWish) -> None:
+        Attributes:
+            forward: −1 to 1, as of a stick.
+            right: −1 to 1.
+        """
+
+        def __init__(self, forward: float, right: float) -> None:
             super().__init__()
-            self.drive, self.lasts_s = drive, STICK_LASTS_S
+            self.forward, self.right = forward, right
 
     class Released(Message):
         """The pad was let go."""
 
-    def __init__(self, speed_rad_s: Callable[[], float]) -> None:
+    def __init__(self) -> None:
         super().__init__(id="pad")
-        self._speed_rad_s = speed_rad_s
         self._at: tuple[float, float] | None = None
         self._saying: Timer | None = None
         self.border_title = "drag to drive"
@@ -240,7 +240,7 @@ class DrivePad(Widget):
 
     def _say(self) -> None:
         if self._at is not None:
-            self.post_message(self.Dragged(drive_by_stick(*self._at, self._speed_rad_s())))
+            self.post_message(self.Dragged(*self._at))
 
     def _let_go(self) -> None:
         if self._saying is not None:

@@ -15,7 +15,7 @@ from backbone.errors import LinkError, Refusal, code_of
 from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import STICK_LASTS_S, HaltWish, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, GiveWish, HaltWish, move_by_stick
 from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, PictureSeen, failed
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
@@ -91,13 +91,15 @@ class Operator:
     def obey(self, intent: protocol.Intent) -> None:
         """Carry out the browser's intent; a slow one goes on in a task of its own."""
         match intent:
-            case protocol.Steer(moment, forward, right, speed_rad_s):
-                drive = drive_by_stick(forward, right, speed_rad_s)
-                self._by_press(moment, lambda console: console.hold(drive, STICK_LASTS_S))
+            case protocol.Steer(moment, forward, right, speed) if self.model.reach is not None:
+                move = move_by_stick(forward, right, speed, self.model.reach)
+                self._by_press(moment, lambda console: console.hold(move, STICK_LASTS_S))
+            case protocol.Steer():
+                pass  # the ARC has no body that moves
             case protocol.StopWheels():
                 self.stop()
-            case protocol.JumpOnce(moment):
-                self._by_press(moment, Teleoperation.jump)
+            case protocol.GiveRequest(moment, word, values, role):
+                self._give(moment, GiveWish(word, values, role))
             case protocol.Drawn(robot, number):
                 self._drawn(robot, number)
             case protocol.Watch(robots):
@@ -175,6 +177,7 @@ class Operator:
         model.sees = model.robot in self.outbox.watched
         model.look(now_s)
         put("own", view_json(model.own(now_s)))
+        put("abilities", view_json(model.abilities))
         put("robots", _encode(model.robots(now_s)))
         put("links", _encode(model.links(now_s)))
         put("alarms", _encode(model.alarm_views()))
@@ -194,6 +197,13 @@ class Operator:
         """Move the robot unless the press is from an earlier moment, also if the page's message was late."""
         if moment == self.model.moment:
             self._with_robot(act)
+
+    def _give(self, moment: int, wish: GiveWish) -> None:
+        """Give a command, unless the robot was stopped, freed, granted or lost since the page showed it."""
+        if moment == self.model.moment:
+            self._with_robot(lambda console: console.give(wish))
+        else:
+            self._answer({"refused": f"{wish.word} was not given: the robot's state has changed; press again"})
 
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)

@@ -10,13 +10,16 @@ from typing import Annotated, Any
 import msgspec
 
 from backbone.mission_log.question import LogQuestion
-from backbone.ranges import EXACT
+from backbone.ranges import EXACT, LONGEST_LINE
 from ui_console.model.consent import MAX_WHY
 from ui_console.web.login import BeatRequest, Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
-MOST_RAD_S = 15.0  # a Scout's most; robots clip to what they can
 
+ShortLine = Annotated[str, msgspec.Meta(max_length=LONGEST_LINE)]
+MOST_FIELDS = 64  # chosen: more than a person fills in
+
+GivenValue = Annotated[int, msgspec.Meta(ge=-EXACT, le=EXACT)] | float | bool | ShortLine
 Numbered = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
@@ -26,26 +29,35 @@ class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
     Attributes:
         moment: ``OwnView.moment`` as the page showed it when the press began; at a later one the press moves nothing.
+        forward: −1 (full backward) to 1.
+        right: −1 (full left) to 1.
+        speed: Share of the robot's most at full stick.
     """
 
     moment: Numbered
     forward: Share
     right: Share
-    speed_rad_s: Annotated[float, msgspec.Meta(ge=0.0, le=MOST_RAD_S)]
+    speed: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 
 
 class StopWheels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop"):
     """The control was let go."""
 
 
-class JumpOnce(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="jump"):
-    """Jump.
+class GiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="give"):
+    """Give one command to the robot in hand.
 
     Attributes:
         moment: As in ``Steer``.
+        word: The command's.
+        values: Field → value; the ARC checks them.
+        role: Role of the RC that obeys it.
     """
 
     moment: Numbered
+    word: ShortText
+    values: Annotated[dict[ShortText, GivenValue], msgspec.Meta(max_length=MOST_FIELDS)]
+    role: ShortText
 
 
 class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="take"):
@@ -161,7 +173,7 @@ class Here(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="d
 Intent = (
     Steer
     | StopWheels
-    | JumpOnce
+    | GiveRequest
     | TakeOver
     | ReleaseRequest
     | MayI

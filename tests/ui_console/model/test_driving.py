@@ -1,20 +1,30 @@
-"""Laws of the dead man: no key, no command; every drive ends in a halt."""
+"""Laws of the dead man: no key, no command; every drive ends in a halt. No wheel exceeds its share of the speed."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from resource_pool.rcs.scout import MOST_M_S, MOST_TURN_RAD_S
+from scout_model.dimensions import WHEEL_SPEED_LIMIT_RAD_S
+from scout_model.scout import wheels_rad_s
+from ui_console.model.arc_abilities import Reach
 from ui_console.model.driving import (
     FIRST_HOLD_S,
     REPEAT_EVERY_S,
+    SPEED,
+    SPEED_LEAST,
+    SPEED_MOST,
     DeadMan,
     DriveSpan,
-    DriveWish,
+    GiveWish,
     HaltWish,
-    JumpWish,
-    drive_towards,
+    MoveWish,
+    faster,
+    move_by_stick,
 )
 
-FORWARD = drive_towards("forward", 4.0)
+FORWARD = MoveWish(0.1, 0.0)
+REACH = Reach(MOST_M_S, MOST_TURN_RAD_S)
 TICK_S = 0.01
 
 
@@ -61,7 +71,7 @@ def test_another_direction_takes_over_at_once() -> None:
     hand = DeadMan()
     hand.press(FORWARD, 0.0)
     assert hand.due(0.0) == FORWARD
-    left = drive_towards("left", 4.0)
+    left = MoveWish(0.0, 1.0)
     hand.press(left, 0.02)
     assert hand.due(0.02) == left
 
@@ -72,9 +82,9 @@ def test_a_drive_is_only_sent_within_the_hold_of_a_press_and_always_followed_by_
 ) -> None:
     sent = commands(presses, 10.0, tuple(stops))
     for at_s, command in sent:
-        if isinstance(command, DriveWish):
+        if isinstance(command, MoveWish):
             assert any(press - TICK_S <= at_s <= press + FIRST_HOLD_S + 2 * TICK_S for press in presses)
-    if any(isinstance(command, DriveWish) for _at_s, command in sent):
+    if any(isinstance(command, MoveWish) for _at_s, command in sent):
         assert sent[-1][1] == HaltWish()
 
 
@@ -101,12 +111,12 @@ def test_pressed_again_right_after_a_stop_it_drives_and_waits_for_the_next_repea
     assert hand.due(1.1 + FIRST_HOLD_S) == HaltWish()
 
 
-@given(st.lists(st.sampled_from([FORWARD, HaltWish(), JumpWish(), None])))
-def test_the_begin_and_the_end_of_a_drive_take_turns(applied: list[DriveWish | HaltWish | JumpWish | None]) -> None:
+@given(st.lists(st.sampled_from([FORWARD, HaltWish(), GiveWish("jump"), None])))
+def test_the_begin_and_the_end_of_a_drive_take_turns(applied: list[MoveWish | HaltWish | GiveWish | None]) -> None:
     span, told = DriveSpan(), []
     for at_s, command in enumerate(applied):
         if command is not None and span.begins(command, at_s):
-            assert isinstance(command, DriveWish)
+            assert isinstance(command, MoveWish)
             told.append("begin")
         if command is None or isinstance(command, HaltWish):
             took_s = span.ends(at_s)
@@ -114,3 +124,54 @@ def test_the_begin_and_the_end_of_a_drive_take_turns(applied: list[DriveWish | H
                 assert took_s >= 0
                 told.append("end")
     assert told == (["begin", "end"] * len(told))[: len(told)]
+
+
+_shares = st.floats(0.05, 1.0)
+_at = st.floats(-1.5, 1.5)
+
+
+@given(_at, _at, _shares, st.builds(Reach, st.floats(0.0, 10.0), st.floats(0.0, 20.0)))
+def test_the_shares_of_forward_speed_and_turn_rate_are_together_at_most_the_speed(
+    forward: float, right: float, speed: float, reach: Reach
+) -> None:
+    move = move_by_stick(forward, right, speed, reach)
+    shares = (abs(move.forward_m_s) / (reach.forward_m_s or 1.0), abs(move.turn_rad_s) / (reach.turn_rad_s or 1.0))
+    assert sum(shares) <= speed + 1e-9
+    mirrored = move_by_stick(forward, -right, speed, reach)
+    assert (mirrored.forward_m_s, mirrored.turn_rad_s) == pytest.approx((move.forward_m_s, -move.turn_rad_s))
+
+
+@given(_at, _at, _shares)
+def test_no_wheel_of_a_scout_turns_faster_than_the_speed_and_a_full_stick_uses_all_of_it(
+    forward: float, right: float, speed: float
+) -> None:
+    move = move_by_stick(forward, right, speed, REACH)
+    wheels = [abs(one) for one in wheels_rad_s(move.forward_m_s, move.turn_rad_s)]
+    assert max(wheels) <= speed * WHEEL_SPEED_LIMIT_RAD_S + 1e-9
+    if abs(forward) >= 1.0:
+        assert max(wheels) == pytest.approx(speed * WHEEL_SPEED_LIMIT_RAD_S)
+
+
+@pytest.mark.parametrize(
+    ("forward", "right", "wheels"),
+    [(1, 0, (4, 4)), (-2, 0, (-4, -4)), (0, 1, (2, -2)), (0, 0, (0, 0)), (1, 1, (4, 4 / 3))],
+)
+def test_a_stick_turns_a_scout_on_the_spot_or_bends_its_way(
+    forward: float, right: float, wheels: tuple[float, float]
+) -> None:
+    move = move_by_stick(forward, right, 4.0 / WHEEL_SPEED_LIMIT_RAD_S, REACH)
+    assert wheels_rad_s(move.forward_m_s, move.turn_rad_s) == pytest.approx(wheels)
+
+
+def test_the_usual_speed_of_a_scout_is_a_walk() -> None:
+    assert pytest.approx(4.375) == SPEED * WHEEL_SPEED_LIMIT_RAD_S
+    assert pytest.approx(0.0875) == SPEED * MOST_M_S
+
+
+@given(st.lists(st.integers(-3, 3), max_size=30))
+def test_the_speed_stays_within_its_bounds_and_on_its_steps(steps: list[int]) -> None:
+    speed = SPEED
+    for step in steps:
+        speed = faster(speed, step)
+        assert SPEED_LEAST <= speed <= SPEED_MOST
+        assert 20 * speed == pytest.approx(round(20 * speed))

@@ -7,7 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.model.driving import REPEAT_EVERY_S, DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot, Wish
+from ui_console.model.driving import (
+    REPEAT_EVERY_S,
+    DriveWish,
+    GiveBack,
+    GiveWish,
+    HaltWish,
+    MoveWish,
+    StopAll,
+    StopRobot,
+    Wish,
+)
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript, read_script
 
 EXAMPLE = '{"at_s":0.5,"left_rad_s":4,"right_rad_s":4}\n{"at_s":3,"release":true}\n'
@@ -48,7 +58,7 @@ def test_after_a_halt_nothing_is_repeated() -> None:
 def test_a_jump_does_not_interrupt_a_drive() -> None:
     script = '{"at_s":0,"left_rad_s":1,"right_rad_s":1}\n{"at_s":0.25,"jump":true}\n{"at_s":0.6,"release":true}'
     wishes = [wish for _at_s, wish in play(ScriptPlayer(read_script(script)), 10.0)]
-    assert wishes.count(JumpWish()) == 1
+    assert wishes.count(GiveWish("jump")) == 1
     assert wishes[-2] == DriveWish(1.0, 1.0)
 
 
@@ -77,7 +87,7 @@ def test_when_letting_go_is_required_nothing_moves_before_a_line_that_halts() ->
     assert player.due(0.0) == [DriveWish(1.0, 1.0)]
     player.require_let_go()
     assert player.due(1.0) == []
-    for step in (Step(1.1, DriveWish(2.0, 2.0)), Step(1.2, JumpWish())):
+    for step in (Step(1.1, DriveWish(2.0, 2.0)), Step(1.2, GiveWish("jump"))):
         player.add(step)
     assert player.due(1.5) == []
     assert player.held_back == 2
@@ -107,6 +117,11 @@ def test_a_streamed_script_waits_for_its_next_line_and_repeats_the_last_meanwhil
         ('{"at_s":0,"halt":true,"jump":true}', "exactly one"),
         ('{"at_s":0,"left_rad_s":1}', "belong together"),
         ('{"at_s":0,"left_rad_s":1e999,"right_rad_s":1}', ""),
+        ('{"at_s":0,"forward_m_s":1,"left_rad_s":1,"right_rad_s":1}', "exactly one"),
+        ('{"at_s":0,"turn_rad_s":1e999}', ""),
+        ('{"at_s":0,"give":"shine","jump":true}', "exactly one"),
+        ('{"at_s":0,"halt":true,"values":{"brightness":1}}', "belong to a command by give"),
+        ('{"at_s":0,"give":"shine","values":{"brightness":[1]}}', "values"),
         ('{"at_s":-1,"halt":true}', "comes after"),
         ('{"at_s":0,"halt":true,"color":"red"}', "color"),
         ('{"at_s":"now","halt":true}', "float"),
@@ -129,8 +144,36 @@ def test_time_may_not_run_backwards_and_nothing_follows_a_release() -> None:
         read_script('{"at_s":0,"release":true}\n{"at_s":1,"halt":true}')
 
 
+@pytest.mark.parametrize(
+    ("line", "wish"),
+    [
+        ('{"at_s":0,"forward_m_s":0.1,"turn_rad_s":-1}', MoveWish(0.1, -1.0)),
+        ('{"at_s":0,"forward_m_s":0.1}', MoveWish(0.1, 0.0)),
+        ('{"at_s":0,"turn_rad_s":1}', MoveWish(0.0, 1.0)),
+        ('{"at_s":0,"jump":true}', GiveWish("jump")),
+        (
+            '{"at_s":0,"give":"shine","values":{"brightness":0.5},"role":"lamp"}',
+            GiveWish("shine", {"brightness": 0.5}, "lamp"),
+        ),
+    ],
+)
+def test_a_line_moves_any_body_and_gives_any_command(line: str, wish: Wish) -> None:
+    assert [step.wish for step in read_script(line)] == [wish]
+
+
+def test_after_a_stop_a_command_that_moves_nothing_is_given_without_a_halt() -> None:
+    shine, jump = GiveWish("shine", {"brightness": 1.0}), GiveWish("jump")
+    player = ScriptPlayer(None, moves=lambda word: word != "shine")
+    player.require_let_go()
+    for wish in (shine, jump, MoveWish(0.1, 0.0)):
+        player.add(Step(0.0, wish))
+    assert player.due(1.0) == [shine]
+    assert player.held_back == 2
+
+
 _speeds = st.floats(-30.0, 30.0)
-_wishes = st.one_of(st.builds(DriveWish, _speeds, _speeds), st.just(HaltWish()), st.just(JumpWish()))
+_motions = st.one_of(st.builds(DriveWish, _speeds, _speeds), st.builds(MoveWish, _speeds, _speeds))
+_wishes = st.one_of(_motions, st.just(HaltWish()), st.just(GiveWish("jump")))
 _scripts = st.lists(st.tuples(st.floats(0.0, 3.0), _wishes), max_size=12).map(
     lambda steps: [Step(at_s, wish) for at_s, wish in sorted(steps, key=lambda step: step[0])]
 )
@@ -146,7 +189,7 @@ def test_every_step_is_done_once_in_order_at_its_time_and_the_release_comes_last
         if left and wish is left[0].wish:
             assert at_s == left.pop(0).at_s
         else:
-            assert isinstance(wish, DriveWish)
+            assert isinstance(wish, DriveWish | MoveWish)
     assert left == []
 
 

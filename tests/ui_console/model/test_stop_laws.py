@@ -18,7 +18,7 @@ from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import OtherStop
 from ui_console.model.consent import ConsentDesk, Sought, Topic
-from ui_console.model.driving import STICK_LASTS_S, DeadMan, DriveWish
+from ui_console.model.driving import STICK_LASTS_S, DeadMan, MoveWish
 from ui_console.model.lifting import AskFirst, LiftNow, NotThatStop, decide_lift
 
 SEQUENCES, STEPS = 1000, 50
@@ -98,10 +98,10 @@ class World:
                 heapq.heappop(self._on_the_way)[2]()
             for who in self.people:
                 if who.pressed_s is not None:
-                    drive = DriveWish(who.pressed_s, 1.0)
+                    drive = MoveWish(who.pressed_s, 1.0)
                     who.hand.press(drive, self.now_s, STICK_LASTS_S if who.uses_stick else None)
                 wanted = who.hand.due(self.now_s)
-                if isinstance(wanted, DriveWish) and who.epoch:
+                if isinstance(wanted, MoveWish) and who.epoch:
                     self._command(who, wanted, who.epoch, who.known.number("scout1"))
 
     def tell_all(self, tell: Callable[[Operator], None]) -> None:
@@ -110,7 +110,7 @@ class World:
                 self.send(who, lambda who=who: tell(who))
 
     # ------------------------------------------------------------------ the robot's RC
-    def _command(self, who: Operator, drive: DriveWish, epoch: int, after_stop: int) -> None:
+    def _command(self, who: Operator, drive: MoveWish, epoch: int, after_stop: int) -> None:
         def arrive() -> None:
             if epoch != self.epoch or who.name != self.holder:
                 return
@@ -128,8 +128,8 @@ class World:
         who.known.refused(refusal)
         who.hand.require_let_go()
 
-    def _moved(self, drive: DriveWish) -> None:
-        pressed_s = drive.left_rad_s
+    def _moved(self, drive: MoveWish) -> None:
+        pressed_s = drive.forward_m_s
         self.moves += 1
         self.moves_again += self.lifts > 0
         assert not self.latch.state.is_stopped

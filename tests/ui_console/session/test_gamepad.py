@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
-from ui_console.model.driving import STICK_LASTS_S, DeadMan, DriveWish
+from ui_console.model.driving import STICK_LASTS_S, DeadMan, MoveWish
 from ui_console.session.gamepad import (
     ABS_X,
     ABS_Y,
@@ -52,16 +52,16 @@ EVENTS = st.one_of(
 
 
 @given(st.lists(EVENTS, max_size=40))
-def test_without_the_dead_man_button_nothing_drives_and_with_it_never_faster_than_allowed(events: list[Said]) -> None:
+def test_without_the_dead_man_button_nothing_drives_and_with_it_no_stick_exceeds_its_end(events: list[Said]) -> None:
     stick, held = Stick(RANGES), {BTN_TL: False, BTN_TR: False}
     for event in events:
         stick.feel(event)
         if event.type == EV_KEY and event.code in held:
             held[event.code] = bool(event.value)
-        wanted = stick.wanted(4.0)
+        wanted = stick.wanted()
         assert (wanted is not None) == any(held.values())
         if wanted is not None:
-            assert max(abs(wanted.left_rad_s), abs(wanted.right_rad_s)) <= 4.0 + 1e-9
+            assert all(-1.0 <= share <= 1.0 for share in wanted)
 
 
 @pytest.mark.parametrize(
@@ -83,18 +83,16 @@ def test_a_stick_that_rests_beside_its_middle_stands_still() -> None:
     stick = Stick(RANGES)
     for event in (Said(EV_KEY, BTN_TL, 1), Said(EV_ABS, ABS_Y, -2000), Said(EV_ABS, ABS_X, 3000)):
         stick.feel(event)
-    assert stick.wanted(4.0) == DriveWish(0.0, 0.0)
+    assert stick.wanted() == (0.0, 0.0)
 
 
 def test_up_is_forward_and_right_turns_right() -> None:
     stick = Stick(RANGES)
     for event in (Said(EV_KEY, BTN_TR, 1), Said(EV_ABS, ABS_Y, -32768)):
         stick.feel(event)
-    assert stick.wanted(4.0) == DriveWish(4.0, 4.0)
+    assert stick.wanted() == (1.0, 0.0)
     stick.feel(Said(EV_ABS, ABS_X, 32767))
-    wanted = stick.wanted(4.0)
-    assert wanted is not None
-    assert wanted.left_rad_s > wanted.right_rad_s
+    assert stick.wanted() == (1.0, 1.0)
 
 
 class PlayedGamepad:
@@ -121,10 +119,9 @@ def play(script: list[tuple[float, Said]], *, unplugged: bool, for_s: float) -> 
             play_gamepad(
                 device,
                 Stick(RANGES),
-                hold=lambda drive, lasts_s: said.append((drive, lasts_s)),
+                hold=lambda *held: said.append(held),
                 stop=lambda: said.append("stop"),
                 wish=said.append,
-                speed_rad_s=lambda: 4.0,
             )
         )
         await asyncio.sleep(for_s)
@@ -140,7 +137,7 @@ def test_what_is_held_is_said_again_until_it_is_let_go() -> None:
     held = [(0.0, Said(EV_ABS, ABS_Y, -32768)), (0.0, Said(EV_KEY, BTN_TL, 1)), (1.0, Said(EV_KEY, BTN_TL, 0))]
     said = play(held, unplugged=False, for_s=3.0)
     assert said[-1] == "stop"
-    assert set(said[:-1]) == {(DriveWish(4.0, 4.0), STICK_LASTS_S)}
+    assert set(said[:-1]) == {(1.0, 0.0, STICK_LASTS_S)}
     assert 9 <= len(said[:-1]) <= 13
 
 
@@ -150,14 +147,12 @@ def test_a_shoulder_button_that_is_held_through_a_stop_drives_only_when_it_is_pr
         script = [(0.0, Said(EV_ABS, ABS_Y, -32768)), (0.0, Said(EV_KEY, BTN_TL, 1)), (2.0, Said(EV_KEY, BTN_TL, 0))]
         device = PlayedGamepad([*script, (0.5, Said(EV_KEY, BTN_TL, 1))], unplugged=False)
 
-        def hold(drive: DriveWish, lasts_s: float) -> None:
-            if hand.press(drive, loop.time(), lasts_s):
+        def hold(forward: float, right: float, lasts_s: float) -> None:
+            if hand.press(MoveWish(forward, right), loop.time(), lasts_s):
                 driven_s.append(loop.time())
 
         playing = asyncio.create_task(
-            play_gamepad(
-                device, Stick(RANGES), hold=hold, stop=hand.stop, wish=lambda wish: None, speed_rad_s=lambda: 4.0
-            )
+            play_gamepad(device, Stick(RANGES), hold=hold, stop=hand.stop, wish=lambda wish: None)
         )
         await asyncio.sleep(1.0)
         hand.require_let_go()

@@ -20,15 +20,16 @@ from backbone.wire import Envelope, Message
 from resource_pool.arc_client import EmergencyStopped
 from resource_pool.commands import Drive as ArcDrive
 from resource_pool.commands import Halt as ArcHalt
-from resource_pool.commands import Jump as ArcJump
+from resource_pool.commands import Move as ArcMove
+from resource_pool.messages import GiveCommand
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, DriveWish, HaltWish, drive_towards
+from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, GiveWish, HaltWish, MoveWish
 from ui_console.session.scripted import ScriptDriver
 from ui_console.session.teleoperation import Teleoperation
 
-FORWARD = drive_towards("forward", 4.0)
+FORWARD = MoveWish(0.1, 0.0)
 REPEAT_S = 0.05
 
 
@@ -60,7 +61,7 @@ def test_a_press_counts_only_if_its_control_was_let_go_since_that_was_required(p
                 assert counts is is_clean[control]
                 until_s[control] = now_s + silence_s[control]
         if not any(is_clean[control] and now_s < end_s for control, end_s in until_s.items()):
-            assert not isinstance(hand.due(now_s), DriveWish)
+            assert not isinstance(hand.due(now_s), MoveWish)
 
 
 def test_what_is_held_when_letting_go_is_required_halts_at_once() -> None:
@@ -106,10 +107,10 @@ def test_a_stick_says_that_it_was_let_go_and_a_stop_key_does_not_say_it_for_keys
 
 def test_a_jump_key_that_is_held_jumps_no_more_until_it_was_let_go() -> None:
     hand = DeadMan()
-    assert [hand.press_jump(n * REPEAT_S) for n in range(3)] == [True] * 3
+    assert [hand.press_once(n * REPEAT_S) for n in range(3)] == [True] * 3
     hand.require_let_go()
-    assert not hand.press_jump(3 * REPEAT_S)
-    assert hand.press_jump(3 * REPEAT_S + KEYS_LET_GO_S)
+    assert not hand.press_once(3 * REPEAT_S)
+    assert hand.press_once(3 * REPEAT_S + KEYS_LET_GO_S)
 
 
 # ---------------------------------------------------------------------- a console that holds a robot
@@ -173,8 +174,8 @@ class Stage:
             self.console.hold(FORWARD, lasts_s)
             await self.clock.sleep_s(REPEAT_S)
 
-    def drives(self) -> list[ArcDrive]:
-        return [command for _at_s, _epoch, command in self.arc.commands if isinstance(command, ArcDrive)]
+    def drives(self) -> list[ArcMove | ArcDrive]:
+        return [command for _at_s, _epoch, command in self.arc.commands if isinstance(command, ArcMove | ArcDrive)]
 
     async def _answer(self, asked: Envelope[Any]) -> Message:
         match asked.body:
@@ -320,13 +321,13 @@ def test_a_jump_key_held_through_a_stop_does_not_jump_after_the_lift(stage: Call
             if repeat == 20:
                 on.arc.commands.clear()
                 on.lift()
-            on.console.jump()
+            on.console.give(GiveWish("jump"))
             await on.clock.sleep_s(REPEAT_S)
-        assert not [command for _at_s, _epoch, command in on.arc.commands if isinstance(command, ArcJump)]
+        assert not [command for _at_s, _epoch, command in on.arc.commands if isinstance(command, GiveCommand)]
         await on.clock.sleep_s(KEYS_LET_GO_S + 0.05)
-        on.console.jump()
+        on.console.give(GiveWish("jump"))
         await on.clock.sleep_s(0.1)
-        assert [type(command) for _at_s, _epoch, command in on.arc.commands][-1] is ArcJump
+        assert [type(command) for _at_s, _epoch, command in on.arc.commands][-1] is GiveCommand
 
     stage(scene)
 

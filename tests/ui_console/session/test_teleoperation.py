@@ -20,16 +20,16 @@ from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction, Suspended
-from resource_pool.commands import Drive as ArcDrive
 from resource_pool.commands import Halt as ArcHalt
-from ui_console.model.driving import drive_towards
+from resource_pool.commands import Move as ArcMove
+from ui_console.model.driving import GiveWish, MoveWish
 from ui_console.model.events import Asked, Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, said
 from ui_console.model.script import read_script
 from ui_console.session.scripted import ScriptDriver
 from ui_console.session.teleoperation import Teleoperation
 
 Scene = Callable[[FakePlacer], Awaitable[None]]
-FORWARD = drive_towards("forward", 4.0)
+FORWARD = MoveWish(0.1, 0.0)
 SCRIPT = '{"at_s":0.5,"left_rad_s":4,"right_rad_s":4}\n{"at_s":3,"release":true}\n'
 
 
@@ -104,7 +104,7 @@ def test_a_held_key_drives_and_a_released_one_stops_the_wheels(placer_world: Any
                 await placer.clock.sleep_s(0.05)
             await placer.clock.sleep_s(2.0)
             kinds = [type(command) for _at_s, _epoch, command in arc.commands]
-            assert kinds == [ArcDrive] * (len(kinds) - 1) + [ArcHalt]
+            assert kinds == [ArcMove] * (len(kinds) - 1) + [ArcHalt]
             assert 9 <= len(kinds) <= 14
 
     placer_world(scene)
@@ -123,7 +123,7 @@ def test_keys_pressed_while_somebody_else_has_the_robot_do_nothing_later_either(
             await arc.suspend("higher", "console-9", deadline_s=0.0)
             await arc.grant()
             await placer.clock.sleep_s(1.0)
-            assert {epoch for _at_s, epoch, command in arc.commands if isinstance(command, ArcDrive)} <= {1}
+            assert {epoch for _at_s, epoch, command in arc.commands if isinstance(command, ArcMove)} <= {1}
             words = [type(said(event)) for event in events if isinstance(said(event), Granted | Suspended)]
             assert words == [Granted, Suspended, Granted]
 
@@ -490,7 +490,7 @@ def test_each_thing_a_driver_does_is_one_event_with_the_name(placer_world: Any, 
                 driven.hold(FORWARD)
                 await placer.clock.sleep_s(0.05)
             await placer.clock.sleep_s(1.0)
-            driven.jump()
+            driven.give(GiveWish("jump"))
             await placer.clock.sleep_s(0.1)
             driven.stop()
             driven.hold(FORWARD)
@@ -508,7 +508,7 @@ def test_each_thing_a_driver_does_is_one_event_with_the_name(placer_world: Any, 
             (OperatorAction.TAKE, "scout1"),
             (OperatorAction.DRIVE_BEGIN, "scout1"),
             (OperatorAction.DRIVE_END, "scout1"),
-            (OperatorAction.JUMP, "scout1"),
+            (OperatorAction.COMMAND, "scout1"),
             (OperatorAction.DRIVE_BEGIN, "scout1"),
             (OperatorAction.DRIVE_END, "scout1"),
             (OperatorAction.DRIVE_BEGIN, "scout1"),

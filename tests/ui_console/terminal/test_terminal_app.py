@@ -20,9 +20,11 @@ from backbone.component.messages import StoryEvent
 from backbone.errors import Refusal
 from backbone.mission_log.log import AskLog, Log
 from resource_pool.arc_client import Suspended
+from ui_console.model.arc_abilities import SLOW, ArcAbilities, Reach
 from ui_console.model.consent import Consent, Settled, Sought
-from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
+from ui_console.model.driving import SPEED, SPEED_MOST, STICK_LASTS_S, GiveWish, MoveWish
 from ui_console.model.events import (
+    AbilitiesKnown,
     Attention,
     ConsentAsked,
     ConsentHeard,
@@ -34,7 +36,7 @@ from ui_console.model.events import (
 )
 from ui_console.model.profile import Profile
 from ui_console.session.feed import LogAway
-from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, read_value
+from ui_console.terminal.app import ConsoleApp, read_value
 from ui_console.terminal.keys import DRIVES
 from ui_console.terminal.keys import KEYS as KEYS_OF_THE_CONSOLE
 from ui_console.terminal.tables import PanelName
@@ -43,8 +45,9 @@ from ui_console.terminal.widgets import DrivePad, Panel, Video
 SIZE = (120, 36)
 
 
-FORWARD, BACKWARD = DriveWish(4.0, 4.0), DriveWish(-4.0, -4.0)
-LEFT, RIGHT = DriveWish(-2.0, 2.0), DriveWish(2.0, -2.0)
+MOST_M_S, MOST_RAD_S = SLOW.forward_m_s, SLOW.turn_rad_s  # the sessions here know no better reach
+FORWARD, BACKWARD = MoveWish(SPEED * MOST_M_S, 0.0), MoveWish(-SPEED * MOST_M_S, 0.0)
+LEFT, RIGHT = MoveWish(0.0, SPEED * MOST_RAD_S / 2), MoveWish(0.0, -SPEED * MOST_RAD_S / 2)
 KEYS: list[tuple[str, list[Any]]] = [
     ("up", [FORWARD]),
     ("w", [FORWARD]),
@@ -56,7 +59,8 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("d", [RIGHT]),
     ("space", ["stop"]),
     ("escape", ["stop"]),
-    ("j", ["jump"]),
+    ("j", [GiveWish("jump")]),
+    ("o", []),
     ("r", ["release"]),
     ("t", ["take"]),
     ("m", [("may I", "")]),
@@ -145,9 +149,9 @@ async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds()
     screen = ConsoleApp(session)
     async with screen.run_test() as pilot:
         await pilot.press("plus", "w", "minus", "minus", "w", "equals_sign")
-        assert session.wanted == [DriveWish(5.0, 5.0), DriveWish(3.0, 3.0)]
-        await pilot.press(*["plus"] * 13)
-        assert screen.speed_rad_s == SPEED_MOST_RAD_S
+        assert session.wanted == [MoveWish(0.3 * MOST_M_S, 0.0), MoveWish(0.2 * MOST_M_S, 0.0)]
+        await pilot.press(*["plus"] * 16)
+        assert screen.speed == SPEED_MOST
 
 
 @pytest.mark.parametrize(("key", "code"), [("q", 0), ("alt+q", 0), ("ctrl+q", 0), ("ctrl+c", 130)])
@@ -422,25 +426,25 @@ async def test_dragging_in_the_pad_drives_until_it_is_let_go() -> None:
     assert session.wanted[-1] == "stop"
     drive, lasts_s = held[0]
     assert lasts_s == STICK_LASTS_S
-    assert drive.left_rad_s == pytest.approx(drive.right_rad_s, abs=0.3)
-    assert drive.left_rad_s > 2.0
+    assert drive.turn_rad_s == pytest.approx(0.0, abs=0.02)
+    assert drive.forward_m_s > 0.5 * SPEED * MOST_M_S
 
 
-@pytest.mark.parametrize(
-    ("forward", "right", "drive"),
-    [
-        (1, 0, DriveWish(4, 4)),
-        (-2, 0, DriveWish(-4, -4)),
-        (0, 1, DriveWish(2, -2)),
-        (0, 0, DriveWish(0, 0)),
-        (1, 1, DriveWish(4, 4 / 3)),
-    ],
-)
-def test_a_stick_turns_on_the_spot_or_bends_the_way_and_never_exceeds_the_speed(
-    forward: float, right: float, drive: DriveWish
-) -> None:
-    found = drive_by_stick(forward, right, 4.0)
-    assert (found.left_rad_s, found.right_rad_s) == pytest.approx((drive.left_rad_s, drive.right_rad_s))
+async def test_keys_and_pad_drive_within_the_reach_of_the_body_and_not_at_all_without_one() -> None:
+    session = WrittenSession(ASK)
+    session.model.apply(AbilitiesKnown(9.0, ArcAbilities(Reach(2.0, 4.0), True, [])))
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE) as pilot:
+        await pilot.press("w", "a")
+        assert session.wanted == [MoveWish(0.5, 0.0), MoveWish(0.0, 0.5)]
+        assert "speed 25 % (0.50 m/s)" in screen_text(screen)
+        session.model.apply(AbilitiesKnown(9.1, ArcAbilities(None, False, [])))
+        screen.redraw()
+        await pilot.press("w")
+        await pilot.pause()
+        assert screen.query_one(DrivePad).disabled
+        assert len(session.wanted) == 2
+        assert "speed" not in screen_text(screen).splitlines()[0]
 
 
 # ---------------------------------------------------------------------- profiles

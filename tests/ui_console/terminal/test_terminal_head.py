@@ -30,7 +30,7 @@ def own(view: ConsoleView, **changes: object) -> ConsoleView:
 
 
 def shown_at(view: ConsoleView, columns: int, profile: Profile = Profile.TERMINAL) -> Head:
-    return head(view, columns, profile, 4.0)
+    return head(view, columns, profile, 0.25)
 
 
 @pytest.mark.parametrize("columns", WIDTHS)

@@ -6,14 +6,16 @@ import msgspec
 import pytest
 from bursts import burst
 from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model
+from known_arcs import lit_types
 from screen_text import screen_text
 from textual.events import AppBlur
 from textual.pilot import Pilot
 from textual.widgets import Input
 from written_session import WrittenSession, settle
 
+from ui_console.model.arc_abilities import arc_abilities
 from ui_console.model.console import ConsoleModel
-from ui_console.model.events import Heard
+from ui_console.model.events import AbilitiesKnown, Heard
 from ui_console.model.profile import Profile
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.dialogs import READ_S
@@ -28,6 +30,8 @@ DIALOGS: dict[str, list[str]] = {
     "why": ["y"],
     "keys": ["question_mark"],
     "reason": ["M"],
+    "commands": ["o"],
+    "fields of a command": ["o", "down", "enter"],
     "parameter": [*["tab"] * 6, "e"],
     "lift": ["c"],
 }
@@ -40,6 +44,7 @@ NO_ROBOTS = {"links": 5, "parameters": 6, "log": 8}
 def stopped_model() -> ConsoleModel:
     """Return one that holds scout1, which anna has stopped."""
     shown = held_model()
+    shown.apply(AbilitiesKnown(10.9, arc_abilities("lit", lit_types("lit"))))
     shown.apply(Heard(11.0, STOP))
     return shown
 

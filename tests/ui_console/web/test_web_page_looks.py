@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from axe import serious_findings
 from web_browser import assert_no_sideways_scroll
-from web_page import ALL_SIZES, card, page_at, stop_button, take, wait_stopped
+from web_page import ALL_SIZES, COVERED, card, page_at, stop_button, take, wait_stopped
 from web_stage import LOW, Stage
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
@@ -186,24 +186,6 @@ async def test_by_keyboard_alone_a_robot_is_taken_stopped_lifted_and_released(st
         await page.locator("#release").focus()
         await keyboard.press("Enter")
         await page.wait_for_selector("body[data-held='']")
-
-
-COVERED = """() => {
-  const ends = [0, document.documentElement.scrollHeight];
-  const controls = [...document.querySelectorAll("button, input, select, [tabindex]")];
-  const isAt = (one, box, share) => {
-    const found = document.elementFromPoint(box.x + box.width / 2, box.y + share * box.height);
-    return found === one || one.contains(found) || found?.contains(one);
-  };
-  return controls.filter((one) => one.checkVisibility() && !one.disabled).flatMap((one) => ends.flatMap((end) => {
-    document.activeElement.blur();
-    scrollTo(0, end);
-    one.focus();
-    const box = one.getBoundingClientRect();
-    const isSeen = [0.2, 0.5, 0.8].some((share) => isAt(one, box, share));
-    return isSeen ? [] : [`${one.id || one.textContent || one.className}, from ${end}`];
-  }));
-}"""
 
 
 @pytest.mark.parametrize("size", ALL_SIZES)

@@ -22,7 +22,7 @@ from web_page import (
 )
 from web_stage import ANYBODY, LOW, Stage
 
-from resource_pool.commands import Drive
+from resource_pool.commands import Move
 from ui_console.model.driving import STICK_LASTS_S
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
@@ -253,7 +253,7 @@ async def test_a_hold_from_before_a_stop_moves_nothing_however_late_it_arrives(s
         wheels.forget()
         cable.may_pass.set()
         await page.locator("#let-go").wait_for()
-        assert not any(isinstance(one, Drive) for one in wheels.news), "they were sent before the stop"
+        assert not any(isinstance(one, Move) for one in wheels.news), "they were sent before the stop"
         await wheels.assert_still("the key is still down")
         await page.keyboard.up("d")
         await page.keyboard.down("d")
@@ -295,11 +295,11 @@ async def test_arrows_drive_whatever_has_the_focus_unless_a_text_is_written_ther
             await wheels.wait_turning()
             await page.keyboard.up("ArrowRight")
             await wheels.wait_halted()
-        assert await page.locator("#speed").input_value() == "4"
+        assert await page.locator("#speed").input_value() == "25"
         assert await page.locator("#theme").input_value() == ""
         assert await page.locator("#tab-alarms").get_attribute("aria-selected") == "true"
         await page.keyboard.press("+")
-        assert await page.locator("#speed").input_value() == "5"
+        assert await page.locator("#speed").input_value() == "30"
         await page.evaluate(f"() => {{ {FOCUS['text']} }}")
         await page.keyboard.press("ArrowRight")
         await wheels.assert_still("it moves within the text")

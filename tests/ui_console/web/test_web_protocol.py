@@ -153,13 +153,16 @@ def test_a_few_meaningless_messages_are_forgiven() -> None:
 @pytest.mark.parametrize(
     "said",
     [
-        b'{"do":"drive","moment":0,"forward":2,"right":0,"speed_rad_s":4}',
-        b'{"do":"drive","moment":0,"forward":NaN,"right":0,"speed_rad_s":4}',
-        b'{"do":"drive","moment":0,"forward":1e999,"right":0,"speed_rad_s":4}',
-        b'{"do":"drive","moment":0,"forward":1,"right":0,"speed_rad_s":-1}',
-        b'{"do":"drive","moment":0,"forward":1,"right":0,"speed_rad_s":4,"more":1}',
-        b'{"do":"drive","forward":1,"right":0,"speed_rad_s":4}',
-        b'{"do":"jump"}',
+        b'{"do":"drive","moment":0,"forward":2,"right":0,"speed":0.5}',
+        b'{"do":"drive","moment":0,"forward":NaN,"right":0,"speed":0.5}',
+        b'{"do":"drive","moment":0,"forward":1e999,"right":0,"speed":0.5}',
+        b'{"do":"drive","moment":0,"forward":1,"right":0,"speed":-1}',
+        b'{"do":"drive","moment":0,"forward":1,"right":0,"speed":4}',
+        b'{"do":"drive","moment":0,"forward":1,"right":0,"speed":0.5,"more":1}',
+        b'{"do":"drive","forward":1,"right":0,"speed":0.5}',
+        b'{"do":"give","word":"jump","values":{},"role":""}',
+        b'{"do":"give","moment":0,"word":"shine","values":{"brightness":[1]},"role":""}',
+        b'{"do":"give","moment":0,"word":"shine","values":{"brightness":NaN},"role":""}',
         b'{"do":"take","robot":"' + b"x" * 64 + b'"}',
         b'{"do":"watch","robots":[' + b",".join([b'"a"'] * 17) + b"]}",
         b'{"do":"drawn","robot":"scout1","number":-1}',
@@ -181,8 +184,8 @@ def test_words_become_intents() -> None:
     one = welcomed()
     assert one.heard(b'{"do":"beat","number":7}', 1.0) == BeatRequest(7)
     assert one.heard(b'{"do":"lift","robot":"scout1","number":3}', 1.0) == LiftRequest("scout1", 3)
-    said = b'{"do":"drive","moment":3,"forward":0.5,"right":-1,"speed_rad_s":4}'
-    assert one.heard(said, 1.0) == Steer(3, 0.5, -1.0, 4.0)
+    said = b'{"do":"drive","moment":3,"forward":0.5,"right":-1,"speed":0.5}'
+    assert one.heard(said, 1.0) == Steer(3, 0.5, -1.0, 0.5)
     assert one.heard('{"do":"release"}', 1.0) == ReleaseRequest()
     assert one.heard(b'{"do":"watch","robots":["scout1"]}', 1.0) == Watch(["scout1"])
     setting = one.heard(b'{"do":"set","name":"watch-scout1","parameter":"pause_s","value":[1,"a"]}', 1.0)

@@ -16,7 +16,7 @@ from web_stage import ANYBODY, HEIGHT_PX, HIGH, LOW, RIGHTS, WIDTH_PX, WITHIN_S,
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import CloseCode
 
-from resource_pool.commands import Drive, Halt
+from resource_pool.commands import Halt, Move
 from ui_console.web import login, page_server
 from ui_console.web.login import MAX_MESSAGE_BYTES, Authenticator
 from ui_console.web.page_server import CannotListen
@@ -35,11 +35,11 @@ async def test_who_takes_a_robot_drives_it_and_who_lets_go_stops_it(stage: Stage
         await anna.wait(lambda: anna.is_held, "held")
         assert anna.view["own"]["status"].startswith("you hold scout1")
         for _ in range(6):
-            await anna.drive(forward=1.0, right=0.0, speed_rad_s=4.0)
+            await anna.drive(forward=1.0, right=0.0, speed=0.5)
             await stage.clock.sleep_s(0.05)
         await anna.say(do="stop")
         await stage.placer.wait(lambda: stage.drives() and isinstance(stage.drives()[-1][1], Halt))
-        assert stage.drives()[0][1] == Drive(4.0, 4.0)
+        assert stage.drives()[0][1] == Move(0.05, 0.0)
         await anna.say(do="release")
         await anna.wait(lambda: not anna.view["own"]["is_asked"], "given back")
         [arc] = stage.placer.arcs.values()
@@ -56,7 +56,7 @@ async def test_when_nothing_is_heard_for_a_moment_the_wheels_stop_by_the_servers
     async with stage.browser() as anna:
         await anna.say(do="take", robot="scout1")
         await anna.wait(lambda: anna.is_held, "held")
-        await anna.drive(forward=1.0, right=0.5, speed_rad_s=4.0)
+        await anna.drive(forward=1.0, right=0.5, speed=0.5)
         await stage.placer.wait(lambda: any(isinstance(command, Halt) for _at, command in stage.drives()))
         count = len(stage.drives())
         await stage.clock.sleep_s(0.5)
@@ -75,11 +75,11 @@ async def test_a_press_from_before_a_stop_moves_nothing_after_the_lift(stage: St
         stage.robots["scout1"].free()
         await anna.wait(lambda: not anna.view["own"]["stop"], "free")
         count = len(stage.drives())
-        await anna.say(do="drive", moment=pressed_at, forward=1.0, right=0.0, speed_rad_s=4.0)
-        await anna.say(do="jump", moment=pressed_at)
-        await anna.drive(forward=1.0, right=0.0, speed_rad_s=3.0)
+        await anna.say(do="drive", moment=pressed_at, forward=1.0, right=0.0, speed=0.5)
+        await anna.say(do="give", moment=pressed_at, word="jump", values={}, role="")
+        await anna.drive(forward=1.0, right=0.0, speed=0.25)
         await stage.placer.wait(lambda: len(stage.drives()) > count)
-        assert stage.drives()[count][1] == Drive(3.0, 3.0, after_stop=1), "it was pressed after the lift"
+        assert stage.drives()[count][1] == Move(0.025, 0.0, after_stop=1), "it was pressed after the lift"
 
 
 async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back(stage: Stage) -> None:
@@ -88,7 +88,7 @@ async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back
         await anna.say(do="take", robot="scout1")
         await anna.wait(lambda: anna.is_held, "held")
         [arc] = stage.placer.arcs.values()
-        await anna.drive(forward=1.0, right=0.0, speed_rad_s=4.0)
+        await anna.drive(forward=1.0, right=0.0, speed=0.5)
         await stage.placer.wait(lambda: arc.commands)
         anna.socket.transport.abort()
         await stage.placer.wait(lambda: arc.released)
@@ -230,17 +230,15 @@ async def test_others_do_not_notice_one_that_floods(stage: Stage) -> None:
         await anna.say(do="take", robot="scout1")
         await anna.wait(lambda: anna.is_held, "held")
         await flooder.send(json.dumps({"do": "hello", "token": LOW}))
-        flood = (
-            flooder.send(b'{"do":"drive","moment":0,"forward":1,"right":0,"speed_rad_s":4}') for _ in range(20_000)
-        )
+        flood = (flooder.send(b'{"do":"drive","moment":0,"forward":1,"right":0,"speed":0.5}') for _ in range(20_000))
         with contextlib.suppress(ConnectionClosed):
             await all_in_turn(flood)
         async with asyncio.timeout(WITHIN_S):
             await flooder.wait_closed()
         assert flooder.close_code == CloseCode.POLICY_VIOLATION
         await anna.wait(lambda: anna.has_alarm("ben at 127.0.0.1 sent more than"), "alarm")
-        await anna.drive(forward=1.0, right=0.0, speed_rad_s=3.0)
-        await stage.placer.wait(lambda: any(command == Drive(3.0, 3.0) for _at, command in stage.drives()))
+        await anna.drive(forward=1.0, right=0.0, speed=0.25)
+        await stage.placer.wait(lambda: any(command == Move(0.025, 0.0) for _at, command in stage.drives()))
 
 
 async def test_others_do_not_notice_one_that_stops_reading(stage: Stage) -> None:
@@ -341,7 +339,7 @@ async def test_when_the_page_is_no_longer_in_front_the_wheels_stop_and_alarms_ar
     async with stage.browser() as anna:
         await anna.say(do="take", robot="scout1")
         await anna.wait(lambda: anna.is_held, "held")
-        await anna.drive(forward=1.0, right=0.0, speed_rad_s=4.0)
+        await anna.drive(forward=1.0, right=0.0, speed=0.5)
         await stage.placer.wait(stage.drives)
         await anna.say(do="here", is_there=False)
         await stage.placer.wait(lambda: any(isinstance(command, Halt) for _at, command in stage.drives()))

@@ -12,7 +12,7 @@ import web_browser
 from web_browser import SIZES
 from web_stage import Stage
 
-from resource_pool.commands import Drive, Halt
+from resource_pool.commands import Halt, Move
 
 QUIET_S = 0.6  # twice what the server counts a drive for
 
@@ -23,6 +23,24 @@ const pad = () => ({ connected: true, axes: [1, 0, 0, 0], buttons: buttons() });
 Object.defineProperty(navigator, "getGamepads", { value: () => [pad()] });
 """
 SHOULDER = 5
+
+COVERED = """() => {
+  const ends = [0, document.documentElement.scrollHeight];
+  const controls = [...document.querySelectorAll("button, input, select, [tabindex]")];
+  const isAt = (one, box, share) => {
+    const found = document.elementFromPoint(box.x + box.width / 2, box.y + share * box.height);
+    return found === one || one.contains(found) || found?.contains(one);
+  };
+  return controls.filter((one) => one.checkVisibility() && !one.disabled).flatMap((one) => ends.flatMap((end) => {
+    document.activeElement.blur();
+    scrollTo(0, end);
+    one.focus();
+    const box = one.getBoundingClientRect();
+    const isSeen = [0.2, 0.5, 0.8].some((share) => isAt(one, box, share));
+    return isSeen ? [] : [`${one.id || one.textContent || one.className}, from ${end}`];
+  }));
+}"""
+"""What gets the focus somewhere and cannot be seen there."""
 
 
 @asynccontextmanager
@@ -83,7 +101,7 @@ class Wheels:
         self._seen = len(self._stage.drives(self._robot))
 
     async def wait_turning(self) -> None:
-        await wait_until(lambda: any(isinstance(one, Drive) for one in self.news), "the wheels turn")
+        await wait_until(lambda: any(isinstance(one, Move) for one in self.news), "the wheels turn")
 
     async def wait_halted(self) -> None:
         await wait_until(lambda: self.news and isinstance(self.news[-1], Halt), "the wheels stop")
@@ -92,7 +110,7 @@ class Wheels:
         """Nothing turns them for a while."""
         self.forget()
         await asyncio.sleep(QUIET_S)
-        assert not any(isinstance(one, Drive) for one in self.news), why
+        assert not any(isinstance(one, Move) for one in self.news), why
 
 
 class Key:

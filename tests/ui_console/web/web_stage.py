@@ -5,20 +5,22 @@ from __future__ import annotations
 import asyncio
 import json
 import struct
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 from fake_resource_pool import FakeArc, FakePlacer
+from known_arcs import lit_types, serve_types
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from backbone.addresses import LAUNCHER, RC_MANAGER
+from backbone.addresses import COMPONENT_DATABASE, LAUNCHER, RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
+from backbone.component_database.messages import ComponentType
 from backbone.keys import Conversation
 from backbone.mission_log.log import AskLog, AskPeople, MissionLog, PeopleKnown
 from backbone.naming import Subsystem, address
@@ -157,7 +159,7 @@ class Stage:
         self.port = 0
         self.robots: dict[str, FakeRobot] = {}
         self._network = network
-        self._launchers: list[Bus] = []
+        self._others: list[Bus] = []
 
     @property
     def address(self) -> str:
@@ -171,6 +173,12 @@ class Stage:
             self.robots[name] = FakeRobot(bus, self.clock, name, self._stop_changed)
         self.publish_schedule(**dict.fromkeys(names, ""))
 
+    def know_commands(self, types: Sequence[ComponentType] = ()) -> None:
+        """Add a component database with these types; none: each robot is held with a lamp beside it."""
+        bus = self._network.join(COMPONENT_DATABASE, self.clock)
+        serve_types(bus, types or lit_types("capture"))
+        self._others.append(bus)
+
     def keep_log(self, events: Iterable[StoryEvent]) -> None:
         """Add a launcher that has kept these events."""
         log, bus = MissionLog(), self._network.join(LAUNCHER, self.clock)
@@ -181,7 +189,7 @@ class Stage:
             return log.answer(asked.body) if isinstance(asked.body, AskLog) else PeopleKnown({})
 
         bus.serve(LAUNCHER, AskLog | AskPeople, answer)
-        self._launchers.append(bus)
+        self._others.append(bus)
 
     def _stop_changed(self, latch: StopLatch) -> None:
         """Let the ARCs of a stopped robot refuse commands that move it."""
@@ -193,8 +201,8 @@ class Stage:
                 arc.refusal = refusal if state.is_stopped else None
 
     async def close(self) -> None:
-        for launcher in self._launchers:
-            await launcher.close()
+        for other in self._others:
+            await other.close()
         for robot in self.robots.values():
             await robot.bus.close()
 

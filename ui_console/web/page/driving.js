@@ -179,7 +179,7 @@ export class Driving {
     const wanted = this.wanted();
     if (wanted === null || this.isClogged()) return; // a message that cannot leave now must not arrive late
     const [forward, right] = wanted;
-    this.say({ do: "drive", moment: this.pressedAt, forward, right, speed_rad_s: this.speed() });
+    this.say({ do: "drive", moment: this.pressedAt, forward, right, speed: this.speed() });
   }
 }
 

@@ -3,20 +3,24 @@
 import { find } from "./dom.js";
 import { lasting, set } from "./text.js";
 
+/** @import { Commands } from "./commands.js" */
 /** @import { Driving } from "./driving.js" */
-/** @import { OwnView } from "./messages.d.ts" */
+/** @import { ArcAbilities, OwnView } from "./messages.d.ts" */
 /** @import { Act } from "./types.d.ts" */
 
 const MEMORY = "held";
 
 /** Shows `own` of the view; `act(what, name)` carries out a person's action. */
 export class Hand {
-  /** @param {{ act: Act, driving: Driving }} given */
-  constructor({ act, driving }) {
+  /** @param {{ act: Act, driving: Driving, commands: Commands }} given */
+  constructor({ act, driving, commands }) {
     this.act = act;
     this.driving = driving;
+    this.commands = commands;
     /** @type {OwnView | null} */
     this.own = null;
+    /** @type {ArcAbilities | null} */
+    this.abilities = null;
     this.now_s = 0;
     this.memory = new Memory();
     find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
@@ -24,7 +28,6 @@ export class Hand {
     find("may-i").addEventListener("click", () => act("may_i"));
     find("stop-mine").addEventListener("click", () => act("stop_mine"));
     find("halt").addEventListener("click", () => act("halt"));
-    find("jump").addEventListener("click", () => act("jump"));
     find("consent-yes").addEventListener("click", () => act("consent", "yes"));
     find("consent-no").addEventListener("click", () => act("consent", "no"));
     find("retake").addEventListener("click", () => {
@@ -51,17 +54,33 @@ export class Hand {
   }
 
   get speed() {
-    return Number(find("speed", HTMLInputElement).value);
+    return Number(find("speed", HTMLInputElement).value) / 100;
   }
 
-  /** @param {number} step */
-  change(step) {
-    find("speed", HTMLInputElement).value = String(this.speed + step);
+  /** @param {number} steps */
+  change(steps) {
+    const slider = find("speed", HTMLInputElement);
+    if (steps > 0) slider.stepUp(steps);
+    else slider.stepDown(-steps);
     this.showSpeed();
   }
 
+  /** @param {ArcAbilities | null} abilities */
+  know(abilities) {
+    this.abilities = abilities;
+    this.commands.know(abilities);
+    this.showSpeed();
+    if (this.own !== null) this.driving.turn(this.own.is_held && this.canMove);
+  }
+
+  get canMove() {
+    return this.abilities === null || this.abilities.reach !== null;
+  }
+
   showSpeed() {
-    set(find("speed-shown"), find("speed", HTMLInputElement).value);
+    const most = this.abilities?.reach?.forward_m_s;
+    const there = most === undefined ? "" : ` (${(most * this.speed).toFixed(2)} m/s)`;
+    set(find("speed-shown"), `${find("speed", HTMLInputElement).value} %${there}`);
   }
 
   /**
@@ -75,6 +94,7 @@ export class Hand {
     set(find("own"), this.held ? `You held ${this.held} when the connection ended.` : "Not connected.");
     this.own = null;
     this.driving.turn(false);
+    this.commands.turn(false);
     document.body.dataset.held = "";
     document.body.classList.remove("is-asking");
   }
@@ -90,7 +110,7 @@ export class Hand {
     if (isOther(before, own))
       this.driving.letGo(own.is_held); // a held control was meant for an earlier moment
     else if (own.moment !== before?.moment) this.driving.letGo();
-    this.driving.turn(own.is_held);
+    this.driving.turn(own.is_held && this.canMove);
     if (own.is_asked) this.memory.forget();
     set(find("own"), own.status);
     set(find("taken"), own.taken_because ? `Taken from you: ${own.taken_because}` : "");
@@ -101,7 +121,8 @@ export class Hand {
     find("may-i", HTMLButtonElement).disabled = !own.is_asked || own.is_held;
     find("release", HTMLButtonElement).disabled = !own.is_asked;
     find("take", HTMLButtonElement).disabled = own.is_asked;
-    find("halt", HTMLButtonElement).disabled = find("jump", HTMLButtonElement).disabled = !own.is_held;
+    find("halt", HTMLButtonElement).disabled = !own.is_held;
+    this.commands.turn(own.is_held);
     find("stop-mine").hidden = !own.is_held;
     set(find("stop-mine"), `Stop ${own.robot}`);
     document.body.dataset.held = this.held;

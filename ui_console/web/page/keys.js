@@ -53,12 +53,12 @@ function isStopTaken(key, at) {
 }
 
 /**
- * Returns whether typed keys are written there.
+ * Returns whether typed keys are written there, or are the control's own: the arrows of a command's slider.
  *
  * @param {HTMLElement} element
  */
 export function isText(element) {
-  if (element.isContentEditable || element.tagName === "TEXTAREA") return true;
+  if (element.isContentEditable || element.tagName === "TEXTAREA" || element.dataset?.keys === "own") return true;
   return element.tagName === "INPUT" && !NO_TEXT.includes(/** @type {HTMLInputElement} */ (element).type);
 }
 

@@ -2,6 +2,7 @@
 
 import { Blindness } from "./blind.js";
 import { Cards } from "./cards.js";
+import { Commands } from "./commands.js";
 import { find, queryAll } from "./dom.js";
 import { Driving } from "./driving.js";
 import { Hand } from "./hand.js";
@@ -16,7 +17,7 @@ import { seconds, set } from "./text.js";
 import { followTheme } from "./theme.js";
 
 /** @import { Answer, Heard, Said, View } from "./messages.d.ts" */
-/** @import { Act, LinkChange, Say } from "./types.d.ts" */
+/** @import { Act, LinkChange, More, Say } from "./types.d.ts" */
 
 const TOUCHED_EVERY_MS = 5000; // chosen: far below the two minutes after which the operator counts as away
 /** @type {Partial<View>} */
@@ -46,7 +47,11 @@ const driving = new Driving({
   speed: () => hand.speed,
   moment: () => hand.moment,
 });
-const hand = new Hand({ act, driving });
+const commands = new Commands({
+  root: find("commands", HTMLFieldSetElement),
+  give: (word, values, role) => act("give", word, { values, role }),
+});
+const hand = new Hand({ act, driving, commands });
 const blindness = new Blindness({
   link,
   root: find("blind"),
@@ -99,6 +104,7 @@ function heard(message) {
     document.title = `${mission} – Scout console`;
   }
   if (changes.now_s !== undefined) set(find("clock"), seconds(changes.now_s));
+  if (changes.abilities !== undefined) hand.know(changes.abilities);
   if (changes.own) {
     hand.show(changes.own, view.now_s ?? 0);
     const down_s = changes.own.link_down_s;
@@ -124,7 +130,7 @@ function answered(answer) {
 }
 
 // ---------------------------------------------------------------- the operator's actions
-/** @type {Record<string, (name: string, more: { number?: number, parameter?: string, value?: unknown }) => Said>} */
+/** @type {Record<string, (name: string, more: More) => Said>} */
 const words = {
   take: (name) => ({ do: "take", robot: name }),
   release: () => ({ do: "release" }),
@@ -132,7 +138,7 @@ const words = {
   may_i: () => ({ do: "may_i" }),
   consent: (answer) => ({ do: "decide", is_given: answer === "yes" }),
   dismiss: () => ({ do: "dismiss_lost" }),
-  jump: () => ({ do: "jump", moment: hand.moment }),
+  give: (word, { values = {}, role = "" }) => ({ do: "give", moment: hand.moment, word, values, role }),
   why: (name) => ({ do: "why", name }),
   acknowledge: (key) => ({ do: "acknowledge", key }),
   parameters: (name) => ({ do: "parameters", name }),
@@ -157,6 +163,9 @@ function act(what, name = "", more = {}) {
     case "stop_all":
       driving.letGo();
       stopping.all();
+      return;
+    case "jump":
+      if (!commands.giveByWord("jump")) notice("This robot cannot jump.");
       return;
     case "faster":
       hand.change(1);

@@ -45,10 +45,24 @@ export interface AlarmView {
   keys: string[];
 }
 
+export interface ArcAbilities {
+  reach: Reach | null;
+  can_halt: boolean;
+  commands: RoleCommand[];
+}
+
 export type Certainty =
   | "next"
   | "now"
   | "past";
+
+export interface CommandForm {
+  word: string;
+  fields: FieldForm[];
+  moves: boolean;
+  roles: string[];
+  doc: string;
+}
 
 export interface ComponentState {
   address: string;
@@ -73,6 +87,18 @@ export interface ConsentView {
   others: number;
   topic: string;
   line: string;
+}
+
+export interface FieldForm {
+  name: string;
+  kind: ValueKind;
+  unit: string;
+  least: number;
+  most: number;
+  default: number | boolean | string;
+  is_required: boolean;
+  choices: string[];
+  doc: string;
 }
 
 export interface FoundEvent {
@@ -206,6 +232,11 @@ export interface ParametersAnswer {
   told: boolean;
 }
 
+export interface Reach {
+  forward_m_s: number;
+  turn_rad_s: number;
+}
+
 export interface RefusedAnswer {
   refused: string;
 }
@@ -254,6 +285,13 @@ export interface RobotView {
   lease_age_s: number;
   because: string;
   video: VideoView | null;
+}
+
+export interface RoleCommand {
+  role: string;
+  title: string;
+  form: CommandForm;
+  labels: string[];
 }
 
 export interface SetAnswer {
@@ -310,6 +348,13 @@ export interface TimelineView {
   rows: TimelineRow[];
 }
 
+export type ValueKind =
+  | "flag"
+  | "number"
+  | "other"
+  | "text"
+  | "whole";
+
 export interface VideoView {
   robot: string;
   age_s: number;
@@ -321,6 +366,7 @@ export interface VideoView {
 export interface View {
   welcome: Welcomed;
   own: OwnView;
+  abilities: ArcAbilities | null;
   robots: RobotView[];
   links: LinkView[];
   alarms: AlarmView[];
@@ -372,6 +418,14 @@ export interface Drawn {
   number: number;
 }
 
+export interface GiveRequest {
+  do: "give";
+  moment: number;
+  word: string;
+  values: Record<string, number | number | boolean | string>;
+  role: string;
+}
+
 export interface Hello {
   do: "hello";
   token: string;
@@ -383,11 +437,6 @@ export interface Hello {
 export interface Here {
   do: "here";
   is_there: boolean;
-}
-
-export interface JumpOnce {
-  do: "jump";
-  moment: number;
 }
 
 export interface LiftRequest {
@@ -439,7 +488,7 @@ export interface Steer {
   moment: number;
   forward: number;
   right: number;
-  speed_rad_s: number;
+  speed: number;
 }
 
 export interface StopAllRequest {
@@ -485,7 +534,7 @@ export type Said =
   | BeatRequest
   | Steer
   | StopWheels
-  | JumpOnce
+  | GiveRequest
   | TakeOver
   | ReleaseRequest
   | MayI

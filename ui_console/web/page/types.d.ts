@@ -6,7 +6,16 @@ import type { Said } from "./messages.d.ts";
 export type Say = (message: Said) => boolean;
 
 /** Does what a person wants. */
-export type Act = (what: string, name?: string, more?: { number?: number; parameter?: string; value?: unknown }) => void;
+export type Act = (what: string, name?: string, more?: More) => void;
+
+/** What some actions need besides a name. */
+export interface More {
+  number?: number;
+  parameter?: string;
+  value?: unknown;
+  values?: Record<string, string | number | boolean>;
+  role?: string;
+}
 
 /** A picture as it came. */
 export interface Picture {

@@ -1,0 +1,38 @@
+"""A component database that knows kinds of ARC, so that consoles know what their operators can do with these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from backbone.addresses import COMPONENT_DATABASE
+from backbone.bus.interface import Bus
+from backbone.component.component import Component
+from backbone.component_database.messages import ComponentType, ListTypes, TypeCount, Types
+from backbone.naming import Subsystem
+from backbone.wire import Envelope, Message
+from resource_pool.arcs.skeleton import LitDriveArc
+from resource_pool.rcs.scout import Scout
+from resource_pool.rcs.skeleton import Lamp
+
+
+def lit_types(name: str) -> list[ComponentType]:
+    """Return the types of a robot with a lamp; its kind of ARC has this name."""
+    made: list[tuple[str, type[Component], dict[str, str]]] = [  # type: ignore[type-arg]  of any parameters
+        ("scout", Scout, {}),
+        ("lamp", Lamp, {}),
+        (name, LitDriveArc, LitDriveArc.kinds()),
+    ]
+    return [
+        ComponentType(kind, "x:Y", Subsystem.RESOURCE_POOL, needs=needs, abilities=cls.abilities())
+        for kind, cls, needs in made
+    ]
+
+
+def serve_types(bus: Bus, types: Sequence[ComponentType]) -> None:
+    """Answer as the component database on this bus."""
+
+    async def answer(_asked: Envelope[Message]) -> Message:
+        return Types([TypeCount(one, 1) for one in types])
+
+    bus.serve(COMPONENT_DATABASE, ListTypes, answer)
+    bus.declare_alive(COMPONENT_DATABASE)

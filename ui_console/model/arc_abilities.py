@@ -1,0 +1,140 @@
+"""What an operator can do with a kind of ARC: how fast its body moves, and which commands it takes. Pure.
+
+Consoles draw stick, buttons, sliders and switches from it. An ARC declares its commands with the roles of the RCs that
+obey them; the limits of each field are those of the RC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+
+from backbone.component.abilities import CommandForm, FieldForm, ValueKind
+from backbone.component_database.messages import ComponentType
+from ui_console.model.fields import label_of
+
+MOVE, HALT = "move", "halt"
+BY_STICK = frozenset({MOVE, "drive", HALT})
+"""Words of the commands that stick, pad and keys send; all others get a button."""
+
+
+class Reach(msgspec.Struct, frozen=True):
+    """Most that a stick asks of a body.
+
+    Attributes:
+        forward_m_s: Forward speed at full stick.
+        turn_rad_s: Turn rate on the spot, as fast as the body can.
+    """
+
+    forward_m_s: float
+    turn_rad_s: float
+
+
+SLOW = Reach(0.1, 1.0)  # chosen: of a robot whose limits are not known: a person steps aside in time
+
+
+class RoleCommand(msgspec.Struct, frozen=True):
+    """A command for the RC of one role, with that RC's limits.
+
+    Attributes:
+        role: Role of the RC that obeys it.
+        title: For people: its words, and the role if several RCs of the ARC obey it.
+        form: Its fields, without those that a person cannot be asked for.
+        labels: Of the fields, with range and unit, for people.
+    """
+
+    role: str
+    title: str
+    form: CommandForm
+    labels: list[str]
+
+
+class ArcAbilities(msgspec.Struct, frozen=True):
+    """What an operator can do with an ARC.
+
+    Attributes:
+        reach: Most speeds of its body; None: it cannot move.
+        can_halt: True if it takes a command to halt.
+        commands: Commands that a person can give, without those of the stick, in the order of their declaration.
+    """
+
+    reach: Reach | None
+    can_halt: bool
+    commands: list[RoleCommand]
+
+    def takes(self, word: str) -> bool:
+        """Return whether a person can give this command."""
+        return any(command.form.word == word for command in self.commands)
+
+    def moves(self, word: str) -> bool:
+        """Return whether a stopped robot refuses this command; True if the ARC does not declare the command."""
+        forms = [command.form for command in self.commands if command.form.word == word]
+        return not forms or any(form.moves for form in forms)
+
+
+def arc_abilities(kind: str, types: Sequence[ComponentType]) -> ArcAbilities | None:
+    """Return what an operator can do with this kind of ARC; None: the mission has no such kind.
+
+    Example:
+        >>> arc_abilities("drive", []) is None
+        True
+    """
+    by_name = {one.name: one for one in types}
+    arc = by_name.get(kind)
+    if arc is None:
+        return None
+    declared = arc.abilities.commands
+    commands = [
+        _asked(role, _title(form, role), _limited(arc, form, role, by_name))
+        for form in declared
+        for role in form.roles
+        if form.word not in BY_STICK and not any(_is_odd(field) and field.is_required for field in form.fields)
+    ]
+    return ArcAbilities(_reach(arc, by_name), any(form.word == HALT for form in declared), commands)
+
+
+def _asked(role: str, title: str, form: CommandForm) -> RoleCommand:
+    fields = [field for field in form.fields if not _is_odd(field)]
+    asked = msgspec.structs.replace(form, fields=fields)
+    return RoleCommand(role, title, asked, [label_of(field) for field in fields])
+
+
+def _is_odd(field: FieldForm) -> bool:
+    """Return whether a person cannot be asked for this field."""
+    return field.kind is ValueKind.OTHER
+
+
+def _title(form: CommandForm, role: str) -> str:
+    words = form.word.replace("_", " ")
+    return f"{words} ({role})" if len(form.roles) > 1 else words
+
+
+def _limited(arc: ComponentType, form: CommandForm, role: str, by_name: dict[str, ComponentType]) -> CommandForm:
+    """Return the form as the RC of this role declares it; the ARC's own if the RC's type is unknown."""
+    rc = by_name.get(arc.needs.get(role, ""))
+    own = [one for one in rc.abilities.commands if one.word == form.word] if rc is not None else []
+    return own[0] if own else form
+
+
+def _reach(arc: ComponentType, by_name: dict[str, ComponentType]) -> Reach | None:
+    """Return the limits of ``move``; ``SLOW`` for a field whose limit the body's RC does not declare."""
+    body = arc.abilities.body
+    declared = [form for form in arc.abilities.commands if form.word == MOVE and body in form.roles]
+    if not declared:
+        return None
+    form, limited = declared[0], _limited(arc, declared[0], body, by_name)
+    forward, turn = (_most(form, limited, field) for field in ("forward_m_s", "turn_rad_s"))
+    return Reach(SLOW.forward_m_s if forward is None else forward, SLOW.turn_rad_s if turn is None else turn)
+
+
+def _most(form: CommandForm, limited: CommandForm, field: str) -> float | None:
+    """Return the largest value of a field as the RC limits it; None: it does not, the field's type does."""
+    of_type, of_rc = _field(form, field), _field(limited, field)
+    if of_rc is None or (of_type is not None and of_rc.most >= of_type.most):
+        return None
+    return max(0.0, of_rc.most)
+
+
+def _field(form: CommandForm, name: str) -> FieldForm | None:
+    return next((field for field in form.fields if field.name == name), None)
