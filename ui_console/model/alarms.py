@@ -30,6 +30,7 @@ SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.UNSAFE: Severity.ALARM,
     AlarmKind.RC_DOWN: Severity.ALARM,
     AlarmKind.LINK: Severity.ALARM,
+    AlarmKind.BATTERY: Severity.WARNING,
     AlarmKind.STALE_VIDEO: Severity.WARNING,
     AlarmKind.STARVING: Severity.WARNING,
     AlarmKind.DEADLINE: Severity.WARNING,

@@ -22,7 +22,7 @@ from backbone.picture.words import why_lost
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
-from resource_pool.arc_client import StopState, Suspended
+from resource_pool.arc_client import Readings, StopState, Suspended
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import Settled, Sought, Topic
 
@@ -230,6 +230,7 @@ Said = (
     | ProcessFell
     | HostLoad
     | StopState
+    | Readings
     | MissionTime
     | Statistics
     | MissionHealth

@@ -15,8 +15,9 @@ from backbone.picture.mission import MissionPicture
 from backbone.picture.words import because
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import RcView, RequestView, Schedule
-from resource_pool.arc_client import Stopper, StopState
+from resource_pool.arc_client import Readings, Stopper, StopState
 from ui_console.model.alarms import AlarmBook
+from ui_console.model.gauges import LOW_BATTERY, battery_of, gauges
 from ui_console.model.lifting import author_name, authors, is_own, lift_line
 from ui_console.model.link_board import LinkBoard
 from ui_console.model.views import LEAVING, NONE_S, AlarmKind, RobotView, StopView
@@ -36,6 +37,7 @@ class RobotBoard:
         self._picture, self._alarms, self._links, self._lift_remedy = picture, alarms, links, lift_remedy
         self._renewed: dict[tuple[str, str, int], float] = {}
         self._stops: dict[str, StopState] = {}
+        self._readings: dict[str, Readings] = {}
 
     # ------------------------------------------------------------------ messages in
     def take_schedule(self, schedule: Schedule) -> None:
@@ -63,6 +65,17 @@ class RobotBoard:
             self._alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, self._lift_remedy)
         else:
             self._alarms.retract(AlarmKind.STOPPED, stop.rc)  # the log names who lifted it; nothing is left to do
+
+    def take_readings(self, readings: Readings, at_s: float) -> None:
+        """Take in what a robot reports; a low battery is an alarm until it is charged or silent."""
+        known = self._readings.get(readings.rc)
+        if readings.at_s < 0 or (known is not None and known.at_s > readings.at_s):
+            return
+        self._readings[readings.rc] = readings
+        battery = battery_of(readings)
+        is_low = battery is not None and battery < LOW_BATTERY
+        line = f"the battery of {readings.rc} is low: {battery or 0.0:.0%}"
+        self._alarms.hold(is_low, AlarmKind.BATTERY, readings.rc, line, at_s, "Bring it back while it can drive.")
 
     # ------------------------------------------------------------------ views out
     def views(self, now_s: float) -> list[RobotView]:
@@ -110,6 +123,7 @@ class RobotBoard:
 
     def _robot(self, rc: RcView, number: int, requests: Mapping[str, RequestView], now_s: float) -> RobotView:
         component = self._picture.components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
+        readings = self._readings.get(rc.rc)
         waiting = [self._picture.people.person(requests[arc].owner) for arc in rc.next if arc in requests]
         free = RobotView(
             rc.rc,
@@ -118,6 +132,8 @@ class RobotBoard:
             waiting,
             self.stop_view(rc.rc, now_s),
             self._picture.people.named(component.feedback) if component is not None else "",
+            gauges=gauges(readings) if readings is not None else [],
+            reported_age_s=max(0.0, now_s - readings.at_s) if readings is not None else NONE_S,
         )
         if not rc.holders:
             return free

@@ -37,7 +37,7 @@ from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule, Why
 from backbone.spoken import value_text
-from resource_pool.arc_client import StopState, Suspended
+from resource_pool.arc_client import Readings, StopState, Suspended
 from ui_console.model.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.model.events import LinkHeard, Said, TeamEvent
 from ui_console.model.health_board import HealthBoard
@@ -118,6 +118,8 @@ class TeamModel:
                 self.links.take_load(said, at_s)
             case StopState():
                 self.robots.take_stop(said, at_s)
+            case Readings():
+                self.robots.take_readings(said, at_s)
             case Statistics():
                 self.links.take_counts(component_of(source), said.values, at_s)
             case MissionTime():

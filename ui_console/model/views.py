@@ -15,6 +15,7 @@ from backbone.creator.messages import HostLoad
 from backbone.scheduling.views import RequestView
 from backbone.wire import plain
 from ui_console.model.arc_abilities import ArcAbilities
+from ui_console.model.gauges import GaugeView
 from ui_console.model.timeline import TimelineView
 
 NONE_S = -1.0
@@ -41,6 +42,7 @@ class AlarmKind(StrEnum):
     UNSAFE = "unsafe"  # an RC did not reach its safe state
     RC_DOWN = "rc_down"  # the RC manager cannot reach an RC
     LINK = "link"  # this console has no link to the hub
+    BATTERY = "battery"  # the battery of a robot is low
     STALE_VIDEO = "stale_video"  # the picture the operator drives by is old
     STARVING = "starving"  # a request waits long and no end is in sight
     DEADLINE = "deadline"  # packets on a radio come too late
@@ -115,6 +117,8 @@ class RobotView(msgspec.Struct, frozen=True):
         waiting: Decision processes that wait for it, the next first.
         stop: The operator's stop in force; None: it may move.
         video: Its pictures; None: this console gets none.
+        gauges: What it reports, shares first; empty: nothing.
+        reported_age_s: Age of that.
         feedback: Feedback of its RC.
     """
 
@@ -136,6 +140,8 @@ class RobotView(msgspec.Struct, frozen=True):
     lease_age_s: float = NONE_S
     because: str = ""
     video: VideoView | None = None
+    gauges: list[GaugeView] = []
+    reported_age_s: float = NONE_S
 
 
 class NodeState(StrEnum):

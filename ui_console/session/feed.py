@@ -42,7 +42,7 @@ from backbone.picture.reasons import reasons_for
 from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
-from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
+from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_readings, watch_stops
 from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said, failed
 
 log = logging.getLogger(__name__)
@@ -95,6 +95,7 @@ class ConsoleFeed:
         bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_nameserver)
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard, latest=True)
         watch_stops(bus, self._hear)
+        watch_readings(bus, self._hear)
         bus.watch_link(self._heard_link)
 
     async def run(self) -> None:

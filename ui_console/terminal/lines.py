@@ -33,6 +33,7 @@ NODE_MARKS = {
 ALARM_STYLES = {views.Severity.ALARM: "bold red", views.Severity.WARNING: "yellow", views.Severity.NOTICE: "cyan"}
 BUSY_CPU = 0.8  # chosen: from here on a host's load is shown in yellow
 NAME_COLUMNS = 10
+REPORTED_S = 60.0  # chosen: a robot without a holder reports nothing, and its battery loses little in a minute
 BEYOND_S = 1.0  # chosen: a slice that ends now is not beyond it yet
 HANG = 2  # chosen: the second line of a row is set off from the next row
 LEAST_COLUMNS = 12  # chosen: below, no line is worth folding
@@ -189,6 +190,8 @@ def _robot_facts(robot: views.RobotView, now_s: float) -> Iterator[str]:
         yield robot.stop.reason or f"since {robot.stop.age_s:.0f} s"
     if robot.holder and robot.until_s >= 0:
         yield from _slice_end(robot.until_s, now_s)
+    if robot.gauges and 0 <= robot.reported_age_s <= REPORTED_S:
+        yield from (f"{gauge.name} {gauge.text}" for gauge in robot.gauges if gauge.share >= 0)
     if robot.waiting:
         yield "then " + ", ".join(robot.waiting)
     if robot.holder:

@@ -117,6 +117,9 @@ export class Cards {
   }
 }
 
+/** A robot without a holder reports nothing, and its battery loses little in a minute. */
+const REPORTED_S = 60;
+
 class Card {
   /** @param {{ name: string, act: Act, drawn: (number: number) => void }} given */
   constructor({ name, act, drawn }) {
@@ -145,8 +148,9 @@ class Card {
     this.state = make("span", "state");
     top.append(title, this.state);
     this.holder = make("p", "holder");
+    this.gauges = make("p", "gauges");
     this.take = this.button("Take over", "take");
-    this.root.append(this.screen.root, top, this.holder, this.makeButtons());
+    this.root.append(this.screen.root, top, this.holder, this.gauges, this.makeButtons());
   }
 
   makeEnlarge() {
@@ -193,6 +197,9 @@ class Card {
     const next = robot.waiting.length ? `; next: ${robot.waiting[0]}` : "";
     const who = robot.is_mine ? "you" : robot.holder;
     set(this.holder, who ? `${who}: ${robot.feedback || robot.because}${next}` : robot.feedback + next);
+    const isReported = robot.reported_age_s >= 0 && robot.reported_age_s <= REPORTED_S;
+    const shares = isReported ? robot.gauges.filter((gauge) => gauge.share >= 0) : [];
+    set(this.gauges, shares.map((gauge) => `${gauge.name} ${gauge.text}`).join(", "));
     const isWanted = own.is_asked && own.robot === this.name;
     set(this.take, robot.is_mine ? "Yours" : isWanted ? "Waiting…" : "Take over");
     this.take.disabled = robot.is_mine || isWanted === true;

@@ -11,6 +11,7 @@ export interface Absence {
 
 export type AlarmKind =
   | "absent"
+  | "battery"
   | "deadline"
   | "link"
   | "lost"
@@ -110,6 +111,12 @@ export interface FoundEvent {
   where: string;
   cause: string;
   time: string;
+}
+
+export interface GaugeView {
+  name: string;
+  text: string;
+  share: number;
 }
 
 export interface HealthView {
@@ -285,6 +292,8 @@ export interface RobotView {
   lease_age_s: number;
   because: string;
   video: VideoView | null;
+  gauges: GaugeView[];
+  reported_age_s: number;
 }
 
 export interface RoleCommand {
