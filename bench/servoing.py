@@ -16,7 +16,7 @@ import numpy as np
 from measuring import percentile, report
 from numpy.typing import NDArray
 
-from mission_control.vision.servo_law import HALT, STOP_M, Command, Stage
+from mission_control.vision.servo_law import HALT, STOP_M, SpeedCommand, Stage
 from mission_control.vision.visual_servo import VisualServo
 from scout_model.camera import Camera
 from scout_model.description import CLEAN_AIR, AirDescription, Landmark, RobotPlace, WorldDescription
@@ -66,7 +66,7 @@ def run(seed: int, air: AirDescription, *, limit_s: float = LIMIT_S) -> Trial:
     place = RobotPlace("scout", 1, BOARD.x_m - ahead_m, BOARD.y_m + left_m, float(rng.uniform(-math.pi, math.pi)))
     world = World(WorldDescription(*ROOM_M, seed=seed, robots=[place], landmarks=[BOARD]))
     receiver, servo = Receiver(seed, "A", air), VisualServo()
-    sent: list[Command] = [HALT] * LATENCY_FRAMES
+    sent: list[SpeedCommand] = [HALT] * LATENCY_FRAMES
     frames = tracked = 0
     step = None
     with Camera(world.mjcf, "paint") as camera:

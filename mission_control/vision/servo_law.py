@@ -56,7 +56,7 @@ class Stage(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class SpeedCommand:
     """Command to the robot until the next one.
 
     Attributes:
@@ -68,18 +68,18 @@ class Command:
     turn_rad_s: float
 
 
-HALT = Command(0.0, 0.0)
+HALT = SpeedCommand(0.0, 0.0)
 
 
 def _clip(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
 
 
-def slewed(wanted: Command, last: Command, elapsed_s: float) -> Command:
+def slewed(wanted: SpeedCommand, last: SpeedCommand, elapsed_s: float) -> SpeedCommand:
     """Return the command nearest to the wanted one that the body follows without a jerk."""
     forward_m_s = last.forward_m_s + _clip(wanted.forward_m_s - last.forward_m_s, SPEED_SLEW_M_S2 * elapsed_s)
     turn_rad_s = last.turn_rad_s + _clip(wanted.turn_rad_s - last.turn_rad_s, TURN_SLEW_RAD_S2 * elapsed_s)
-    return Command(forward_m_s, turn_rad_s)
+    return SpeedCommand(forward_m_s, turn_rad_s)
 
 
 def bearing_limit_rad(range_m: float) -> float:
@@ -93,7 +93,7 @@ def bearing_limit_rad(range_m: float) -> float:
     return math.atan(max(0.0, min(BEARING_SHARE * HALF_VIEW_PX, HALF_VIEW_PX - half_target_px)) / FOCAL_PX)
 
 
-def steer(pose: TargetPose, stage: Stage, last: Command, elapsed_s: float, stop_m: float = STOP_M) -> Command:
+def steer(pose: TargetPose, stage: Stage, last: SpeedCommand, elapsed_s: float, stop_m: float = STOP_M) -> SpeedCommand:
     """Return the next command.
 
     Args:
@@ -122,7 +122,7 @@ def steer(pose: TargetPose, stage: Stage, last: Command, elapsed_s: float, stop_
     speed_m_s *= max(0.0, 1.0 - abs(error_rad) / STRAIGHT_RAD)
     # Driving past the target turns it aside by itself; the second term keeps up with that.
     turn_rad_s = BEARING_GAIN_HZ * error_rad + speed_m_s * math.sin(pose.bearing_rad) / max(pose.range_m, 0.1)
-    return slewed(Command(speed_m_s, _clip(turn_rad_s, TURN_RAD_S)), last, elapsed_s)
+    return slewed(SpeedCommand(speed_m_s, _clip(turn_rad_s, TURN_RAD_S)), last, elapsed_s)
 
 
 def has_arrived(pose: TargetPose, stop_m: float = STOP_M) -> bool:
@@ -168,7 +168,7 @@ class Approach:
         self._last = HALT
         self._search()
 
-    def step(self, phase: TrackingPhase, pose: TargetPose | None, elapsed_s: float) -> Command:
+    def step(self, phase: TrackingPhase, pose: TargetPose | None, elapsed_s: float) -> SpeedCommand:
         """Return the next command.
 
         Args:
@@ -187,7 +187,7 @@ class Approach:
         self._last = steer(pose, self.stage, self._last, elapsed_s, self._stop_m)
         return self._last
 
-    def _blind(self, phase: TrackingPhase, elapsed_s: float) -> Command:
+    def _blind(self, phase: TrackingPhase, elapsed_s: float) -> SpeedCommand:
         """Stop; after a while without the target, turn step by step and look."""
         self._steady_frames = 0
         self._unseen_s += elapsed_s
@@ -199,7 +199,7 @@ class Approach:
         if self._unseen_s % (LOOK_S + turning_s) < LOOK_S:
             return slewed(HALT, self._last, elapsed_s)
         self.searched_rad += SEARCH_TURN_RAD_S * elapsed_s
-        return slewed(Command(0.0, self._side * SEARCH_TURN_RAD_S), self._last, elapsed_s)
+        return slewed(SpeedCommand(0.0, self._side * SEARCH_TURN_RAD_S), self._last, elapsed_s)
 
     def _count_steady(self) -> None:
         is_still = abs(self._last.forward_m_s) < 0.02 and abs(self._last.turn_rad_s) < 0.05

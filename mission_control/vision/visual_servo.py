@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from mission_control.vision.landmark import Picture
 from mission_control.vision.pose_filter import PoseFilter
-from mission_control.vision.servo_law import STOP_M, Approach, Command, Stage
+from mission_control.vision.servo_law import STOP_M, Approach, SpeedCommand, Stage
 from mission_control.vision.skeleton_tracking import TargetTracker, Track
 from mission_control.vision.target_pose import TargetPose
 
@@ -30,7 +30,7 @@ class ServoStep:
         pose: Where the robot stands, None as long as the target is not in sight.
     """
 
-    command: Command
+    command: SpeedCommand
     stage: Stage
     track: Track
     pose: TargetPose | None
@@ -57,7 +57,7 @@ class VisualServo:
         self._filter = PoseFilter()
         self._approach = Approach(stop_m)
         self._latency_s = latency_s
-        self._sent: deque[tuple[float, Command]] = deque()
+        self._sent: deque[tuple[float, SpeedCommand]] = deque()
         self._now_s = 0.0
         self._is_fresh = True
 

@@ -66,7 +66,7 @@ class NoRadio(Refusal):
 P = TypeVar("P", bound=RobotParameters)
 
 
-class Robot(ResourceController[P], Generic[P]):
+class RobotRc(ResourceController[P], Generic[P]):
     """Encodes commands as packets of the robot's protocol; the radio sends them at the ARC's rate.
 
     Derive, set ``commands``, and ``reports`` if the protocol is a ``ReplyReader``, and override ``obey``; a command

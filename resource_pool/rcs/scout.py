@@ -13,7 +13,7 @@ from backbone.errors import Refusal
 from resource_pool.commands import Command, Drive, Halt, Jump, Move, SwitchTransmitter
 from resource_pool.drivers.interface import ScoutProtocol, ScoutReports
 from resource_pool.holds import Hold
-from resource_pool.rcs.robot import Robot, RobotParameters
+from resource_pool.rcs.robot import RobotParameters, RobotRc
 from scout_model.dimensions import TRACK_M, WHEEL_RADIUS_M, WHEEL_SPEED_LIMIT_RAD_S
 from scout_model.scout import wheels_rad_s
 
@@ -28,7 +28,7 @@ class NotFinite(Refusal):
     remedy = "Send finite wheel speeds; those beyond the motor's limit are clipped."
 
 
-class Scout(Robot[RobotParameters]):
+class Scout(RobotRc[RobotParameters]):
     """Two wheels and a spring foot."""
 
     body_class = "scout_model.scout:Scout"

@@ -98,7 +98,7 @@ class Remove:
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class Relocate:
     """Move an element; ``at`` is its number among its siblings afterwards."""
 
     path: Path
@@ -133,5 +133,15 @@ class Rename:
 
 
 Command = (
-    Add | AddType | AddBehavior | ClaimArc | AddResource | AddWorld | Remove | Move | SetValue | WriteParameter | Rename
+    Add
+    | AddType
+    | AddBehavior
+    | ClaimArc
+    | AddResource
+    | AddWorld
+    | Remove
+    | Relocate
+    | SetValue
+    | WriteParameter
+    | Rename
 )

@@ -29,7 +29,7 @@ from ui_console.design.commands import (
     Command,
     DesignRefused,
     ElementNameTaken,
-    Move,
+    Relocate,
     Remove,
     Rename,
     SetValue,
@@ -76,7 +76,7 @@ def carry_out(step: TextState, command: Command) -> TextState:
             return _add_world(step.text, command)
         case Remove(path):
             return _remove(step.text, path)
-        case Move(path, parent, at):
+        case Relocate(path, parent, at):
             return _move(step.text, path, parent, at)
         case SetValue(path, attribute, value):
             return TextState(set_attribute(step.text, path, attribute, value), path)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from ui_console.model.arc_abilities import Reach
-from ui_console.model.grip import Grip
+from ui_console.model.grip import ControlGrip
 
 FIRST_HOLD_S = 0.5  # chosen: bridges the pause of usual keyboards before they repeat; a press moves 0.5 s at most
 KEYS_LET_GO_S = 0.7  # chosen: a longer pause than keyboards make before they repeat (X: 0.66 s), so a hand let go
@@ -187,7 +187,7 @@ class DeadMan:
         self._pressed_s = self._until_s = self._next_s = 0.0
         self._repeats = 0
         self._must_halt = False
-        self._keys, self._stick, self._once = Grip(), Grip(), Grip()
+        self._keys, self._stick, self._once = ControlGrip(), ControlGrip(), ControlGrip()
 
     # ------------------------------------------------------------------ controls
     def press(self, drive: Motion, now_s: float, lasts_s: float | None = None) -> bool:
@@ -266,5 +266,5 @@ class DeadMan:
         return max((at_s for grip in self._grips if (at_s := grip.let_go_s) is not None), default=None)
 
     @property
-    def _grips(self) -> tuple[Grip, Grip, Grip]:
+    def _grips(self) -> tuple[ControlGrip, ControlGrip, ControlGrip]:
         return self._keys, self._stick, self._once

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 
-class Grip:
+class ControlGrip:
     """One control of an operator.
 
     Laws: after ``require_let_go`` no press counts until the control was let go; the release is reported, or is a

@@ -11,7 +11,7 @@ from resource_pool.devices.pan_camera.body import MOST_PAN_RAD, encode_look
 from resource_pool.drivers.interface import HardwareFault
 from resource_pool.drivers.simulated import SimulatedRobotProtocol
 from resource_pool.holds import Hold
-from resource_pool.rcs.robot import Robot, RobotParameters
+from resource_pool.rcs.robot import RobotParameters, RobotRc
 
 
 class Look(Command, frozen=True):
@@ -42,7 +42,7 @@ class FixedProtocol(PanProtocol):
         raise HardwareFault(f"{self._site.resource} is fixed", remedy="Command the camera that pans.")
 
 
-class VideoCamera(Robot[RobotParameters]):
+class VideoCamera(RobotRc[RobotParameters]):
     """A camera with transmitter, reached through a command radio like a robot."""
 
     commands = Look | Halt | SwitchTransmitter

@@ -14,7 +14,7 @@ from resource_pool.commands import Command, Halt, Move, SwitchTransmitter, clipp
 from resource_pool.drivers.interface import MalformedReply
 from resource_pool.drivers.simulated import SimulatedRobotProtocol
 from resource_pool.holds import Hold
-from resource_pool.rcs.robot import Robot, RobotParameters
+from resource_pool.rcs.robot import RobotParameters, RobotRc
 from resource_pool.robots.rover.body import TOP_M_S, TOP_RAD_S
 from resource_pool.robots.rover.link import GripPacket, MovePacket, StopPacket, encode
 from resource_pool.robots.rover.report import RoverReport, report_of
@@ -54,7 +54,7 @@ class RoverProtocol(SimulatedRobotProtocol):
             raise MalformedReply(str(error)) from error
 
 
-class Rover(Robot[RobotParameters]):
+class RoverRc(RobotRc[RobotParameters]):
     """Two wheels and a gripper."""
 
     commands = Move | Halt | Grip | SwitchTransmitter

@@ -27,7 +27,7 @@ from resource_pool.drivers.interface import DriverSite, MalformedReply
 from resource_pool.drivers.simulated import SimulatedRobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.messages import DEFAULT_DRIVE_USAGE
-from resource_pool.rcs.robot import Robot, RobotParameters
+from resource_pool.rcs.robot import RobotParameters, RobotRc
 from resource_pool.robots.walker.gait import MAX_FORWARD_M_S, MAX_TURN_RAD_S, TROT, WALK, TrunkSpeed, clip
 from resource_pool.robots.walker.link import Angles, JointTargets, encode_joint_targets
 from resource_pool.robots.walker.motion import STEP_S, MotionControl, StateOfMotion
@@ -83,7 +83,7 @@ class _Walk:
     order: Move
 
 
-class Walker(Robot[WalkerParameters]):
+class WalkerRc(RobotRc[WalkerParameters]):
     """Four legs, twelve servos, and the motion control that moves them."""
 
     parameters_type = WalkerParameters

@@ -23,7 +23,7 @@ from mission_control.vision.servo_law import (
     TURN_RAD_S,
     TURN_SLEW_RAD_S2,
     Approach,
-    Command,
+    SpeedCommand,
     Stage,
     back_off_to_m,
     bearing_limit_rad,
@@ -37,7 +37,7 @@ from mission_control.vision.target_pose import TargetPose
 FRAME_S = 1 / 30
 HALF_VIEW_RAD = math.atan(HALF_VIEW_PX / FOCAL_PX)
 stages = st.sampled_from(list(Stage))
-commands = st.builds(Command, st.floats(-SPEED_M_S, SPEED_M_S), st.floats(-TURN_RAD_S, TURN_RAD_S))
+commands = st.builds(SpeedCommand, st.floats(-SPEED_M_S, SPEED_M_S), st.floats(-TURN_RAD_S, TURN_RAD_S))
 places = st.tuples(st.floats(0.3, 2.5), st.floats(-60.0, 60.0), st.floats(-20.0, 20.0))
 
 
@@ -54,7 +54,7 @@ class Robot:
         self.stages: list[Stage] = []
         self.lost = 0
 
-    def step(self) -> Command:
+    def step(self) -> SpeedCommand:
         half_target_rad = math.atan(0.08 / max(self.pose.ahead_m, 0.01))
         is_seen = abs(self.pose.bearing_rad) + half_target_rad * math.cos(self.pose.off_axis_rad) < HALF_VIEW_RAD
         self.lost += not is_seen and bool(self.stages) and self.stages[-1] is not Stage.SEARCHING
@@ -71,7 +71,7 @@ class Robot:
 
 @given(place=places, stage=stages, last=commands, elapsed_s=st.floats(0.0, 0.5))
 def test_a_command_is_within_the_limits_and_follows_the_last_without_a_jerk(
-    place: tuple[float, float, float], stage: Stage, last: Command, elapsed_s: float
+    place: tuple[float, float, float], stage: Stage, last: SpeedCommand, elapsed_s: float
 ) -> None:
     command = steer(at(*place), stage, last, elapsed_s)
     assert abs(command.forward_m_s) <= SPEED_M_S
@@ -82,18 +82,18 @@ def test_a_command_is_within_the_limits_and_follows_the_last_without_a_jerk(
 
 @given(place=places, stage=stages, last=commands)
 def test_on_the_other_side_it_steers_the_other_way(
-    place: tuple[float, float, float], stage: Stage, last: Command
+    place: tuple[float, float, float], stage: Stage, last: SpeedCommand
 ) -> None:
     range_m, off_axis, bearing = place
     here = steer(at(range_m, off_axis, bearing), stage, last, FRAME_S)
-    mirrored = Command(last.forward_m_s, -last.turn_rad_s)
+    mirrored = SpeedCommand(last.forward_m_s, -last.turn_rad_s)
     there = steer(at(range_m, -off_axis, -bearing), stage, mirrored, FRAME_S)
     assert there.forward_m_s == pytest.approx(here.forward_m_s, abs=1e-9)
     assert there.turn_rad_s == pytest.approx(-here.turn_rad_s, abs=1e-9)
 
 
 @given(last=commands, wanted=commands)
-def test_a_wanted_command_is_reached_and_kept(last: Command, wanted: Command) -> None:
+def test_a_wanted_command_is_reached_and_kept(last: SpeedCommand, wanted: SpeedCommand) -> None:
     for _ in range(60):
         last = slewed(wanted, last, FRAME_S)
     assert last == wanted

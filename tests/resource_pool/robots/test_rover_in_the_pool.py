@@ -29,7 +29,7 @@ from resource_pool.robots.rover.link import (
     decode,
     encode_reply,
 )
-from resource_pool.robots.rover.rc import Grip, Rover
+from resource_pool.robots.rover.rc import Grip, RoverRc
 from resource_pool.robots.rover.report import report_of
 from resource_pool.stop_messages import EmergencyStopped
 from scout_model.description import RobotPlace, WorldDescription
@@ -53,7 +53,7 @@ def rover_pool(mission: Any, rcs: list[str]) -> AbstractAsyncContextManager[Pool
         rcs,
         world=ROOM,
         hardware=HARDWARE,
-        rc_classes={"rover": Rover},
+        rc_classes={"rover": RoverRc},
         arc_classes={"rover_drive": RoverDriveArc, "rover_capture": RoverCaptureArc},
     )
 
@@ -241,7 +241,7 @@ def test_its_video_is_captured_under_its_own_kind_of_arc(local_mission: Any) -> 
 
 # ---------------------------------------------------------------------- what consoles draw
 def test_its_abilities_have_the_limits_of_its_body() -> None:
-    abilities = Rover.abilities()
+    abilities = RoverRc.abilities()
     forms = {form.word: form for form in abilities.commands}
     assert {word: [field.name for field in form.fields] for word, form in forms.items()} == {
         "move": ["forward_m_s", "turn_rad_s"],
@@ -259,7 +259,7 @@ def test_its_abilities_have_the_limits_of_its_body() -> None:
 
 
 def test_each_value_of_its_report_can_be_a_gauge() -> None:
-    reports = Rover.abilities().reports
+    reports = RoverRc.abilities().reports
     assert {field.kind for field in reports} == {ValueKind.NUMBER, ValueKind.FLAG}
     assert all(field.doc for field in reports)
     units = {field.name: field.unit for field in reports}

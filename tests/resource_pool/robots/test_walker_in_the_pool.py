@@ -20,7 +20,7 @@ from resource_pool.messages import NoSuchAction
 from resource_pool.rcs.command_radio import CommandRadio
 from resource_pool.robots.walker.gait import MAX_FORWARD_M_S, MAX_TURN_RAD_S, TROT, WALK, ImpossibleMove
 from resource_pool.robots.walker.motion import STEP_S
-from resource_pool.robots.walker.rc import Walker
+from resource_pool.robots.walker.rc import WalkerRc
 from scout_model.description import AirDescription
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOn
 
@@ -142,7 +142,7 @@ class LateClock(VirtualClock):
         await super().sleep_until_s(at_s + 0.6 * STEP_S)
 
 
-class LateWalker(Walker):
+class LateWalker(WalkerRc):
     """Lives on a busy machine."""
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

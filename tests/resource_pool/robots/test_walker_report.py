@@ -8,12 +8,12 @@ from backbone.component.abilities import ValueKind
 from resource_pool.robots.walker.gait import MAX_FORWARD_M_S, MAX_TURN_RAD_S, TrunkSpeed
 from resource_pool.robots.walker.link import Status, encode_status
 from resource_pool.robots.walker.motion import MotionControl
-from resource_pool.robots.walker.rc import Walker
+from resource_pool.robots.walker.rc import WalkerRc
 from resource_pool.robots.walker.report import report_of
 
 
 def test_its_abilities_have_the_limits_of_its_gait() -> None:
-    abilities = Walker.abilities()
+    abilities = WalkerRc.abilities()
     forms = {form.word: form for form in abilities.commands}
     assert list(forms) == ["move", "halt", "switch_transmitter"]
     assert [(field.least, field.most) for field in forms["move"].fields] == [
@@ -25,7 +25,7 @@ def test_its_abilities_have_the_limits_of_its_gait() -> None:
 
 
 def test_each_value_of_its_report_can_be_a_gauge() -> None:
-    reports = Walker.abilities().reports
+    reports = WalkerRc.abilities().reports
     assert {field.kind for field in reports} == {ValueKind.NUMBER, ValueKind.FLAG}
     assert all(field.doc for field in reports)
     units = {field.name: field.unit for field in reports}

@@ -10,7 +10,7 @@ from backbone.component.process import load_class
 from backbone.mission.class_probe import facts_of
 from resource_pool.robots.walker.extra import NoMink
 
-RC = "resource_pool.robots.walker.rc:Walker"
+RC = "resource_pool.robots.walker.rc:WalkerRc"
 ARC = "resource_pool.robots.walker.arcs:WalkerDriveArc"
 
 

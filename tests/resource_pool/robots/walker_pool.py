@@ -25,7 +25,7 @@ from resource_pool.arc_client import ArcClient
 from resource_pool.drivers.world_messages import AskWorld, WorldModel, WorldState
 from resource_pool.robots.walker import link
 from resource_pool.robots.walker.arcs import WalkerCaptureArc, WalkerDriveArc
-from resource_pool.robots.walker.rc import Walker
+from resource_pool.robots.walker.rc import WalkerRc
 from scout_model.description import RobotPlace, WorldDescription
 from scout_model.world import STATE
 
@@ -35,7 +35,7 @@ ROOM = WorldDescription(
     6.0,
     robots=[
         RobotPlace("scout1", 1, 2.0, 1.0, 0.0),
-        RobotPlace("walker1", NETWORK_ID, 2.0, 3.0, 0.0, Walker.body_class),
+        RobotPlace("walker1", NETWORK_ID, 2.0, 3.0, 0.0, WalkerRc.body_class),
     ],
 )
 HARDWARE = [Resource("walker1", "walker", parameters={"network_id": NETWORK_ID}, links={"command_radio": ["radio"]})]
@@ -92,7 +92,7 @@ def walker_pool(
         rcs,
         world=world,
         hardware=HARDWARE,
-        rc_classes={"walker": Walker} | other_classes,
+        rc_classes={"walker": WalkerRc} | other_classes,
         arc_classes={"walker_drive": WalkerDriveArc, "walker_capture": WalkerCaptureArc},
     )
 

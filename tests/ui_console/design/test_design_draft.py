@@ -25,8 +25,8 @@ from ui_console.design.commands import (
     Command,
     DesignRefused,
     ElementNameTaken,
-    Move,
     NothingToUndo,
+    Relocate,
     Remove,
     Rename,
     SetValue,
@@ -86,7 +86,7 @@ def commands(draft: Draft) -> st.SearchStrategy[Command]:
     return st.one_of(
         st.builds(Remove, paths),
         st.builds(Rename, paths, NAMES),
-        st.builds(Move, paths, paths, st.integers(0, 5)),
+        st.builds(Relocate, paths, paths, st.integers(0, 5)),
         st.builds(SetValue, paths, st.sampled_from(["name", "priority", "host", "x-m"]), NAMES | st.none()),
         st.builds(WriteParameter, paths, NAMES, NAMES | st.none()),
         st.builds(AddBehavior, paths, kinds, NAMES, st.integers(-3, 3)),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from backbone.errors import Refusal
 from backbone.mission.edit import Node
-from ui_console.design.commands import AddBehavior, AddResource, AddType, Command, Move, Remove, Rename, SetValue
+from ui_console.design.commands import AddBehavior, AddResource, AddType, Command, Relocate, Remove, Rename, SetValue
 from ui_console.design.draft import Draft
 from ui_console.design.following import follower
 
@@ -20,7 +20,7 @@ BUILT = Draft("guard.xml", tutorial_draft().step)
 PATHS = st.sampled_from([node.path for node in BUILT.mission])
 COMMANDS = st.one_of(
     st.builds(Remove, PATHS),
-    st.builds(Move, PATHS, PATHS, st.integers(0, 5)),
+    st.builds(Relocate, PATHS, PATHS, st.integers(0, 5)),
     st.builds(SetValue, PATHS, st.sampled_from(["name", "priority", "x-m"]), st.sampled_from(["spy", "7"])),
     st.builds(Rename, PATHS, st.just("spy")),
     st.builds(AddBehavior, PATHS, st.sampled_from(["patrol", "surveillance"]), st.just("other")),
