@@ -104,13 +104,16 @@ def table(results: Sequence[dict[str, Any]]) -> str:
 
 
 def cell(result: dict[str, Any] | None) -> str:
-    """Return one case as a cell: noticed / healthy / gap, seconds."""
+    """Return one case as a cell: noticed / healthy / gap, or the time up or down took; seconds."""
     if result is None:
         return ""
     if "gone_s" in result:
         return f"gone in {result['gone_s']}, exit {result['up_exit']}"
     if "failed" in result:
         return str(result["failed"])
+    for took in ("up_in_s", "down_in_s"):
+        if took in result:
+            return f"{result[took]}, exit {result['up_exit']}, {result['left']} left"
     shown = ["–" if result[key] is None else f"{result[key]:.1f}" for key in ("noticed_s", "healthy_s", "gap_s")]
     return " / ".join(shown)
 

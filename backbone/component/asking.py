@@ -18,6 +18,9 @@ async def ask_until_answered(
 ) -> Reply:
     """Ask, and after every ``LinkError`` ask again after a growing pause.
 
+    A question counts for at most the time it may take: if this process itself was stopped meanwhile, that time is no
+    silence of the receiver.
+
     Args:
         question: An idempotent question.
         each_s: Seconds of the machine that one question waits for its answer.
@@ -27,12 +30,14 @@ async def ask_until_answered(
         Refusal: The receiver refused.
         LinkError: No answer arrived in time.
     """
-    end_s, pause_s = clock.now_s() + within_s * clock.rate, PAUSE_FIRST_S
+    left_s, pause_s = within_s, PAUSE_FIRST_S
     while True:
+        asked_s = clock.now_s()
         try:
             return await bus.ask(address, question, reply, within_s=each_s)
         except LinkError:
-            if clock.now_s() + pause_s * clock.rate >= end_s:
+            left_s -= min(each_s, (clock.now_s() - asked_s) / clock.rate) + pause_s
+            if left_s <= 0:
                 raise
         await clock.sleep_s(pause_s * clock.rate)
         pause_s = min(pause_s * PAUSE_FACTOR, PAUSE_MOST_S)
