@@ -1,8 +1,9 @@
 """Many faults, one after the other, in one mission: what it is like at the end, and what has grown.
 
 What a process uses is taken after a first part of the same faults, and again at the end; each time all links were
-just lost and regained, and the least of some seconds counts, since links begin and end threads. A framegrabber fills
-its stores for three minutes; a nameserver grows by a seventh over the first seventy lives that end beside it, and then
+just lost and regained, and the least of some seconds counts, since links begin and end threads. It has grown when it
+uses more at the end than ever in the first part: lives differ in age, and a framegrabber fills its stores for three
+minutes; a nameserver grows by a seventh over the first seventy lives that end beside it, and then
 stays (measured: 21.3 MB at first, 24.6 after 72, 24.6 after 120). A second life is not as the first: it is not forked
 from a fresh zygote, it watches what it found instead of what it started, and its link, once lost and regained, keeps
 three descriptors more.
@@ -23,6 +24,9 @@ from recovery_breaker import FAULTS, HARDWARE, ROWS, STAYS_S, Breaker, breaking_
 from recovery_mission import POLL_S, BenchMission, Look, NotSeen
 from recovery_verdict import Expected, Fault, Judgement, longest_gap_s
 
+UsageOfOne = dict[str, float]  # what a process uses: mb, fds, threads, log_kb
+Usage = dict[str, UsageOfOne]
+
 PAUSE_S = (5.0, 15.0)
 REMEMBERED_S = 60.0  # chosen: twice the longest pause of a process
 SETTLED_WITHIN_S = 60.0
@@ -37,12 +41,12 @@ def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
     """Do random things to a mission for so long, and print what it is like afterwards."""
     rng = random.Random(seed)
     with breaking_calm() as (breaking, expected):
-        fresh = usage(breaking.mission, breaking.watch.looks[-1])
+        most: Usage = {}
         end_each_once(breaking, expected)
         judgement = Judgement(expected, [])
-        strike(breaking, judgement, rng, victims, WARM_UP_S)
+        strike(breaking, judgement, rng, victims, WARM_UP_S, most)
         before = relinked_usage(breaking, judgement)
-        faults = strike(breaking, judgement, rng, victims, minutes * 60)
+        faults = strike(breaking, judgement, rng, victims, minutes * 60, {})
         after = relinked_usage(breaking, judgement)
         began_s, mission = expected.before.at_s, breaking.mission
         look = breaking.watch.looks[-1]
@@ -55,12 +59,14 @@ def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
         }
         mission.detach_console()
         for name in sorted(before):
-            report("recovery_soak_usage", **compared(name, before[name], after.get(name, {}), fresh.get(name, {})))
+            report("recovery_soak_usage", **compared(name, before[name], most.get(name, {}), after.get(name, {})))
         report("recovery_soak", faults=faults, minutes=minutes, seed=seed, **end, **breaking.end())
 
 
-def strike(breaking: Breaker, judgement: Judgement, rng: random.Random, victims: Sequence[str], for_s: float) -> int:
-    """Do random things for so long; return how many."""
+def strike(
+    breaking: Breaker, judgement: Judgement, rng: random.Random, victims: Sequence[str], for_s: float, most: Usage
+) -> int:
+    """Do random things for so long; return how many. ``most`` then tells the most that each process used meanwhile."""
     ends_s = time.monotonic() + for_s
     began_s = judgement.expected.before.at_s
     faults: list[Fault] = []
@@ -71,6 +77,9 @@ def strike(breaking: Breaker, judgement: Judgement, rng: random.Random, victims:
             judgement.faults = [f for f in faults if f.lifted_s > time.monotonic() - REMEMBERED_S]
             report("recovery_soak", at_s=rounded(fault.at_s - began_s), **done_to(fault))
         wait(breaking, judgement, time.monotonic() + rng.uniform(*PAUSE_S))
+        for name, now in usage(breaking.mission, breaking.watch.looks[-1]).items():
+            known = most.setdefault(name, now)
+            most[name] = {kind: max(known[kind], value) for kind, value in now.items()}
     return len(faults)
 
 
@@ -120,14 +129,14 @@ def settle(breaking: Breaker, judgement: Judgement) -> None:
             return
 
 
-def relinked_usage(breaking: Breaker, judgement: Judgement) -> dict[str, dict[str, float]]:
+def relinked_usage(breaking: Breaker, judgement: Judgement) -> Usage:
     """Return the least that each process uses for a while after all have lost their link once more and are whole."""
     settle(breaking, judgement)
     fault = breaking.fault("nameserver", "SIGKILL")
     breaking.strike([fault])
     judgement.faults = [*judgement.faults, fault]
     settle(breaking, judgement)
-    least: dict[str, dict[str, float]] = {}
+    least: Usage = {}
     ends_s = time.monotonic() + LOOKED_AT_S
     while time.monotonic() < ends_s:
         wait(breaking, judgement, time.monotonic() + 1.0)
@@ -137,9 +146,9 @@ def relinked_usage(breaking: Breaker, judgement: Judgement) -> dict[str, dict[st
     return least
 
 
-def usage(mission: BenchMission, look: Look) -> dict[str, dict[str, float]]:
+def usage(mission: BenchMission, look: Look) -> Usage:
     """Return what each process uses, and how long its log is, by the name of a component in it."""
-    logs, found, seen = mission.logs(), dict[str, dict[str, float]](), set[int]()
+    logs, found, seen = mission.logs(), Usage(), set[int]()
     for name, pid in mission.processes(look).items():
         if pid in seen:
             continue
@@ -165,19 +174,16 @@ def anonymous_kb(pid: int) -> int:
     return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:"))
 
 
-def compared(name: str, before: dict[str, float], after: dict[str, float], fresh: dict[str, float]) -> dict[str, Any]:
+def compared(name: str, before: UsageOfOne, most: UsageOfOne, after: UsageOfOne) -> dict[str, Any]:
     """Return what a process used before and after, and what of it has grown by more than ``GROWTH``.
 
-    A log grows with each fault that it tells of; it has grown when it is longer than logs may be. Worker threads have
-    grown when there are more than at the beginning, too: of a process that was just stopped some may still be missing
-    (measured: 23 at the beginning, 20 before, 23 after).
+    A log grows with each fault that it tells of; it has grown when it is longer than logs may be.
 
     Args:
-        fresh: What the process used when the mission had just come up.
+        most: The most that the process used in the first part.
     """
-    at_start = fresh.get("threads", 0)
     both = {kind: [before[kind], after.get(kind)] for kind in before}
-    most = {kind: was * (1 + GROWTH) for kind, was in before.items()} | {"log_kb": LOG_KB}
-    most["threads"] = max(most["threads"], before["threads"] + FEW_THREADS, at_start)
-    grown = [kind for kind, (_, now) in both.items() if now is not None and now > most[kind]]
-    return {"process": name, **both, "threads_at_start": at_start, "grown": grown}
+    bound = {kind: max(was, most.get(kind, was)) * (1 + GROWTH) for kind, was in before.items()} | {"log_kb": LOG_KB}
+    bound["threads"] = max(bound["threads"], before["threads"] + FEW_THREADS)
+    grown = [kind for kind, (_, now) in both.items() if now is not None and now > bound[kind]]
+    return {"process": name, **both, "most_before": most, "grown": grown}
