@@ -26,6 +26,7 @@ from typing import Any
 
 from measuring import BIN, MISSION_XML, report
 from playwright.async_api import Error as PageError
+from stops_headless import Headless
 from stops_link import relay_to_mission
 from stops_page import page_present
 from stops_places import KINDS, OTHERS, ROBOT, Cell, Gesture, Link, cells
@@ -266,7 +267,11 @@ async def console_at_hand(name: str) -> AsyncIterator[TriedConsole]:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="stops-")))
         relay = await stack.enter_async_context(relay_to_mission(run_files.find(MISSION), folder))
         environment = {"XDG_RUNTIME_DIR": str(folder)}
-        console = Script(name, relay) if name == "script" else Terminal(name, relay, folder)
+        console = (
+            Script(name, relay)
+            if name == "script"
+            else (Headless if name == "headless" else Terminal)(name, relay, folder)
+        )
         yield await stack.enter_async_context(console.present(environment, MISSION))
 
 

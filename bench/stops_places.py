@@ -88,6 +88,7 @@ DRIVING = (
 TERMINAL = (*PANELS, *DRIVING, *READING, *WRITING, *LIFTING)
 MONITOR = (*PANELS, *READING, *WRITING, *LIFTING)
 PENDANT = (Place("the screen", "screen"), READING[0], *LIFTING)
+HEADLESS = (Place("no screen", "headless"),)
 SCRIPT = (Place("a drive runs", "drive"), Place("nothing is due", "pause"))
 
 
@@ -190,6 +191,7 @@ KINDS = {
     "pendant": Kind(PENDANT, KEYS, size=(80, 24), words=(*ATTACH, "--profile", "pendant")),
     "monitor": Kind(MONITOR, KEYS, drives=False, size=(80, 24), words=("monitor",)),
     "gamepad": Kind(TERMINAL, PAD, size=(120, 40), words=(*ATTACH, "--gamepad")),
+    "headless": Kind(HEADLESS, PAD, words=(*ATTACH, "--profile", "headless")),
     "page desktop": Kind(PAGE, (*KEYS, *RED, *PAD)),
     "page tablet": Kind(PAGE, (*KEYS, *RED)),
     "page phone": Kind(PAGE, (*KEYS, *RED)),

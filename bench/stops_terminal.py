@@ -7,7 +7,6 @@ import json
 import os
 import re
 import signal
-import sys
 import time
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Sequence
@@ -17,13 +16,12 @@ from pathlib import Path
 import psutil
 from measuring import BIN
 from stops_link import Relay
+from stops_pad import Pad
 from stops_places import KINDS, ROBOT, Gesture, Place
 from stops_world import TURN, NotSeen, until
 
 from ui_console.model.driving import KEYS_LET_GO_S
-from ui_console.session.gamepad import ABS_X, BTN_EAST, BTN_NORTH, BTN_TR, EV_ABS, EV_KEY
 
-HERE = Path(__file__).parent
 REPEAT_EVERY_S = 0.05  # chosen: about as fast as keyboards repeat
 LET_GO_S = KEYS_LET_GO_S + 0.1  # a little more, for the terminal takes a moment to hand keys on
 ESCAPE_S = 0.15  # chosen: a terminal tells escape from the begin of another key by a pause
@@ -102,7 +100,7 @@ class Terminal(TriedConsole):
 
     def __init__(self, name: str, relay: Relay, folder: Path) -> None:
         super().__init__(name, relay)
-        self._socket, self._fifo, self._pid = folder / "tmux", folder / "gamepad", 0
+        self._socket, self._pad, self._pid = folder / "tmux", Pad(folder), 0
 
     @property
     def _has_gamepad(self) -> bool:
@@ -111,10 +109,7 @@ class Terminal(TriedConsole):
     @asynccontextmanager
     async def present(self, environment: dict[str, str], mission: str) -> AsyncIterator[Terminal]:
         """Run the console until the block ends."""
-        program = [str(BIN / "scout-console")]
-        if self._has_gamepad:
-            os.mkfifo(self._fifo)
-            program = [sys.executable, str(HERE / "stops_gamepad.py"), str(self._fifo)]
+        program = self._pad.program() if self._has_gamepad else [str(BIN / "scout-console")]
         words = " ".join([*program, *self.kind.words, "--user", "tina", "--mission", mission])
         columns, lines = self.kind.size
         size = ["-x", str(columns), "-y", str(lines)]
@@ -170,10 +165,8 @@ class Terminal(TriedConsole):
                 await self._press("x")
             case Gesture.ALL:
                 await self._press("X")
-            case Gesture.PAD_ONE:
-                self._feel(f"{EV_KEY} {BTN_EAST} 1", f"{EV_KEY} {BTN_EAST} 0")
-            case Gesture.PAD_ALL:
-                self._feel(f"{EV_KEY} {BTN_NORTH} 1", f"{EV_KEY} {BTN_NORTH} 0")
+            case Gesture.PAD_ONE | Gesture.PAD_ALL:
+                self._pad.stop(gesture)
             case _:
                 raise ValueError(f"a terminal has no {gesture}")
         return at_s
@@ -197,7 +190,7 @@ class Terminal(TriedConsole):
 
     async def _hold(self) -> None:
         if self._has_gamepad:
-            self._feel(f"{EV_ABS} {ABS_X} 100", f"{EV_KEY} {BTN_TR} 1")
+            self._pad.turn()
             await asyncio.Event().wait()
         while True:
             await self._press("d")
@@ -205,11 +198,7 @@ class Terminal(TriedConsole):
 
     async def _release(self) -> None:
         if self._has_gamepad:
-            self._feel(f"{EV_KEY} {BTN_TR} 0")
-
-    def _feel(self, *events: str) -> None:
-        with self._fifo.open("r+b", buffering=0) as fifo:
-            fifo.write("".join(f"{event}\n" for event in events).encode())
+            self._pad.let_go()
 
     async def _press(self, keys: str) -> None:
         if keys.split():

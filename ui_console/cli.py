@@ -23,8 +23,8 @@ from backbone.launcher.endings import ExitCode, say
 from ui_console.model.arc_kinds import Sight
 from ui_console.model.profile import Profile
 
-SIGHTS = {Profile.TERMINAL: Sight.PICTURES, Profile.PENDANT: Sight.BROADCAST}
-"""With a screen, pictures come to this machine; a person with a pendant looks at a video monitor."""
+SIGHTS = {Profile.TERMINAL: Sight.PICTURES, Profile.PENDANT: Sight.BROADCAST, Profile.HEADLESS: Sight.BROADCAST}
+"""With a screen, pictures come to this machine; a person without one looks at a video monitor, or at the robot."""
 
 WEB_PORT = 8420  # chosen: free on most machines
 LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
@@ -130,7 +130,11 @@ def attach(
         from ui_console.session.headless import drive_by_script
 
         run(lambda: drive_by_script(where, wished, user, script, within))
-    _need_a_terminal("attach", "--script FILE or --json")
+    if profile is Profile.HEADLESS:
+        from ui_console.session.gamepad_session import drive_by_gamepad
+
+        run(lambda: drive_by_gamepad(where, {**wished, "away_after_s": away_after}, user))
+    _need_a_terminal("attach", "--script FILE, --json or --profile headless")
     from ui_console.terminal.on_screen import Looks, drive_by_hand
 
     sees = SIGHTS[profile] is Sight.PICTURES

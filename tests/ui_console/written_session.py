@@ -17,7 +17,7 @@ from backbone.moments import Now
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import GiveWish, MoveWish
 from ui_console.model.events import ConsoleEvent
-from ui_console.terminal.verbs import Session
+from ui_console.session.verbs import Session
 
 
 class WrittenSession(Session):

@@ -19,6 +19,7 @@ from textual.widgets import Static
 from ui_console.model.driving import SPEED
 from ui_console.model.profile import Profile
 from ui_console.model.views import ConsoleView
+from ui_console.session.verbs import Session
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Dialog, LiftQuestion
 from ui_console.terminal.ending import EndingApp
@@ -27,7 +28,6 @@ from ui_console.terminal.keys import KEYS, has, hints, robot_meant
 from ui_console.terminal.lines import Row, table_rows
 from ui_console.terminal.log_search import FOUND_SHOWN, LogResult
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName
-from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
 
 REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission

@@ -19,10 +19,10 @@ from ui_console.model.team import TeamModel
 from ui_console.session.gamepad import Gamepad, PadWish, Stick, play_gamepad
 from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
+from ui_console.session.verbs import Session
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.hangup import HangupWatch
 from ui_console.terminal.pixels import can_show_pixels
-from ui_console.terminal.verbs import Session
 
 LIFT_REMEDY = "When the robot may move, press c, then l."
 Pilot = Callable[[textual_pilot.Pilot[object]], Coroutine[object, None, None]]

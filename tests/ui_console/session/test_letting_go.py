@@ -8,29 +8,18 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
-from fake_resource_pool import FakeArc, FakePlacer
+from fake_resource_pool import FakePlacer
+from held_robot import FORWARD, REPEAT_S, HeldRobot
 from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.component.launch import Launch
-from backbone.keys import Conversation
-from backbone.naming import Subsystem
-from backbone.wire import Envelope, Message
 from resource_pool.arc_client import EmergencyStopped
 from resource_pool.commands import Drive as ArcDrive
 from resource_pool.commands import Halt as ArcHalt
-from resource_pool.commands import Move as ArcMove
 from resource_pool.messages import GiveCommand
-from resource_pool.stop_latch import StopLatch
-from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
-from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, GiveWish, HaltWish, MoveWish
 from ui_console.session.scripted import ScriptDriver
-from ui_console.session.teleoperation import Teleoperation
-
-FORWARD = MoveWish(0.1, 0.0)
-REPEAT_S = 0.05
 
 
 # ---------------------------------------------------------------------- the law
@@ -114,77 +103,7 @@ def test_a_jump_key_that_is_held_jumps_no_more_until_it_was_let_go() -> None:
 
 
 # ---------------------------------------------------------------------- a console that holds a robot
-class Stage:
-    """A console whose screens show what it hears, and the RC of the robot that it holds."""
-
-    def __init__(self, placer: FakePlacer, *, is_scripted: bool = False) -> None:
-        self.placer, self.clock = placer, placer.clock
-        self.model = ConsoleModel("console-7", "anna")
-        if not is_scripted:
-            self.make_console(show=self.model.apply)
-        self.latch = StopLatch("scout1")
-        self.rc = placer.network.join("resource_pool/scout1", placer.clock)
-        self.rc.serve("resource_pool/scout1", AskStop | EmergencyStop | LiftStop, self._answer)
-        self.rc.declare_alive("resource_pool/scout1")
-
-    def make_console(self, **options: Any) -> None:
-        parameters = {"robot": "scout1", "kind": "drive", "priority": 100}
-        launch = Launch(
-            "iros2001",
-            Subsystem.UI_CONSOLE,
-            "console-7",
-            "console",
-            "in this process",
-            "local",
-            "",
-            0.0,
-            1.0,
-            parameters,
-        )
-        bus = self.placer.network.join(launch.address, self.clock)
-        self.console = Teleoperation(launch, bus, self.clock, watches=False, user="anna", **options)
-
-    @property
-    def arc(self) -> FakeArc:
-        return self.placer.arcs["console-7-drive"]
-
-    def stop(self, by: str = "ben", reason: str = "") -> None:
-        """Stop the robot: its RC refuses commands from now on, and publishes the stop."""
-        self.latch.stop(by, reason, self.clock.now_s(), f"ui_console/{by}")
-        for arc in self.placer.arcs.values():
-            arc.refusal = EmergencyStopped(
-                "scout1 was stopped", rc="scout1", number=self.latch.state.number, is_stopped=True
-            )
-        self.rc.publish("resource_pool/scout1", Conversation.EVENTS, self.latch.state)
-
-    def lift(self) -> None:
-        self.latch.lift(self.latch.state.number, "ben", self.clock.now_s())
-        self.arc.refusal = None
-        self.rc.publish("resource_pool/scout1", Conversation.EVENTS, self.latch.state)
-
-    async def held(self) -> None:
-        await self.placer.wait(lambda: self.placer.arcs)
-        await self.arc.grant()
-        await self.clock.sleep_s(0.1)
-
-    async def hold_key(self, seconds: float, lasts_s: float | None = None) -> None:
-        """Hold a control for so long."""
-        until_s = self.clock.now_s() + seconds
-        while self.clock.now_s() < until_s:
-            self.console.hold(FORWARD, lasts_s)
-            await self.clock.sleep_s(REPEAT_S)
-
-    def drives(self) -> list[ArcMove | ArcDrive]:
-        return [command for _at_s, _epoch, command in self.arc.commands if isinstance(command, ArcMove | ArcDrive)]
-
-    async def _answer(self, asked: Envelope[Any]) -> Message:
-        match asked.body:
-            case EmergencyStop(user=user, reason=reason):
-                self.stop(user, reason)
-        return self.latch.state
-
-
-Scene = Callable[[Stage], Awaitable[None]]
+Scene = Callable[[HeldRobot], Awaitable[None]]
 
 
 @pytest.fixture
@@ -193,7 +112,7 @@ def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
         async def main() -> None:
             async with local_mission("iros2001") as network:
                 placer = FakePlacer(network, VirtualClock(), {})
-                on = Stage(placer)
+                on = HeldRobot(placer)
                 try:
                     async with beside(on.console):
                         await on.held()
@@ -215,7 +134,7 @@ def scripted(local_mission: Any) -> Callable[[Scene], None]:
         async def main() -> None:
             async with local_mission("iros2001") as network:
                 placer = FakePlacer(network, VirtualClock(), {})
-                on = Stage(placer, is_scripted=True)
+                on = HeldRobot(placer, is_scripted=True)
                 try:
                     await scene(on)
                 finally:
@@ -234,7 +153,7 @@ HANDS = [pytest.param(None, id="key"), pytest.param(STICK_LASTS_S, id="stick")]
 def test_after_a_lift_a_held_control_moves_nothing_until_it_is_pressed_anew(
     stage: Callable[[Scene], None], lasts_s: float | None
 ) -> None:
-    async def scene(on: Stage) -> None:
+    async def scene(on: HeldRobot) -> None:
         await on.hold_key(1.0, lasts_s)
         assert on.drives()
         on.stop()
@@ -257,7 +176,7 @@ def test_after_a_lift_a_held_control_moves_nothing_until_it_is_pressed_anew(
 def test_a_stop_and_lift_nobody_told_of_are_learned_from_the_refusal_and_need_a_fresh_press_too(
     stage: Callable[[Scene], None], lasts_s: float | None
 ) -> None:
-    async def scene(on: Stage) -> None:
+    async def scene(on: HeldRobot) -> None:
         await on.hold_key(1.0, lasts_s)
         on.arc.refusal = EmergencyStopped("scout1 was stopped", rc="scout1", number=4, is_stopped=True)
         await on.hold_key(0.3, lasts_s)
@@ -274,7 +193,7 @@ def test_a_stop_and_lift_nobody_told_of_are_learned_from_the_refusal_and_need_a_
 def test_a_control_held_through_a_change_moves_nothing_until_it_is_pressed_anew(
     stage: Callable[[Scene], None], lasts_s: float | None, change: str
 ) -> None:
-    async def scene(on: Stage) -> None:
+    async def scene(on: HeldRobot) -> None:
         await on.hold_key(1.0, lasts_s)
         match change:
             case "loss and grant":
@@ -299,7 +218,7 @@ def test_a_control_held_through_a_change_moves_nothing_until_it_is_pressed_anew(
 
 
 def test_stopping_twice_with_a_stick_held_does_not_count_as_letting_it_go(stage: Callable[[Scene], None]) -> None:
-    async def scene(on: Stage) -> None:
+    async def scene(on: HeldRobot) -> None:
         await on.hold_key(0.5, STICK_LASTS_S)
         for _press in range(2):
             on.console.stop()  # screens stop the wheels by it as well
@@ -314,7 +233,7 @@ def test_stopping_twice_with_a_stick_held_does_not_count_as_letting_it_go(stage:
 
 
 def test_a_jump_key_held_through_a_stop_does_not_jump_after_the_lift(stage: Callable[[Scene], None]) -> None:
-    async def scene(on: Stage) -> None:
+    async def scene(on: HeldRobot) -> None:
         for repeat in range(40):
             if repeat == 10:
                 on.stop()
@@ -337,7 +256,7 @@ def test_a_robot_that_was_stopped_and_freed_before_it_is_granted_is_driven_by_th
 ) -> None:
     """An operator who takes the robot knows of the stop from the beginning, so that no second press is needed."""
 
-    async def scene(on: Stage) -> None:
+    async def scene(on: HeldRobot) -> None:
         await on.console.give_back()
         on.latch.stop("ben", "", on.clock.now_s())
         on.latch.lift(on.latch.state.number, "ben", on.clock.now_s())
@@ -351,7 +270,7 @@ def test_a_robot_that_was_stopped_and_freed_before_it_is_granted_is_driven_by_th
 
 
 # ---------------------------------------------------------------------- scripts
-async def play(on: Stage, lines: list[tuple[float, str | None]]) -> tuple[int, list[str]]:
+async def play(on: HeldRobot, lines: list[tuple[float, str | None]]) -> tuple[int, list[str]]:
     """Write these lines into the script's pipe, each after its pause; return how it ended and the words it said."""
     said: list[bytes] = []
     driver = ScriptDriver(said.append)
@@ -365,7 +284,7 @@ async def play(on: Stage, lines: list[tuple[float, str | None]]) -> tuple[int, l
 
 
 def test_a_script_drives_on_after_a_lift_only_when_it_halted_first(scripted: Callable[[Scene], None]) -> None:
-    async def scene(on: Stage) -> None:
+    async def scene(on: HeldRobot) -> None:
         drive = '{"at_s":%s,"left_rad_s":4,"right_rad_s":4}'
         playing = asyncio.create_task(
             play(
@@ -393,7 +312,7 @@ def test_a_script_drives_on_after_a_lift_only_when_it_halted_first(scripted: Cal
 
 
 def test_a_script_stops_robots_before_its_grant_and_at_once(scripted: Callable[[Scene], None]) -> None:
-    async def scene(on: Stage) -> None:
+    async def scene(on: HeldRobot) -> None:
         playing = asyncio.create_task(
             play(
                 on,
