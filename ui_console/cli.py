@@ -20,8 +20,7 @@ from backbone.command_line.options import (
 )
 from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode, say
-from ui_console.model.arc_kinds import Sight
-from ui_console.model.profile import Profile
+from ui_console.model.profile import Profile, Sight
 
 SIGHTS = {Profile.TERMINAL: Sight.PICTURES, Profile.PENDANT: Sight.BROADCAST, Profile.HEADLESS: Sight.BROADCAST}
 """With a screen, pictures come to this machine; a person without one looks at a video monitor, or at the robot."""

@@ -65,7 +65,7 @@ def test_a_robot_that_is_misspelled_is_one_sentence(mission: RunningMission) -> 
     done = mission.command(*words, stdin=DRIVE)
     assert done.returncode == 5
     refused = json.loads(done.stdout.splitlines()[0])
-    assert refused["detail"].startswith("no scout is named 'scuot1' (did you mean 'scout1'?)")
+    assert refused["detail"].startswith("no robot is named 'scuot1' (did you mean 'scout1'?)")
     assert "Traceback" not in done.stdout + done.stderr
     assert "\n" not in refused["detail"]
 

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from enum import StrEnum
 
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.errors import Refusal
+from backbone.naming import did_you_mean
+from ui_console.model.profile import Sight
 
-
-class Sight(StrEnum):
-    """What the operator is to see of the robot."""
-
-    PICTURES = "pictures"  # pictures come to this machine
-    BROADCAST = "broadcast"  # the robot transmits to a video monitor; a framegrabber is left to others
-    NOTHING = "nothing"  # no picture, so the robot waits for none to settle, and leaves the frequency to others
+NAME_ONE = "Use one of these names, or add the robot to the mission file."
 
 
 class NoArcKind(Refusal):
@@ -36,13 +31,19 @@ def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources
     Raises:
         NoArcKind: The mission has no kind for the robot.
     """
+    if robot and not any(resource.name == robot for resource in resources):
+        robots = sorted(resource.name for resource in resources if resource.is_robot)
+        others = ", ".join(robots) or "none"
+        raise NoArcKind(
+            f"no robot is named {robot!r}{did_you_mean(robot, robots)}; there is {others}", remedy=NAME_ONE, robot=robot
+        )
     there = {resource.type for resource in resources}
     of_robot = {resource.type for resource in resources if resource.name == robot or (not robot and resource.is_robot)}
     drives = [one for one in types if one.needs.get(one.abilities.body, "") in of_robot]
     complete = [one for one in drives if there.issuperset(one.needs.values())] or drives
     if not complete:
-        kinds = ", ".join(sorted(of_robot)) or "robot of this name"
-        raise NoArcKind(f"no kind of ARC has a body of kind {kinds}", robot=robot)
+        kinds = ", ".join(sorted(of_robot))
+        raise NoArcKind(f"no kind of ARC has a body of kind {kinds}" if kinds else "there is no robot", robot=robot)
     return min(complete, key=lambda one: _badness(one, sight)).name
 
 

@@ -9,7 +9,7 @@ import msgspec
 from backbone.bus.interface import Bus
 from backbone.naming import component_of
 from resource_pool.arc_client import ROBOT, PathNode, arc_name, claim_parameters
-from ui_console.model.arc_kinds import Sight
+from ui_console.model.profile import Sight
 
 ANY_ROBOT = "any robot"
 ANY_CAMERA = {ROBOT: ["camera"]}

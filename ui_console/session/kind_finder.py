@@ -14,7 +14,8 @@ from backbone.dependency_database.messages import AskResources, Resources
 from backbone.errors import LinkError, Refusal
 from backbone.wire import Message
 from ui_console.model.arc_abilities import ArcAbilities, arc_abilities
-from ui_console.model.arc_kinds import NoArcKind, Sight, arc_kind
+from ui_console.model.arc_kinds import NoArcKind, arc_kind
+from ui_console.model.profile import Sight
 
 if TYPE_CHECKING:
     from ui_console.session.claim import TeleoperationParameters

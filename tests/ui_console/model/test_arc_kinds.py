@@ -10,7 +10,8 @@ from backbone.component.abilities import Abilities
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.naming import Subsystem
-from ui_console.model.arc_kinds import NoArcKind, Sight, arc_kind
+from ui_console.model.arc_kinds import NoArcKind, arc_kind
+from ui_console.model.profile import Sight
 
 
 def arc(name: str, *needs: str, pictures: bool = False) -> ComponentType:
@@ -64,7 +65,13 @@ def test_a_device_is_claimed_by_its_name_and_never_as_any_robot() -> None:
         arc_kind("", Sight.PICTURES, [arc("light", "lamp")], [Resource("lamp1", "lamp")])
 
 
-@pytest.mark.parametrize(("robot", "told"), [("radio1", "body of kind radio"), ("spot", "robot of this name")])
+@pytest.mark.parametrize(
+    ("robot", "told"),
+    [
+        ("radio1", "body of kind radio"),
+        ("scuot1", r"no robot is named 'scuot1' \(did you mean 'scout1'\?\); there is rover1, scout1"),
+    ],
+)
 def test_without_a_kind_for_the_robot_the_claim_is_refused(robot: str, told: str) -> None:
     with pytest.raises(NoArcKind, match=told):
         arc_kind(robot, Sight.PICTURES, TYPES, HARDWARE)
