@@ -24,7 +24,7 @@ from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
 from resource_pool.arc_request import ROBOT, claim_parameters
-from resource_pool.commands import Command, Drive, Halt, Jump, Move
+from resource_pool.commands import Command, Drive, Halt, Jump, Move, WrongCommand
 from resource_pool.drivers.world_messages import AskPose, Pose
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
@@ -83,6 +83,7 @@ __all__ = [
     "Suspending",
     "SwappedOut",
     "Usage",
+    "WrongCommand",
     "arc_name",
     "ask_readings",
     "ask_stop",

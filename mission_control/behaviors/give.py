@@ -1,0 +1,98 @@
+"""Give: one command of its ARC, by its word, for as long as stated.
+
+In mission.xml: an ARC of any kind that has the command; ``scout-backbone components`` lists the commands of each kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from mission_control.behavior import BehaviorParameters
+from mission_control.behaviors.composed import Pause
+from mission_control.behaviors.driver import Driver
+from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import WrongCommand
+
+TICK_S = 1e-6  # chosen: far above the rounding of mission times
+
+
+class GiveParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``Give``.
+
+    Attributes:
+        word: The command.
+        values: Its fields, ``name=value`` separated by blanks.
+        role: Role of the RC that obeys, if several can.
+        for_s: Time for which it holds its ARC; 0: until the command was applied.
+        again_s: Time after which it repeats the command; 0: it repeats it only after an interruption.
+    """
+
+    word: str
+    values: str = ""
+    role: str = ""
+    for_s: Pause = 0.0
+    again_s: Pause = 0.0
+
+    def __post_init__(self) -> None:
+        read_values(self.values)
+
+
+def read_values(text: str) -> dict[str, object]:
+    """Return field → value: a number, ``true`` or ``false``, else text.
+
+    Raises:
+        ValueError: A part is not ``name=value``.
+
+    Example:
+        >>> read_values("pan_rad=-0.5 on=true frequency=video1")
+        {'pan_rad': -0.5, 'on': True, 'frequency': 'video1'}
+    """
+    pairs = [part.partition("=") for part in text.split()]
+    if wrong := ["".join(pair) for pair in pairs if not (pair[0] and pair[2])]:
+        raise ValueError(f"values has {wrong[0]!r}: write name=value, separated by blanks")
+    return {name: _value(value) for name, _equals, value in pairs}
+
+
+def _value(text: str) -> object:
+    try:
+        value = msgspec.json.decode(text)
+    except msgspec.DecodeError:
+        return text
+    return value if isinstance(value, float | int) else text
+
+
+class Give(Driver[GiveParameters]):
+    """Succeeds when the command was applied and its time is over; fails if the ARC has no such command."""
+
+    parameters_type = GiveParameters
+    never = Driver.never | {WrongCommand.code}
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self.held_s = 0.0
+        """Time for which the command was in force, over all grants."""
+        self._values: Mapping[str, object] = read_values(self.parameters.values)
+
+    def parameters_changed(self) -> None:
+        """Give the new command at the next repetition or grant."""
+        self._values = read_values(self.parameters.values)
+
+    async def drive_on(self, robot: str) -> None:
+        """Give it, and hold the ARC."""
+        while True:
+            wanted = self.parameters
+            await self.held.give(wanted.word, self._values, wanted.role)
+            self.report(f"gives {wanted.word}{f' to {robot}' if robot else ''}")
+            left_s = max(0.0, wanted.for_s - self.held_s)
+            since_s = self.clock.now_s()
+            try:
+                await self.clock.sleep_s(min(left_s, wanted.again_s or left_s))
+            finally:
+                self.held_s += self.clock.now_s() - since_s
+            if self.held_s >= self.parameters.for_s - TICK_S:
+                self.finish(BehaviorStatus.SUCCESS)
+                return
