@@ -77,7 +77,9 @@ async def placer_behind_a_hub(
             run_files.remove(MISSION)
 
 
-async def console(*arguments: str, stdin: int | None = asyncio.subprocess.DEVNULL) -> asyncio.subprocess.Process:
+async def console(
+    *arguments: str, stdin: int = asyncio.subprocess.DEVNULL, stdout: int = asyncio.subprocess.PIPE
+) -> asyncio.subprocess.Process:
     return await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
@@ -85,7 +87,7 @@ async def console(*arguments: str, stdin: int | None = asyncio.subprocess.DEVNUL
         *ATTACH,
         *arguments,
         stdin=stdin,
-        stdout=asyncio.subprocess.PIPE,
+        stdout=stdout,
         stderr=asyncio.subprocess.PIPE,
     )
 
@@ -143,6 +145,25 @@ async def test_interrupted_it_gives_the_robot_back(
             out, _err = await process.communicate()
         assert json.loads(out.splitlines()[-1])["event"] == "released"
         assert process.returncode == 130
+        assert not placer.arcs
+
+
+async def test_a_reader_that_goes_away_ends_it_in_good_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, beside: Callable[..., Any]
+) -> None:
+    """As ``scout-console attach … --json | head -1`` does."""
+    async with placer_behind_a_hub(tmp_path, monkeypatch, beside) as placer:
+        placer.on_arc = grant_at_once(placer)
+        ours, theirs = os.pipe()
+        async with asyncio.timeout(WITHIN_S):
+            process = await console("--json", stdin=asyncio.subprocess.PIPE, stdout=theirs)
+            os.close(theirs)
+            assert b"granted" in await asyncio.to_thread(os.read, ours, 4096)
+            os.close(ours)
+            assert process.stdin is not None
+            process.stdin.write(b'{"at_s":0,"left_rad_s":2,"right_rad_s":2}\n')
+            _out, err = await process.communicate()
+        assert (process.returncode, err.decode()) == (0, "")
         assert not placer.arcs
 
 

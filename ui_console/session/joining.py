@@ -115,9 +115,16 @@ def _end_on(end: Callable[[str], None], *numbers: signal.Signals) -> Callable[[]
 
 
 def write_line(line: bytes) -> None:
-    """Write one line to standard output at once; its reader may wait for it."""
-    sys.stdout.buffer.write(line + b"\n")
-    sys.stdout.buffer.flush()
+    """Write one line to standard output at once; its reader may wait for it.
+
+    A reader that has gone away ends this process in good order, as SIGTERM does.
+    """
+    try:
+        sys.stdout.buffer.write(line + b"\n")
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        signal.raise_signal(signal.SIGTERM)
 
 
 def _name_elsewhere(host: str) -> str:
