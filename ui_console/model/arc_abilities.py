@@ -57,11 +57,13 @@ class ArcAbilities(msgspec.Struct, frozen=True):
         reach: Most speeds of its body; None: it cannot move.
         can_halt: True if it takes a command to halt.
         commands: Commands that a person can give, without those of the stick, in the order of their declaration.
+        gives_pictures: True if pictures of its robot come to consoles.
     """
 
     reach: Reach | None
     can_halt: bool
     commands: list[RoleCommand]
+    gives_pictures: bool = False
 
     def takes(self, word: str) -> bool:
         """Return whether a person can give this command."""
@@ -91,7 +93,8 @@ def arc_abilities(kind: str, types: Sequence[ComponentType]) -> ArcAbilities | N
         for role in form.roles
         if form.word not in BY_STICK and not any(_is_odd(field) and field.is_required for field in form.fields)
     ]
-    return ArcAbilities(_reach(arc, by_name), any(form.word == HALT for form in declared), commands)
+    can_halt = any(form.word == HALT for form in declared)
+    return ArcAbilities(_reach(arc, by_name), can_halt, commands, arc.abilities.gives_pictures)
 
 
 def _asked(role: str, title: str, form: CommandForm) -> RoleCommand:

@@ -41,7 +41,7 @@ class ConsoleModel:
         name: Name of this console.
         user: The person at this console.
         team: Model of the mission; None: a new one.
-        sees: True if pictures are to come while a robot is held: their absence is an alarm then.
+        sees: True if pictures are to come while a robot is held whose ARC gives any: their absence is an alarm then.
         alarms: Book for this console's alarms; None: a book that only its operator reads.
     """
 
@@ -358,7 +358,7 @@ class ConsoleModel:
 
     def _stale_line(self, now_s: float) -> str:
         """Return in one line the fault of the pictures of the robot held; empty: they are fresh."""
-        if self.held is None or not self.sees:
+        if self.held is None or not self.sees or (self.abilities is not None and not self.abilities.gives_pictures):
             return ""
         seen = self._pictures.get(self.robot)
         if not seen:

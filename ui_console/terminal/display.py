@@ -34,6 +34,7 @@ REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and 
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
 LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which an old view must be marked
+NO_PICTURES = "no pictures: this kind of ARC has no camera or no framegrabber"
 NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are both too small
 
 
@@ -187,6 +188,8 @@ class ConsoleDisplay(EndingApp):
         remark = f"picture is {stale[0].age_s:.0f} s old" if stale else ""
         if own.is_asked and not own.is_held:
             remark = own.status
+        elif (abilities := self._view.abilities) is not None and not abilities.gives_pictures:
+            remark = NO_PICTURES
         main.query_one(Video).look(remark)
 
     def _main(self) -> Screen[object] | None:

@@ -32,8 +32,10 @@ from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
 from resource_pool.arc_client import StopState, Suspended
+from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.console import SILENT_S, STALE_S, ConsoleModel
 from ui_console.model.events import (
+    AbilitiesKnown,
     Asked,
     Attention,
     CommandApplied,
@@ -166,6 +168,13 @@ def test_pictures_tell_their_age_rate_and_latency_and_are_forgotten_with_the_rob
     assert shown.videos(13.0 + STALE_S)[0].is_stale
     shown.apply(GivenBack(14.0, "released", True))
     assert shown.videos(14.0) == []
+
+
+@pytest.mark.parametrize("gives_pictures", [True, False])
+def test_missing_pictures_are_an_alarm_only_of_an_arc_that_gives_any(gives_pictures: bool) -> None:
+    shown = model(ASK, AbilitiesKnown(9.9, ArcAbilities(None, True, [], gives_pictures)), GRANT)
+    alarms = [alarm.kind for alarm in shown.view(GRANT.at_s + SILENT_S + 0.1).alarms]
+    assert alarms == [AlarmKind.STALE_VIDEO] * gives_pictures
 
 
 def test_a_round_trip_of_commands_is_among_the_links() -> None:

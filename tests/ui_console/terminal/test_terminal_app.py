@@ -443,6 +443,12 @@ async def test_keys_and_pad_drive_within_the_reach_of_the_body_and_not_at_all_wi
         await pilot.press("w")
         await pilot.pause()
         assert screen.query_one(DrivePad).disabled
+        assert "no pictures: this kind of ARC has no camera" not in screen_text(screen)
+        session.model.apply(GRANT)
+        screen.redraw()
+        screen.redraw_video()
+        await pilot.pause()
+        assert "no pictures: this kind of ARC has no camera" in screen_text(screen)
         assert len(session.wanted) == 2
         assert "speed" not in screen_text(screen).splitlines()[0]
 

@@ -50,6 +50,7 @@ export interface ArcAbilities {
   reach: Reach | null;
   can_halt: boolean;
   commands: RoleCommand[];
+  gives_pictures: boolean;
 }
 
 export type Certainty =
