@@ -58,6 +58,7 @@ class RadioAir:
         self._seed, self._air, self._way = abs(seed), air, way
         self._flying: list[tuple[float, int, Sent]] = []
         self._order = itertools.count()
+        self._last_s: dict[int, float] = {}  # network id → arrival of its last packet: no packet overtakes another
         self._delivered: Counter[int] = Counter()
         self._lost: Counter[int] = Counter()
         self.for_no_robot = 0
@@ -86,6 +87,7 @@ class RadioAir:
             self._lost[sent.network_id] += 1
         else:
             at_s = sent.begun_s + sent.air_time_s + away_m / LIGHT_M_PER_S + self._air.radio_delay_s
+            at_s = self._last_s[sent.network_id] = max(at_s, self._last_s.get(sent.network_id, 0.0))
             heapq.heappush(self._flying, (at_s, next(self._order), sent))
 
     def arrived(self, now_s: float) -> list[Sent]:

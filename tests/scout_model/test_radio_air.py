@@ -97,7 +97,7 @@ def test_packets_arrive_in_the_order_of_their_times_however_often_one_looks(
     begins_s = [begin_ms / 1000 for begin_ms in begins_ms]
     air = RadioAir(1, CLEAN_AIR)
     for number, begun_s in enumerate(begins_s):
-        air.send(packet(number, begun_s=begun_s), 3.0)
+        air.send(packet(number, network_id=number + 1, begun_s=begun_s), 3.0)  # to different robots
     arrived = [sent.begun_s for at_s in [*sorted(looks_s), 100.0] for sent in air.arrived(at_s)]
     assert arrived == sorted(begins_s)
 
@@ -136,3 +136,16 @@ def test_the_reply_to_a_packet_that_arrived_can_be_lost() -> None:
     there = fates(RadioAir(1, air), packets, 2.0)
     back = fates(RadioAir(1, air, "reply to "), [sent for sent in packets if (sent.radio, sent.number) in there], 2.0)
     assert len(back) / len(there) == pytest.approx(0.5, abs=0.05)
+
+
+@given(st.lists(st.tuples(st.integers(1, 3), st.floats(0.0, 0.01), st.floats(0.0, 0.01)), min_size=1))
+def test_no_packet_to_a_robot_overtakes_an_earlier_one(packets: list[tuple[int, float, float]]) -> None:
+    """A world that hears two packets at the same late moment must not let the short one, a halt, arrive first."""
+    air, begun_s = RadioAir(1, CLEAN_AIR), 0.0
+    for number, (network_id, pause_s, air_time_s) in enumerate(packets):
+        begun_s += pause_s
+        air.send(Sent("radio", number, network_id, HALT, begun_s, air_time_s), 3.0)
+    arrived = air.arrived(1000.0)
+    for network_id in {sent.network_id for sent in arrived}:
+        numbers = [sent.number for sent in arrived if sent.network_id == network_id]
+        assert numbers == sorted(numbers)
