@@ -38,7 +38,7 @@ LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its s
 
 
 def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
-    """Do random things to a mission for so long, and print what it is like afterwards."""
+    """Inject random faults into a mission for ``minutes``, and print its health and growth afterwards."""
     rng = random.Random(seed)
     with breaking_calm() as (breaking, expected):
         most: Usage = {}
@@ -66,7 +66,7 @@ def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
 def strike(
     breaking: Breaker, judgement: Judgement, rng: random.Random, victims: Sequence[str], for_s: float, most: Usage
 ) -> int:
-    """Do random things for so long; return how many. ``most`` then tells the most that each process used meanwhile."""
+    """Inject random faults for ``for_s``; return how many. ``most`` then holds the peak usage of each process."""
     ends_s = time.monotonic() + for_s
     began_s = judgement.expected.before.at_s
     faults: list[Fault] = []

@@ -23,6 +23,12 @@ FORWARD = MoveWish(0.1, 0.0)
 REPEAT_S = 0.05
 
 
+def console_launch(parameters: dict[str, Any]) -> Launch:
+    """Return how a console of these parameters is launched."""
+    address = (Subsystem.UI_CONSOLE, "console-7", "console")
+    return Launch("iros2001", *address, "in this process", "local", "", 0.0, 1.0, parameters)
+
+
 class HeldRobot:
     """A console whose screens show what it hears, and the RC of the robot that it holds."""
 
@@ -37,19 +43,7 @@ class HeldRobot:
         self.rc.declare_alive("resource_pool/scout1")
 
     def make_console(self, **options: Any) -> None:
-        parameters = {"robot": "scout1", "kind": "drive", "priority": 100}
-        launch = Launch(
-            "iros2001",
-            Subsystem.UI_CONSOLE,
-            "console-7",
-            "console",
-            "in this process",
-            "local",
-            "",
-            0.0,
-            1.0,
-            parameters,
-        )
+        launch = console_launch({"robot": "scout1", "kind": "drive", "priority": 100})
         bus = self.placer.network.join(launch.address, self.clock)
         self.console = Teleoperation(launch, bus, self.clock, watches=False, user="anna", **options)
 

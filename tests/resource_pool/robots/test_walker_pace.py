@@ -1,4 +1,4 @@
-"""Pace of a motion control: steps keep to their grid, whatever the delays, and late ones are counted."""
+"""Pace of a motion control: steps keep to their grid after any delay, and late ones are counted."""
 
 from __future__ import annotations
 

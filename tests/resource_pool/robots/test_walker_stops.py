@@ -1,4 +1,4 @@
-"""Whatever ends a walk, the walker stands upright afterwards, and no step of it follows."""
+"""However a walk ends, the walker stands upright afterwards, and no step of it follows."""
 
 from __future__ import annotations
 

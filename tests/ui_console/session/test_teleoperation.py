@@ -10,14 +10,13 @@ from typing import Any
 
 import pytest
 from fake_resource_pool import FakeArc, FakePlacer
+from held_robot import console_launch
 
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.component.launch import Launch
 from backbone.component.messages import Parameters, SetParameter, StoryEvent
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
-from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction, Suspended
 from resource_pool.commands import Halt as ArcHalt
@@ -53,18 +52,7 @@ def console(
     placer: FakePlacer, show: Callable[[ConsoleEvent], None], away_after_s: float = 0.0, **options: Any
 ) -> Teleoperation:
     parameters = {"robot": "scout1", "kind": "video_drive", "priority": 100, "away_after_s": away_after_s}
-    launch = Launch(
-        "iros2001",
-        Subsystem.UI_CONSOLE,
-        "console-7",
-        "console",
-        "in this process",
-        "local",
-        "",
-        0.0,
-        1.0,
-        parameters,
-    )
+    launch = console_launch(parameters)
     bus = placer.network.join(launch.address, placer.clock)
     return Teleoperation(launch, bus, placer.clock, show=show, **options)
 
