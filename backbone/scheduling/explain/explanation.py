@@ -272,14 +272,21 @@ class Explanation:
             what = f"{age}: none starts while {whom}, higher in its group, waits (policy strict)"
             return _Answer([what], "8", f"{whom} starts or idles")
         if granted_s == math.inf:
-            what = f"{age} for {whom}, without a predicted start: no gap is long enough for it"
-            remedy = f"{_release(blockers)}, or a shorter minimum run time"
-            return _Answer([what], "9", remedy)
+            return self._starves(arc, blockers, f"{age} for {whom}, without a predicted start")
         if not self._schedule.planner_of(arc).is_exact and all(other.queued for other in blockers):
             what = f"{age}; first in line before it: {whom}; granted at about {_at(granted_s)}"
             return _Answer([what], "15", f"{_release(blockers)} earlier, or a higher ARC asks")
         what = f"{age} for {whom}, granted at about {_at(granted_s)}"
         return _Answer([what], "3", f"{_release(blockers)} earlier, or a higher ARC asks")
+
+    def _starves(self, arc: ArcEntry, blockers: Sequence[ArcEntry], what: str) -> _Answer:
+        lasting = (RequestState.CONNECTING, RequestState.RUNNING)
+        stay = [other for other in blockers if other.state in lasting and higher(other.path, arc.path)]
+        if not stay:
+            remedy = f"{_release(blockers)}, or a shorter minimum run time"
+            return _Answer([f"{what}: no gap is long enough for it"], "9", remedy)
+        until = "stays until it releases or idles" if len(stay) == 1 else "stay until they release or idle"
+        return _Answer([f"{what}: {_names(stay)}, higher, {until}"], "9", _release(blockers))
 
     def _would_let_it_start(self, arc: ArcEntry, blockers: Sequence[ArcEntry], otherwise: str) -> str:
         """Return the events after which the ARC would start after one hand-over."""
