@@ -34,6 +34,7 @@ class Console:
         minimum_runtime_s: float,
         found: run_files.RunFile,
         clock: MissionClock,
+        kind: str = "drive",
     ) -> None:
         self.name, self.clock, self.events = name, clock, list[ConsoleEvent]()
         self.launch = Launch(
@@ -46,7 +47,7 @@ class Console:
             found.endpoint,
             found.clock_origin_monotonic_s,
             found.clock_rate,
-            {"robot": robot, "kind": "drive", "priority": priority, "minimum_runtime_s": minimum_runtime_s},
+            {"robot": robot, "kind": kind, "priority": priority, "minimum_runtime_s": minimum_runtime_s},
         )
         self.component: Teleoperation | None = None
         self.heard = asyncio.Event()
@@ -101,6 +102,7 @@ async def consoles_at_work(
     robot: str,
     people: Sequence[tuple[str, int]],
     minimum_runtime_s: float = 0.1,
+    kind: str = "drive",
 ) -> AsyncIterator[list[Console]]:
     """Have consoles ready that claim nothing yet.
 
@@ -110,11 +112,12 @@ async def consoles_at_work(
         robot: What all of them want.
         people: Name and priority of each.
         minimum_runtime_s: Of each claim.
+        kind: ARC kind of each claim.
     """
     with runtime_directory(mission.environment["XDG_RUNTIME_DIR"]):
         found = run_files.find(mission.name)
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
-    consoles = [Console(name, priority, robot, minimum_runtime_s, found, clock) for name, priority in people]
+    consoles = [Console(name, priority, robot, minimum_runtime_s, found, clock, kind) for name, priority in people]
     lives = []
     for console in consoles:
         own = await ZenohBus.open_when_up(mission.name, console.launch.address, clock, client_config(found.endpoint))
