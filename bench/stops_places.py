@@ -51,7 +51,8 @@ class Place:
         open: Keys of a terminal, or a script of the page.
         shows: What stands on the terminal, or holds of the page, once it is open; empty: nothing is waited for.
         close: Keys or script that lead back.
-        needs: What has to be there first: "stopped" (another robot is stopped), "asked" (another operator asks).
+        needs: What has to be there first: "stopped" (another robot is stopped), "asked" (another operator asks), "held"
+            (the console holds ``ROBOT``, so there is no such cell while another operator does).
         meant: The robot a stop of one means here while another operator holds ``ROBOT``.
     """
 
@@ -81,8 +82,8 @@ WRITING = (
 )
 DRIVING = (
     Place("picture alone", "action_bare", "v", close="v"),
-    Place("dialog of commands", "action_command", "o", "which command", "Escape"),
-    Place("dialog of robots", "action_pick", "p Down Down", "which robot", "Escape"),
+    Place("dialog of commands", "action_command", "o", "which command", "Escape", needs="held"),
+    Place("dialog of robots", "action_pick", "p", "which robot", "Escape"),
     Place("field of a reason", "action_ask_consent_because", "M", "may I have it", "Escape"),
 )
 TERMINAL = (*PANELS, *DRIVING, *READING, *WRITING, *LIFTING)
@@ -220,4 +221,5 @@ def cells(console: str) -> list[Cell]:
         if not (link is not Link.UP and gesture is Gesture.RED_MINE)  # it is shown beside the hands that drive only
         and not (link is Link.UP and not kind.drives)
         and not (console == "script" and link is Link.OTHER and place.of == "drive")
+        and not (link is Link.OTHER and place.needs == "held")
     ]

@@ -140,7 +140,7 @@ class Terminal(TriedConsole):
         if place.open and not place.of.startswith(("panel:", "action_bare")):
             await self._hold_no_key()
         if place.needs == "stopped":
-            await self._shows("STOPPED")
+            await self._shows(f"STOPPED: {place.meant}(?!,)")
         for key in place.open.split():
             await self._press(key)
             if key == "i":

@@ -243,7 +243,7 @@ def test_a_console_is_drawn_in_any_terminal_and_ctrl_c_ends_it(
         screen.shows(r"you hold scout3")
         screen.press("p")
         screen.shows(r"which robot\?")
-        screen.press("Enter", "Enter")
+        screen.press("Down", "Enter")  # from its own, the last, to the first
         screen.shows(r"you hold scout1")
         screen.press("C-c")
         ended_well(screen, 130)

@@ -211,7 +211,7 @@ class ConsoleApp(ConsoleDisplay):
         if self._view is None:
             return
         self._open(
-            RobotPicker(robot_rows(self._view.robots, self._view.now_s)),
+            RobotPicker(robot_rows(self._view.robots, self._view.now_s), self._session.model.robot),
             lambda robot: self._begin(partial(self._session.switch, robot)),
         )
 

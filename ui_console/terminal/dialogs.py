@@ -73,11 +73,16 @@ class Field(Input):
 
 
 class RobotPicker(Dialog[str]):
-    """Pick the robot to drive next; answers its name."""
+    """Pick the robot to drive next; answers its name.
 
-    def __init__(self, robots: list[Row]) -> None:
+    Args:
+        robots: To choose from.
+        robot: The console's own: the cursor begins at it, so that a stop in a hurry is for this robot.
+    """
+
+    def __init__(self, robots: list[Row], robot: str) -> None:
         super().__init__()
-        self._robots = robots
+        self._robots, self._robot = robots, robot
 
     @property
     def subject(self) -> str:
@@ -89,7 +94,9 @@ class RobotPicker(Dialog[str]):
         """Lay out the list."""
         with Vertical() as box:
             box.border_title = "which robot? (enter takes it)"
-            yield OptionList(*(Option(row.text, id=row.subject) for row in self._robots))
+            robots = OptionList(*(Option(row.text, id=row.subject) for row in self._robots))
+            robots.highlighted = next((at for at, row in enumerate(self._robots) if row.subject == self._robot), 0)
+            yield robots
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Answer."""

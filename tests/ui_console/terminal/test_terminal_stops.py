@@ -15,7 +15,7 @@ from written_session import WrittenSession, settle
 
 from ui_console.model.arc_abilities import arc_abilities
 from ui_console.model.console import ConsoleModel
-from ui_console.model.events import AbilitiesKnown, Heard
+from ui_console.model.events import AbilitiesKnown, Asked, Heard
 from ui_console.model.profile import Profile
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.dialogs import READ_S
@@ -208,6 +208,16 @@ async def test_a_robot_that_the_cursor_was_moved_to_is_meant_in_every_table_and_
         await pilot.press(*["tab"] * NO_ROBOTS.get(name, 0), *DIALOGS.get(name, []))
         await settle(pilot)
         assert name == "keys" or "STOP scout2" in screen_text(pilot.app)
+        await pilot.press("x")
+        await settle(pilot)
+    assert session.wanted == ["stop", ("stop robot", "scout2")]
+
+
+async def test_a_stop_in_the_picker_that_was_just_opened_is_for_the_robot_that_the_console_asks_for() -> None:
+    session = WrittenSession(*TEAM_EVENTS, Heard(8.0, SCHEDULE), Asked(8.5, "scout2", "drive", 100))
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("p")
+        await settle(pilot)
         await pilot.press("x")
         await settle(pilot)
     assert session.wanted == ["stop", ("stop robot", "scout2")]
