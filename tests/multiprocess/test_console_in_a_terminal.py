@@ -85,6 +85,13 @@ def mission() -> Iterator[RunningMission]:
         yield running
 
 
+@pytest.fixture(scope="module")
+def mission_to_stop() -> Iterator[RunningMission]:
+    """Bring up one whose robots a test may leave stopped."""
+    with mission_up() as running:
+        yield running
+
+
 def holder(mission: RunningMission, robot: str) -> str:
     found: dict[str, Any] = next(rc for rc in mission.status()["rcs"] if rc["rc"] == robot)
     return found["holders"][0]["arc"] if found["holders"] else ""
@@ -222,10 +229,10 @@ def every_terminal() -> list[tuple[str, str, tuple[int, int]]]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "variables", "size"), every_terminal(), ids=str)
 def test_no_key_pressed_twice_ends_a_console_in_any_terminal(
-    mission: RunningMission, tmp_path: Path, name: str, variables: str, size: tuple[int, int]
+    mission_to_stop: RunningMission, tmp_path: Path, name: str, variables: str, size: tuple[int, int]
 ) -> None:
-    with terminal(mission, tmp_path) as screen:
-        command = ["scout-console", *COMMANDS[name], "--user", "anna", "--mission", mission.name]
+    with terminal(mission_to_stop, tmp_path) as screen:
+        command = ["scout-console", *COMMANDS[name], "--user", "anna", "--mission", mission_to_stop.name]
         screen.open(*command, size=size, variables=variables)
         screen.shows("STOP ALL")  # what is held depends on the keys before: they may have left stops
         press_all_twice(screen, KEYS_OF_A_CONSOLE)
