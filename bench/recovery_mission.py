@@ -54,13 +54,19 @@ class Look:
         """Health as ``status`` says it."""
         return str(self.sight["word"])
 
+    @property
+    def rows(self) -> dict[str, Any]:
+        """Process and state by the component's name; empty: the nameserver did not answer."""
+        found: dict[str, Any] = self.sight.get("rows", {})
+        return found
+
     def pid(self, name: str) -> int:
         """Return the process of a component; 0 if it has no row."""
-        return int(self.sight.get("rows", {}).get(name, [0])[0])
+        return int(self.rows.get(name, [0])[0])
 
     def ready(self) -> set[str]:
         """Return the names of components that are ready."""
-        return {name for name, (_, state) in self.sight.get("rows", {}).items() if state == "ready"}
+        return {name for name, (_, state) in self.rows.items() if state == "ready"}
 
 
 @dataclass
@@ -189,15 +195,17 @@ class BenchMission:
         return {log.name: log.stat().st_size for log in sorted(self.directory.glob("log/*"))}
 
     def processes(self, look: Look) -> dict[str, int]:
-        """Return the process of everything that can be a victim by its own name, the zygotes included."""
-        found = {name: look.pid(name) for name in look.sight["rows"] if look.pid(name)}
+        """Return the process of each victim, the zygotes included, by its own name; none if the look has no rows."""
+        if not look.rows:
+            return {}
+        found = {name: look.pid(name) for name in look.rows if look.pid(name)}
         found["core_zygote"] = self.zygote_of(self.launcher.pid, look)
         found["zygote"] = self.zygote_of(found.get("creator-base", 0), look)
         return {name: pid for name, pid in found.items() if pid}
 
     def zygote_of(self, keeper_pid: int, look: Look) -> int:
         """Return the process that forks components for this one; 0 if there is none."""
-        rows = {pid for pid, _ in look.sight["rows"].values()}
+        rows = {pid for pid, _ in look.rows.values()}
         with contextlib.suppress(psutil.Error):
             for child in psutil.Process(keeper_pid).children():
                 if child.pid not in rows and child.status() != psutil.STATUS_ZOMBIE:
