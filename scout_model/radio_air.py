@@ -21,6 +21,7 @@ import numpy as np
 
 from scout_model.air import LIGHT_M_PER_S, counted_distance_m, key_of, packet_loss
 from scout_model.description import AirDescription
+from scout_model.dimensions import COMMAND_TIMEOUT_S
 from scout_model.radio_link import packet_bits
 
 
@@ -87,7 +88,10 @@ class RadioAir:
             self._lost[sent.network_id] += 1
         else:
             at_s = sent.begun_s + sent.air_time_s + away_m / LIGHT_M_PER_S + self._air.radio_delay_s
-            at_s = self._last_s[sent.network_id] = max(at_s, self._last_s.get(sent.network_id, 0.0))
+            last_s = self._last_s.get(sent.network_id, at_s)
+            if at_s < last_s <= at_s + COMMAND_TIMEOUT_S:  # a robot that waits longer has stopped by itself
+                at_s = last_s
+            self._last_s[sent.network_id] = at_s
             heapq.heappush(self._flying, (at_s, next(self._order), sent))
 
     def arrived(self, now_s: float) -> list[Sent]:

@@ -149,3 +149,10 @@ def test_no_packet_to_a_robot_overtakes_an_earlier_one(packets: list[tuple[int, 
     for network_id in {sent.network_id for sent in arrived}:
         numbers = [sent.number for sent in arrived if sent.network_id == network_id]
         assert numbers == sorted(numbers)
+
+
+def test_a_packet_of_absurd_length_keeps_no_later_one_from_its_robot() -> None:
+    air = RadioAir(1, CLEAN_AIR)
+    air.send(Sent("radio", 0, 1, HALT, 0.0, 86_400.0), 3.0)
+    air.send(Sent("radio", 1, 1, HALT, 0.1, 0.002), 3.0)
+    assert [sent.number for sent in air.arrived(0.2)] == [1]
