@@ -90,6 +90,8 @@ class Runner:
         if cell.place.needs == "asked":
             await self._world.asker.ask_for_it()
         await self._console.go(cell.place)
+        if cell.link is Link.OTHER and cell.place.meant != ROBOT:
+            await self._console.shows_meant(cell.place.meant)
 
     async def _turn_all(self, cell: Cell) -> None:
         world, is_stopped = self._world, cell.place.needs == "stopped"

@@ -83,7 +83,7 @@ WRITING = (
 DRIVING = (
     Place("picture alone", "action_bare", "v", close="v"),
     Place("dialog of commands", "action_command", "o", "which command", "Escape", needs="held"),
-    Place("dialog of robots", "action_pick", "p", "which robot", "Escape"),
+    Place("dialog of robots", "action_pick", "p Up", "which robot", "Escape", meant=OTHERS[1]),
     Place("field of a reason", "action_ask_consent_because", "M", "may I have it", "Escape"),
 )
 TERMINAL = (*PANELS, *DRIVING, *READING, *WRITING, *LIFTING)

@@ -67,6 +67,9 @@ class TriedConsole(ABC):
     async def go(self, place: Place) -> None:
         """Open a place."""
 
+    async def shows_meant(self, robot: str) -> None:  # noqa: B027  only a cursor in a terminal makes it another one
+        """Return when the console shows that a stop of one is for this robot."""
+
     @abstractmethod
     async def leave(self, place: Place) -> None:
         """Close it."""
@@ -147,6 +150,10 @@ class Terminal(TriedConsole):
                 await self._shows("─ parameters")
         if place.shows:
             await self._shows(place.shows)
+
+    async def shows_meant(self, robot: str) -> None:
+        """See ``TriedConsole``."""
+        await self._shows(f"STOP {robot}")
 
     async def leave(self, place: Place) -> None:
         """See ``TriedConsole``."""

@@ -15,8 +15,6 @@ from ui_console.model.driving import DriveWish
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
-DRIVEN_WITHIN_S = 0.150
-RESUMED_WITHIN_S = 0.300
 PATROL, SCOUT = "mission_control/patrol", "resource_pool/scout3"
 PEOPLE = [("console-low", 90), ("console-high", 100)]
 TREE = re.search(r'<behavior type="surveillance".*</behavior>', MISSION_XML.read_text(), re.DOTALL)
@@ -61,4 +59,4 @@ async def test_a_few_random_take_overs_by_two_consoles(mission: RunningMission) 
 @pytest.mark.timeout(900)
 async def test_two_hundred_random_take_overs_by_two_consoles(mission: RunningMission) -> None:
     took = await at_random(mission, 200, seed=2)
-    assert (max(took.driven) < DRIVEN_WITHIN_S, max(took.resumed) < RESUMED_WITHIN_S) == (True, True), mission.story()
+    assert took.is_quick, mission.story()

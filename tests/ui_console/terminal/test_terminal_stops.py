@@ -213,14 +213,18 @@ async def test_a_robot_that_the_cursor_was_moved_to_is_meant_in_every_table_and_
     assert session.wanted == ["stop", ("stop robot", "scout2")]
 
 
-async def test_a_stop_in_the_picker_that_was_just_opened_is_for_the_robot_that_the_console_asks_for() -> None:
+@pytest.mark.parametrize(("keys", "meant"), [("p", "scout2"), ("p up", "scout1")])
+async def test_a_stop_in_the_picker_is_for_the_robot_that_the_console_asks_for_until_the_cursor_moves(
+    keys: str, meant: str
+) -> None:
     session = WrittenSession(*TEAM_EVENTS, Heard(8.0, SCHEDULE), Asked(8.5, "scout2", "drive", 100))
     async with ConsoleApp(session).run_test(size=SIZE) as pilot:
-        await pilot.press("p")
-        await settle(pilot)
+        for key in keys.split():
+            await pilot.press(key)
+            await settle(pilot)
         await pilot.press("x")
         await settle(pilot)
-    assert session.wanted == ["stop", ("stop robot", "scout2")]
+    assert session.wanted == ["stop", ("stop robot", meant)]
 
 
 def test_a_stop_is_for_the_robot_in_hand_then_for_the_row_then_for_the_one_wanted() -> None:
