@@ -26,9 +26,9 @@ def stick(dice: random.Random) -> MoveWish:
     return MoveWish(dice.uniform(-0.2, 0.2), dice.uniform(-0.5, 0.5))
 
 
-@pytest.fixture(scope="module")
-def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("three") / "trace.jsonl"
+@pytest.fixture
+def trace(tmp_path: Path) -> Path:
+    return tmp_path / "three.jsonl"
 
 
 @pytest.fixture
