@@ -26,6 +26,7 @@ class Conversation(StrEnum):
     TELEMETRY = "telemetry"  # applied commands, measures, overruns
     REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
     READINGS = "readings"  # what the hardware measures, by name
+    POSES = "poses"  # where a localizer believes robots to be
     FRAMES = "frames"  # pictures
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each

@@ -26,7 +26,7 @@ from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import OtherStop, StopState, ask_stop, lift_stop, stop_robot, watch_stops
-from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.localization import AskPose, Pose
 from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DriveWish
 from ui_console.session.teleoperation import Teleoperation
 

@@ -18,15 +18,14 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.world_messages import (
-    AskPose,
     AskWorld,
     ClockTick,
-    Pose,
     RadioPacket,
     ReplyOnAir,
     WorldModel,
     WorldState,
 )
+from resource_pool.localization import AskPose, Pose
 from scout_model.air import antenna_m, distance_m
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S

@@ -15,7 +15,6 @@ from backbone.ranges import (
     Meters,
     Number,
     Payload,
-    Radians,
     Rate,
     Share,
     StateVector,
@@ -86,22 +85,6 @@ class WorldModel(Message, frozen=True):
     seed: Number = 0
     air: AirDescription = AirDescription()
     antenna_m: tuple[Meters, Meters, Meters] = (0.0, 0.0, 1.0)
-
-
-class AskPose(Message, frozen=True):
-    """Ask for the pose of a body. The simulated world or a camera above the room knows it; a robot does not."""
-
-    body: Mention
-
-
-class Pose(Message, frozen=True):
-    """Answer to ``AskPose``: metres and radians in the room's frame, origin in a corner of the floor."""
-
-    body: Mention
-    at_s: Instant
-    x_m: Meters
-    y_m: Meters
-    heading_rad: Radians
 
 
 class WorldState(Message, frozen=True):

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from running_mission import RunningMission, mission_up
 
-from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.localization import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
 

@@ -20,7 +20,8 @@ from backbone.keys import Conversation
 from backbone.mission.reader import read_mission
 from backbone.wire import Envelope
 from mission_control.messages import MotionSeen
-from resource_pool.drivers.world_messages import AskPose, Pose, WorldState
+from resource_pool.drivers.world_messages import WorldState
+from resource_pool.localization import AskPose, Pose
 from resource_pool.messages import Frame
 from scout_model.description import RobotPlace, Target, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, HORIZONTAL_VIEW_RAD, PIONEER_RADIUS_M

@@ -14,7 +14,7 @@ from running_mission import BIN, RunningMission, mission_up
 
 from backbone.bus.interface import Bus
 from resource_pool.arc_client import StopState, ask_stop, watch_stops
-from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.localization import AskPose, Pose
 from ui_console.model.consent import Sought
 from ui_console.model.driving import KEYS_LET_GO_S, DriveWish
 from ui_console.model.events import Granted

@@ -28,7 +28,7 @@ from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskRc, RcState, StaleEpoch
 from mission_control.messages import AskBehavior, BehaviorState
 from resource_pool.commands import Drive
-from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.localization import AskPose, Pose
 from resource_pool.messages import Applied
 from ui_console.model.driving import DriveWish
 from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted

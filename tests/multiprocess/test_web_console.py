@@ -26,7 +26,7 @@ from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
-from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.localization import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 

@@ -30,7 +30,7 @@ from resource_pool.arcs.skeleton import LitDriveArc
 from resource_pool.arcs.video_drive import VideoDriveArc
 from resource_pool.drivers.interface import DriverSite, HardwareFault, Picture
 from resource_pool.drivers.simulated import SimulatedRadio
-from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.localization import AskPose, Pose
 from resource_pool.messages import ArcNotice, AskBeat, Resumed, Suspended, Suspending
 from resource_pool.rcs.command_radio import CommandRadio
 from resource_pool.rcs.framegrabber import Framegrabber

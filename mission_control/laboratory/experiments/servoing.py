@@ -27,7 +27,7 @@ from mission_control.laboratory.experiments.harness import Progress, run_all
 from mission_control.laboratory.experiments.intervals import wilson
 from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
 from mission_control.messages import BehaviorStatus
-from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.localization import AskPose, Pose
 
 ROOM_M = (6.0, 8.0)
 BOARD_M = (5.5, 4.0)  # chosen: faces the room's length, with space for every start

@@ -19,7 +19,7 @@ from backbone.mission.reader import read_mission
 from backbone.placer.messages import Start
 from backbone.wire import Message
 from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
-from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.localization import AskPose, Pose
 from ui_console.model.driving import DriveWish
 from ui_console.session.teleoperation import Teleoperation
 

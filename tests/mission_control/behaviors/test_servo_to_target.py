@@ -17,7 +17,7 @@ from backbone.mission.behavior_orders import behavior_order
 from backbone.mission.model import MissionDescription
 from mission_control.behaviors.servo_to_target import ServoParameters, ServoToTarget
 from mission_control.messages import BehaviorStatus
-from resource_pool.drivers.world_messages import Pose
+from resource_pool.localization import Pose
 
 NAME, ROBOT = "servo-scout3", "scout3"
 PLACE = (4.5, 5.8 - 0.45, math.pi / 2)

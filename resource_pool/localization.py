@@ -1,0 +1,125 @@
+"""Messages of localizers: where robots are believed to be, how surely, from what, and the plan of the floor.
+
+* anybody → localizer: ``AskPose``, ``AskFloorPlan``; localizer → everybody: ``Pose``, published under its address
+  (conversation ``poses``) when a believed position changes.
+* a behavior that sees a landmark → everybody: ``LandmarkSighting``, published as an event.
+
+Positions are in meters in the room's frame: origin in a corner of the floor, x along its width, y along its depth,
+headings counterclockwise from x.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+
+from backbone.ranges import MANY, Instant, Mention, Meters, Radians
+from backbone.wire import Message
+
+Extent = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
+"""Meters, never negative. Chosen: as far as ``Meters``."""
+
+
+class PoseSource(StrEnum):
+    """Where a position comes from; consoles show it."""
+
+    SIMULATOR = "simulator"  # the simulated world itself: no real room has it
+    TRACKING = "tracking"  # a camera above the room
+    DEAD_RECKONING = "dead reckoning"  # the commands that the robot carried out, since its last known place
+    LANDMARK = "landmark"  # a landmark that the robot sees
+
+
+class AskPose(Message, frozen=True):
+    """Ask a localizer for the pose of a robot, or of another body that it knows."""
+
+    body: Mention
+
+
+class Pose(Message, frozen=True, tag="Pose/2"):
+    """Answer to ``AskPose``, and publication: the believed pose of a body.
+
+    Attributes:
+        at_s: Mission time for which it holds.
+        source: What it rests on last.
+        spread_m: Standard deviation of the position; 0: exact.
+    """
+
+    body: Mention
+    at_s: Instant
+    x_m: Meters
+    y_m: Meters
+    heading_rad: Radians
+    source: PoseSource = PoseSource.SIMULATOR
+    spread_m: Extent = 0.0
+
+
+class LandmarkSighting(Message, frozen=True):
+    """A landmark in a robot's picture, with the robot's pose in the frame of the landmark's board.
+
+    Attributes:
+        at_s: Mission time of the picture.
+        ahead_m: Distance from the board along the line at a right angle to it.
+        left_m: Distance from that line, to the left as seen by a robot that faces the board.
+        heading_rad: Of the robot; 0: it faces the board at a right angle.
+        spread_m: Standard deviation of the position.
+    """
+
+    at_s: Instant
+    robot: Mention
+    ahead_m: Meters
+    left_m: Meters
+    heading_rad: Radians
+    spread_m: Extent = 0.05
+
+
+class ShapeKind(StrEnum):
+    """What stands on a floor."""
+
+    FURNITURE = "furniture"
+    WALL = "wall"
+    RAMP = "ramp"
+    DARK = "dark"
+    LANDMARK = "landmark"
+
+
+class FloorShape(Message, frozen=True):
+    """A rectangle on the floor.
+
+    Attributes:
+        kind: What it is.
+        x_m: Middle.
+        y_m: Middle.
+        width_m: Along its own x axis.
+        depth_m: Along its own y axis.
+        heading_rad: Of its own x axis.
+    """
+
+    name: Mention
+    kind: ShapeKind
+    x_m: Meters
+    y_m: Meters
+    width_m: Extent
+    depth_m: Extent
+    heading_rad: Radians = 0.0
+
+
+class AskFloorPlan(Message, frozen=True):
+    """Ask a localizer for the plan of the floor."""
+
+
+class FloorPlan(Message, frozen=True):
+    """Answer to ``AskFloorPlan``.
+
+    Attributes:
+        width_m: Of the room, along x.
+        depth_m: Of the room, along y.
+        shapes: What stands in it.
+        image: A picture of the plan, PNG or JPEG, that covers the whole room; empty: none.
+    """
+
+    width_m: Extent
+    depth_m: Extent
+    shapes: Annotated[list[FloorShape], MANY] = []
+    image: Annotated[bytes, msgspec.Meta(max_length=4_000_000)] = b""  # chosen: a plan of 4000 x 4000 pixels
