@@ -1,7 +1,8 @@
-"""Condition: whether an event or a report is as the mission file says, as a leaf of the tree.
+"""Condition: whether an event, a report or a measured value is as the mission file says, as a leaf of the tree.
 
 An *event* is a message that a component publishes when something happens: one of ``EVENTS``, or one of your own. A
-*report* is a behavior's progress; the condition asks for it.
+*report* is a behavior's progress; the condition asks for it. *Readings* are what the hardware of an RC measured last,
+as the charge of a robot's battery; the condition asks for the newest, and hears of every change.
 
 Source: BehaviorTree.CPP 4, "ScriptCondition"; ``wait`` is ours, because here nothing ticks a condition again and again.
 """
@@ -12,7 +13,7 @@ import functools
 import importlib
 import logging
 import operator
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -20,22 +21,25 @@ from backbone.creator.messages import ProcessFell
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Disappeared
-from backbone.naming import Subsystem, address, is_component, is_legal
+from backbone.naming import Subsystem, component_of, is_component, is_legal
 from backbone.rc_manager.messages import TraceLine
 from backbone.spoken import value_text
 from backbone.wire import Envelope, Message, plain
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.child_keeper import why
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, MotionSeen, WaypointReached
-from resource_pool.arc_client import StopState
+from resource_pool.arc_client import Readings, StopState, ask_readings, watch_readings
 
 log = logging.getLogger(__name__)
 
 EVENTS = (MotionSeen, WaypointReached, StopState, Appeared, Disappeared, ProcessFell, TraceLine)
 """Every event that the project's own components publish."""
-NAMED: Mapping[str, type[Message]] = {kind.__name__: kind for kind in (*EVENTS, BehaviorState)}
+NAMED: Mapping[str, type[Message]] = {kind.__name__: kind for kind in (*EVENTS, BehaviorState, Readings)}
 ANY = "*"
+ASKED_FOR = {BehaviorState: Subsystem.MISSION_CONTROL, Readings: Subsystem.RESOURCE_POOL}
+"""Messages that are asked for → the subsystem whose components answer."""
 ASK_AGAIN_S = 1.0  # chosen: mission time; a report changes with a way point or a turn, not faster
+FIRST_READINGS_S = 5.0  # chosen: mission time; a robot that has just been granted answers within a second
 REPLY_TIME_S = 1.0  # chosen: behaviors answer in milliseconds
 _ABSENT = object()
 
@@ -103,14 +107,15 @@ class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
 
     Attributes:
         source: The component: its name, or its address; '*' for any.
-        message: The event, such as MotionSeen; BehaviorState for a behavior's report; or the class of an event of your
-            own, as package.module:Class.
-        field: Field of the message, such as region.width_px or payload.waypoints_reached; empty: every message will do.
+        message: The event, such as MotionSeen; BehaviorState for a behavior's report; Readings for what an RC measures;
+            or the class of an event of your own, as package.module:Class.
+        field: Field of the message, such as region.width_px, payload.waypoints_reached or values.battery_share; empty:
+            every message will do.
         above: The field must be a number above this.
         below: The field must be a number below this.
         equals: The field must be this.
         mode: wait: success at the first message that is like that. check: the first message decides between success
-            and failure.
+            and failure; readings that are not there within 5 s are a failure.
     """
 
     source: str = ANY
@@ -124,15 +129,16 @@ class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         if not (self.source == ANY or is_legal(self.source) or is_component(self.source)):
             raise ValueError(f"source is {self.source!r}: write a component's name or address, or {ANY} for any")
-        message_class(self.message)
+        kind = message_class(self.message)
         if not self.field and (self.above, self.below, self.equals) != (None, None, None):
             raise ValueError("field is empty: name the field that is compared")
-        if self.message == BehaviorState.__name__ and self.source == ANY:
-            raise ValueError(f"source is {ANY}: name the behavior whose report is asked for")
+        if kind in ASKED_FOR and (self.source == ANY or _asked_at(kind, self.source) is None):
+            asked = "behavior whose report is" if kind is BehaviorState else "RC whose readings are"
+            raise ValueError(f"source is {self.source}: name the {asked} asked for")
 
 
 class MessageCondition(Behavior[MessageConditionParameters]):
-    """Succeeds if an event or a report is as stated; ``check`` fails if it is not, ``wait`` goes on waiting."""
+    """Succeeds if an event, report or reading is as stated; ``check`` fails if it is not, ``wait`` goes on waiting."""
 
     parameters_type = MessageConditionParameters
     children_allowed = (0, 0)
@@ -144,8 +150,8 @@ class MessageCondition(Behavior[MessageConditionParameters]):
         self._comparison = Comparison(given.field, given.above, given.below, given.equals)
         self._kind = message_class(given.message)
         self.report(f"waits for {given.message} of {given.source}: {self._comparison}")
-        if self._kind is BehaviorState:
-            self.start_task(self._ask(), "ask")
+        if self._kind in ASKED_FOR:
+            self._begin_to_ask()
             return
         source = given.source if "/" in given.source else f"*/{given.source}"
         known: Any = functools.reduce(operator.or_, dict.fromkeys((*EVENTS, self._kind)))
@@ -156,23 +162,42 @@ class MessageCondition(Behavior[MessageConditionParameters]):
         given = self.parameters
         self._comparison = Comparison(given.field, given.above, given.below, given.equals)
 
-    async def _ask(self) -> None:
-        source = self.parameters.source
-        behavior = source if "/" in source else address(Subsystem.MISSION_CONTROL, source)
+    def _begin_to_ask(self) -> None:
+        source = _asked_at(self._kind, self.parameters.source)
+        assert source is not None  # noqa: S101  the parameters were checked
+        if self._kind is BehaviorState:
+            ask = functools.partial(self.bus.ask, source, AskBehavior(), BehaviorState, within_s=REPLY_TIME_S)
+            self.start_task(self._ask(source, ask), "ask")
+            return
+        rc = component_of(source)
+        watch_readings(self.bus, self._judge, rc)
+        self.start_task(self._ask(source, functools.partial(ask_readings, self.bus, rc)), "ask")
+        if self.parameters.mode == "check":
+            self.start_task(self._give_up(rc), "give up")
+
+    async def _ask(self, source: str, ask: Callable[[], Awaitable[Message]]) -> None:
+        """Judge the answer, again and again until one is final."""
         while not self.status.is_final:
             try:
-                self._judge(await self.bus.ask(behavior, AskBehavior(), BehaviorState, within_s=REPLY_TIME_S))
+                self._judge(await ask())
             except LinkError as error:
-                log.info("%s does not report: %s", behavior, error)
+                log.info("%s does not report: %s", source, error)
             except Refusal as refusal:
                 self.finish(BehaviorStatus.FAILURE, why(refusal))
             await self.clock.sleep_s(ASK_AGAIN_S)
+
+    async def _give_up(self, rc: str) -> None:
+        """Fail if nothing was read until then, so that a tree does not wait for a robot that nobody holds."""
+        await self.clock.sleep_s(FIRST_READINGS_S)
+        self.finish(BehaviorStatus.FAILURE, {"detail": f"{rc} had no readings within {FIRST_READINGS_S:g} s"})
 
     def _heard(self, envelope: Envelope[Message]) -> None:
         if isinstance(envelope.body, self._kind):
             self._judge(envelope.body)
 
     def _judge(self, message: Message) -> None:
+        if isinstance(message, Readings) and message.at_s < 0.0:
+            return  # the RC has heard nothing of its hardware yet
         finding = self._comparison.finding(message)
         if self._comparison.holds_for(message):
             self.finish(BehaviorStatus.SUCCESS, {"detail": finding})
@@ -198,3 +223,9 @@ def message_class(name: str) -> type[Message]:
     if not (isinstance(found, type) and issubclass(found, Message)):
         raise ValueError(f"message is {name!r}, which is no message")
     return found
+
+
+def _asked_at(kind: type[Message], source: str) -> str | None:
+    """Return the address of who answers; None: no component there does."""
+    given = source if "/" in source else f"{ASKED_FOR[kind]}/{source}"
+    return given if given.startswith(f"{ASKED_FOR[kind]}/") else None
