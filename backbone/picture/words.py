@@ -18,6 +18,7 @@ _SENTENCES = {
     "rc": "{by} does not answer",
     "capacity": "{by} can give less than before",
     "order": "{by} could not serve all its holders in time",
+    "packets": "its packets take longer than was declared",
     "failed": "it could not be made ready",
     WANTED: "no run time was wanted",
     "silent": "this console gave no sign of life",

@@ -4,6 +4,8 @@ The plan decides the rest of an ARC's life (``schedule_manager``).
 
 Rules of this file (numbers as in docs and ``why``):
 
+* 1  Packets count as long as they are measured. An ARC that declared less asks anew with the measured time: as soon as
+  it holds nothing, or when what is connected, or is about to be, could not be served otherwise.
 * 6  revoke → free → connect → grant.
 * 11 An ARC that lost its owner is revoked; the rest of the schedule goes on.
 * 14 A running ARC may go on up to its maximum run time; an idle one keeps its request.
@@ -18,15 +20,17 @@ import msgspec
 from backbone.scheduling import trace
 from backbone.scheduling.alternatives import can_be_planned
 from backbone.scheduling.damping import Damping
-from backbone.scheduling.entries import Afterwards, ArcEntry
+from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry
 from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
 from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.packet_times import Measured, PacketTimes
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.transitions import Transitions, because
 
+_NO_USE = RcUse()
 RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
 
 
@@ -50,6 +54,8 @@ class ArcEvents:
         self._successors: dict[str, Requested] = {}
         self._retrying: dict[str, ArcEntry] = {}
         self._damping = Damping()
+        self._packet_times = PacketTimes()
+        self._understating: dict[str, ArcEntry] = {}
 
     # Requests of ARCs.
 
@@ -66,7 +72,8 @@ class ArcEvents:
             self._successors[request.arc] = event  # a new request while its last RCs are still being freed
             return
         place_in_tree = self._priorities.place(request)
-        if dict(known.uses) != _chosen(request, event.rcs) or known.place_in_tree != place_in_tree:
+        is_another = _chosen(known.request, tuple(known.uses)) != _chosen(request, event.rcs)
+        if is_another or known.place_in_tree != place_in_tree:
             self._successors[request.arc] = event
             self._depart(request.arc, "self")
             return
@@ -111,6 +118,9 @@ class ArcEvents:
             self._queue(arc)
 
     def _queue(self, arc: ArcEntry) -> None:
+        if arc.understates:
+            self._ask_anew(arc)
+            return
         self._transitions.trace.record(trace.about("want", self._transitions.now_s, arc.name), "it wants time again")
         self._transitions.queue(arc)
 
@@ -145,6 +155,7 @@ class ArcEvents:
     def departed(self, name: str, why: str) -> None:
         """Remove an ARC that withdrew or died."""
         self._successors.pop(name, None)
+        self._packet_times.forget(name)
         self._depart(name, why)
 
     def _depart(self, name: str, why: str) -> None:
@@ -152,7 +163,10 @@ class ArcEvents:
         if arc is None or (arc.holds and arc.afterwards is Afterwards.GONE):
             return
         self._leaves(arc)
-        self._transitions.trace.record(trace.about("depart", self._transitions.now_s, name), because(why, ""))
+        self._remove(arc, why)
+
+    def _remove(self, arc: ArcEntry, why: str) -> None:
+        self._transitions.trace.record(trace.about("depart", self._transitions.now_s, arc.name), because(why, ""))
         if not arc.holds:
             self._forget(arc)
         elif arc.state is RequestState.REVOKING:
@@ -164,6 +178,8 @@ class ArcEvents:
         """Set other run times from the ARC's next slice on; times that cannot be planned change nothing."""
         arc, minimum_s = self._state.arcs.get(event.arc), event.minimum_runtime_s
         maximum_s = max(event.maximum_runtime_s, self._longest_s(minimum_s))
+        if event.arc in self._successors and can_be_planned(minimum_s, maximum_s):
+            self._change_successor(event.arc, minimum_runtime_s=minimum_s, maximum_runtime_s=event.maximum_runtime_s)
         if arc is None or (arc.minimum_s, arc.maximum_s) == (minimum_s, maximum_s):
             return
         if not can_be_planned(minimum_s, maximum_s):
@@ -180,6 +196,45 @@ class ArcEvents:
         until_s = min(until_s, arc.slice_s + arc.maximum_s)
         if until_s > arc.end_s:
             self._transitions.extend(arc, until_s)
+
+    # Packets that take longer than declared.
+
+    def packets_measured(self, rc: str, times: Measured) -> None:
+        """Count packets as long as an RC measured them; an ARC that waits asks anew."""
+        for (name, kind), packet_time_s in times.items():
+            arc = self._state.arcs.get(name)
+            if arc is None or not any(usage.kind == kind for usage in arc.uses.get(rc, _NO_USE).streams):
+                continue
+            if not self._packet_times.take(rc, name, kind, packet_time_s):
+                continue
+            counted = self._packet_times.counted(name, arc.uses)
+            if counted != arc.uses:
+                self._state.measure(arc, counted)
+                self._understating[name] = arc
+                if arc.state is RequestState.WAITING:
+                    self._ask_anew(arc)
+
+    def ask_anew_where_late(self) -> None:
+        """Let connected ARCs ask anew where an RC cannot serve all of them by the measured times."""
+        held = dict.fromkeys(rc for arc in self._understating.values() if arc.state in CONNECTED for rc in arc.shares)
+        for rc in held:
+            for arc in self._table.understating(rc):
+                self._ask_anew(arc)
+
+    def ask_anew_beside(self, arc: ArcEntry) -> bool:
+        """Let holders ask anew beside which the ARC would be late; return whether there are any."""
+        asked = dict.fromkeys(holder for rc in arc.shares for holder in self._table.understating(rc, [arc]))
+        for holder in asked:
+            self._ask_anew(holder)
+        return bool(asked)
+
+    def _ask_anew(self, arc: ArcEntry) -> None:
+        """Remove the ARC, and take in the same request with the measured times once its RCs are free."""
+        request = msgspec.structs.replace(
+            arc.request, minimum_runtime_s=arc.minimum_s, maximum_runtime_s=arc.maximum_s, idle=False
+        )
+        self._successors[arc.name] = Requested(request, tuple(arc.uses))
+        self._remove(arc, "packets")
 
     # Outcomes of context switches.
 
@@ -217,6 +272,8 @@ class ArcEvents:
             self.wanted(name)
         elif afterwards is Afterwards.GONE:
             self._forget(arc)
+        elif waits and arc.understates:
+            self._ask_anew(arc)
 
     # ARCs that could not open their gates.
 
@@ -245,7 +302,8 @@ class ArcEvents:
         for rc in event.rcs:
             self._transitions.trace.introduce_rc(self._state.rcs[rc], self._transitions.now_s)
         place_in_tree = self._priorities.place(request)
-        uses, path = _chosen(request, event.rcs), self._tree.path(place_in_tree)
+        uses = self._packet_times.counted(request.arc, _chosen(request, event.rcs))
+        path = self._tree.path(place_in_tree)
         longest_s = self._longest_s(request.minimum_runtime_s)
         arc = self._state.add_arc(request, uses, place_in_tree, path, longest_s, self._transitions.now_s)
         wait_s = 0.0 if request.idle else self._damping.wait_s(request.owner, self._transitions.now_s)
@@ -262,6 +320,7 @@ class ArcEvents:
 
     def _forget(self, arc: ArcEntry) -> None:
         self._retrying.pop(arc.name, None)
+        self._understating.pop(arc.name, None)
         self._state.forget(arc)
         successor = self._successors.pop(arc.name, None)
         if successor is not None:
@@ -270,8 +329,11 @@ class ArcEvents:
     def _successor_idles(self, name: str, *, idle: bool) -> None:
         """Apply an event also to the request that waits for the end of the old one of this name."""
         if name in self._successors:
-            event = self._successors[name]
-            self._successors[name] = Requested(msgspec.structs.replace(event.request, idle=idle), event.rcs)
+            self._change_successor(name, idle=idle)
+
+    def _change_successor(self, name: str, **changes: object) -> None:
+        event = self._successors[name]
+        self._successors[name] = Requested(msgspec.structs.replace(event.request, **changes), event.rcs)
 
     def _record_idle(self, name: str, cause: str) -> None:
         self._transitions.trace.record(trace.about("idle", self._transitions.now_s, name), cause)

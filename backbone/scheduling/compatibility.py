@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 from backbone.scheduling.entries import ArcEntry, RcEntry
 from backbone.scheduling.priority import by_precedence
-from backbone.scheduling.response_time import Analysis, admissible, exceeds
+from backbone.scheduling.response_time import Analysis, Stream, admissible, exceeds
 
 SETS_REMEMBERED = 4096  # chosen: sets of users of one RC; a group of 30 meets some hundred between two arrivals
 
@@ -64,6 +64,10 @@ class Compatibility:
         """Return whether the sharable RC can serve all of these."""
         return self.has_room_for_all(rc) or self._admissible(rc, users)
 
+    def serves_measured(self, rc: str, users: Sequence[ArcEntry]) -> bool:
+        """Return whether the sharable RC can serve all of these with the packet times that were measured."""
+        return self._serves(rc, users, [user.measured[rc] for user in users])
+
     def has_room_for_all(self, rc: str) -> bool:
         """Return whether the whole active demand fits at once (rule 15): then every part of it does."""
         if rc not in self._roomy:
@@ -93,12 +97,16 @@ class Compatibility:
         known = self._admitted.setdefault(rc, {})
         key = frozenset(users)
         if key not in known:
-            known[key] = self._serves(rc, users)
+            known[key] = self._serves(rc, users, [user.streams[rc] for user in users])
         return known[key]
 
-    def _serves(self, rc: str, users: Sequence[ArcEntry]) -> bool:
+    def _serves(self, rc: str, users: Sequence[ArcEntry], demands: Sequence[Sequence[Stream]]) -> bool:
         capacity = self._rcs[rc].capacity
-        streams = [(user, packets, number) for user in users for number, packets in enumerate(user.streams[rc])]
+        streams = [
+            (user, packets, number)
+            for user, demand in zip(users, demands, strict=True)
+            for number, packets in enumerate(demand)
+        ]
         if exceeds(capacity, [packets for _, packets, _ in streams]):
             return False
         ranked = by_precedence(streams, lambda s: s[0].path, lambda s: (s[1].period_us, s[0].name, s[2]))

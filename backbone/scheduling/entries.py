@@ -79,7 +79,8 @@ class ArcEntry:
         touches: The RCs it uses, as a set of bits.
         excludes: Those of them it uses exclusively.
         shares: Names of those it uses by streams.
-        streams: Sharable RC → its streams there.
+        streams: Sharable RC → its streams there, as its present request has them in the trace.
+        measured: The same with the packet times that RCs measured, where those are longer.
         stamp: When it became active or was last served, and which of several at that time it was.
         reservation: Set while RCs are being freed for it by force, or where equals reserve nothing from each other: it
             comes before all equals; smaller is earlier.
@@ -116,6 +117,7 @@ class ArcEntry:
     excludes: int
     shares: tuple[str, ...]
     streams: Mapping[str, Sequence[Stream]]
+    measured: Mapping[str, Sequence[Stream]]
     stamp: tuple[float, int] = (0.0, 0)
     reservation: int | None = None
     state: RequestState = RequestState.IDLE
@@ -144,6 +146,11 @@ class ArcEntry:
     def goes_before(self, other: ArcEntry) -> bool:
         """Return whether its owner is strictly higher than the other's."""
         return self.level is not other.level and higher(self.path, other.path)
+
+    @property
+    def understates(self) -> bool:
+        """Whether its packets take longer than its present request says."""
+        return self.measured is not self.streams
 
     @property
     def active(self) -> bool:

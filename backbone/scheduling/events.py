@@ -76,6 +76,18 @@ class CapacityChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class PacketsMeasured:
+    """A sharable RC measured packets that take longer than their ARCs declared.
+
+    Attributes:
+        times: ARC and kind of packets → the longest time of one of them, in seconds.
+    """
+
+    rc: str
+    times: Mapping[tuple[str, str], float]
+
+
+@dataclass(frozen=True, slots=True)
 class Requested:
     """An ARC sent a request; the set of RCs is already chosen (``choose`` in the schedule manager)."""
 
@@ -188,6 +200,7 @@ Event = (
     | RcRemoved
     | RcCameBack
     | CapacityChanged
+    | PacketsMeasured
     | Requested
     | Adopted
     | Wanted
@@ -229,7 +242,7 @@ class RevokeArc:
 
     Attributes:
         epochs: RC → epoch it held.
-        why: ``slice``, ``higher``, ``rc``, ``self``, ``owner``, ``dead``, ``capacity``, ``failed``.
+        why: ``slice``, ``higher``, ``rc``, ``self``, ``owner``, ``dead``, ``capacity``, ``failed``, ``packets``.
         by: ARC or RC that caused it; empty for ``self``.
         deadline_s: Seconds its decision process has to stop cleanly; 0: none.
         expected_s: Predicted next grant; negative: none.

@@ -44,6 +44,8 @@ def _broken_of(schedule: MasterSchedule, rc: RcEntry, holders: Sequence[ArcEntry
     connected = [arc for arc in holders if arc.state in CONNECTED]
     if connected and not rc.up:
         yield f"{rc.name} is down and has no holders", connected
+    if rc.sharable and any(arc.understates for arc in connected) and schedule.table.understating(rc.name):
+        yield f"{rc.name} serves all its holders in time, with the packet times that were measured", connected
     for arc in connected:
         if not schedule.table.fits(arc, [other for other in connected if other is not arc]):
             yield f"{rc.name} serves all its holders in time", connected

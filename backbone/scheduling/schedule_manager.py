@@ -32,6 +32,7 @@ from backbone.scheduling.events import (
     NodeMoved,
     Opened,
     OpenFailed,
+    PacketsMeasured,
     PriorityChanged,
     RcCameBack,
     RcKnown,
@@ -126,6 +127,7 @@ class ScheduleManager:
         self._arcs.retry()
         self._state.end_slices(self._transitions.now_s)
         self._priorities.age()
+        self._arcs.ask_anew_where_late()
         while turn := self.master_schedule.due(self._transitions.now_s):
             self._switch(turn)
             self._priorities.age()
@@ -147,6 +149,8 @@ class ScheduleManager:
                 self._rcs.came_back(rc, last_epoch)
             case CapacityChanged(rc=rc, capacity=capacity):
                 self._rcs.capacity_changed(rc, capacity)
+            case PacketsMeasured(rc=rc, times=times):
+                self._arcs.packets_measured(rc, times)
             case Requested():
                 self._arcs.requested(event)
             case Adopted():
@@ -180,7 +184,8 @@ class ScheduleManager:
     def _switch(self, turn: Turn) -> None:
         """Connect the ARC whose turn it is, or first revoke the holders of its RCs."""
         if not turn.in_the_way:
-            self._transitions.connect(turn.arc)
+            if not self._arcs.ask_anew_beside(turn.arc):
+                self._transitions.connect(turn.arc)
             return
         for holder in in_order_of_revocation(turn):
             overridden = higher(turn.arc.path, holder.path)

@@ -167,6 +167,7 @@ class ScheduleState:
         """
         rcs = [self.rcs[rc] for rc in uses]
         shares = tuple(rc.name for rc in rcs if rc.sharable and uses[rc.name].streams)
+        streams = {rc.name: [stream(usage) for usage in uses[rc.name].streams] for rc in rcs if rc.sharable}
         arc = ArcEntry(
             request=request,
             uses=uses,
@@ -181,7 +182,8 @@ class ScheduleState:
             touches=sum(self._bits[rc.name] for rc in rcs),
             excludes=sum(self._bits[rc.name] for rc in rcs if rc.name not in shares),
             shares=shares,
-            streams={rc.name: [stream(usage) for usage in uses[rc.name].streams] for rc in rcs if rc.sharable},
+            streams=streams,
+            measured=streams,
         )
         self.arcs[arc.name] = arc
         return arc
@@ -189,6 +191,11 @@ class ScheduleState:
     def request_again(self, arc: ArcEntry, request: SchedulingRequest) -> None:
         """Keep the ARC's newest request."""
         arc.request = request
+
+    def measure(self, arc: ArcEntry, uses: Mapping[str, RcUse]) -> None:
+        """Note the uses with which its packets would be as long as measured; its present request does not change."""
+        arc.measured = {rc: [stream(usage) for usage in uses[rc].streams] for rc in arc.streams}
+        self._concerns(arc.shares)
 
     def set_run_times(self, arc: ArcEntry, minimum_s: float, maximum_s: float) -> None:
         """Set the lengths of its slices from the next one on."""

@@ -160,6 +160,23 @@ class Table:
             (kept if self.state.compatibility.can_share(rc, [*kept, holder]) else left).append(holder)
         return left[::-1]
 
+    def understating(self, rc: str, joining: Sequence[ArcEntry] = ()) -> list[ArcEntry]:
+        """Return the connected ARCs that must ask anew, so that the RC serves the rest by measured packet times.
+
+        Only ARCs whose packets take longer than their requests say, the last in order first, no more than necessary.
+
+        Args:
+            joining: An ARC that is about to be connected, too.
+        """
+        kept = [holder for holder in self.state.rcs[rc].holders if holder.state in CONNECTED] + [*joining]
+        asked: list[ArcEntry] = []
+        for holder in self.in_order([one for one in kept if one.understates and one not in joining])[::-1]:
+            if self.state.compatibility.serves_measured(rc, kept):
+                break
+            kept.remove(holder)
+            asked.append(holder)
+        return asked
+
 
 def _later(arc: ArcEntry) -> tuple[float, int]:
     """Return a key by which the ARC with the younger stamp comes first."""

@@ -26,6 +26,7 @@ _CAUSES: Mapping[str, str] = {
     "rc": "{by} does not answer (rule 11)",
     "capacity": "{by} can give less than before (rule 11)",
     "order": "{by} cannot serve all its holders in time in their new order (rule 11)",
+    "packets": "its packets take longer than it declared, and the longer time must count (rule 1)",
     "failed": "it could not open its gate",
     "self": "its owner wants no time any more",
     "owner": "its owner ended",

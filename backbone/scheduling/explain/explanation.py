@@ -13,6 +13,7 @@ from typing import NamedTuple
 from backbone.naming import component_of
 from backbone.scheduling.entries import INSTANT_S, ArcEntry, RcEntry
 from backbone.scheduling.explain.blockers import Blockers
+from backbone.scheduling.explain.packet_lines import packet_lines
 from backbone.scheduling.explain.start_prediction import StartPrediction
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.planner import Slot
@@ -31,6 +32,7 @@ _REASONS = {
     "rc": "{by} does not answer",
     "capacity": "{by} can give less than before",
     "order": "{by} could not serve all its holders in time in their new order",
+    "packets": "its packets took longer than it had declared",
     "failed": "it could not open its gate",
     "self": "its owner wanted no time any more",
 }
@@ -216,6 +218,7 @@ class Explanation:
             would_change = self._would_let_it_start(arc, blockers, answer.would_change)
         if arc.swapped_out and arc.state is RequestState.WAITING:
             lines.append(f"it lost its RCs last because {_reason(arc)}")
+        lines += packet_lines(arc)
         if arc.raised:
             lines.append(
                 f"it rose by {counted(arc.raised, 'level')} because it waits long; it comes down again once served"

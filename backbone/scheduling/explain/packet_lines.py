@@ -1,0 +1,24 @@
+"""Packet lines: what ARCs declared of their packets and what was measured, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from backbone.scheduling.entries import ArcEntry
+
+
+def packet_lines(arc: ArcEntry) -> list[str]:
+    """Return a line for each stream of the ARC whose packets take longer than it declared."""
+    return [*_lines(arc)]
+
+
+def _lines(arc: ArcEntry) -> Iterator[str]:
+    declared = next((wish for wish in arc.request.alternatives if wish.keys() == arc.uses.keys()), {})
+    counts = "the longer time counts as soon as its slice ends, or another needs the room"
+    for rc in arc.shares:
+        for number, usage in enumerate(declared[rc].streams if rc in declared else ()):
+            takes_s = arc.measured[rc][number].packet_us / 1e6
+            if takes_s > usage.packet_time_s:
+                what = f"its {usage.kind} packets" if usage.kind else "its packets"
+                times = f"on {rc} take {takes_s * 1e3:.3g} ms, it declared {usage.packet_time_s * 1e3:.3g}"
+                yield f"{what} {times}: {counts if arc.understates else 'the longer time counts'}"
