@@ -364,7 +364,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     # ------------------------------------------------------------------ the tree
     async def _take(self, taken: TakeBranch) -> BranchTaken:
-        """Take the place in the changed tree; a message that comes again finds all done, and waits for the same ends."""
+        """Take the place in the changed tree; a message that comes again waits for the same ends."""
         if taken.version >= self._tree_version:
             anew = taken.anew if taken.version > self._tree_version else []
             self._tree_version = taken.version

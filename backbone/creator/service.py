@@ -118,7 +118,7 @@ class Creator(Component[CreatorParameters]):
             await self.clock.sleep_s(LOAD_EACH_S * self.clock.rate)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``Spawn``, ``ReviseSpawn`` and ``EndProcess`` of the placer, and ``ListProcesses`` of any component."""
+        """Answer ``ListProcesses``, and the placer's ``Spawn``, ``ReviseSpawn`` and ``EndProcess``."""
         question: Message = asked.body
         match question:
             case Spawn():
