@@ -23,6 +23,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
 from backbone.errors import LinkError, Refusal
+from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
@@ -88,7 +89,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior
+    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior | TakeBranch
     children_together: ClassVar[bool] = True
     children_allowed: ClassVar[tuple[int, int] | None] = None
     may_claim: ClassVar[bool] = True
@@ -120,6 +121,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         )
         self._suspended_because = self._reported_because = ""
         self._is_wound_up = False
+        self._tree_version, self._left = 0, set[str]()
+        self._claim: dict[str, object] = {}
         self._parent: ParentReports | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._acting: asyncio.Task[None] | None = None
@@ -197,7 +200,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self._children.begin()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer the ARC, the children, and ``AskBehavior``."""
+        """Answer the ARC, the children, ``AskBehavior`` and ``TakeBranch``."""
         match asked.body:
             case ChildReport(child=child) as report:
                 if child not in self._nodes or child != component_of(asked.source):
@@ -206,6 +209,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 return ReportNoted()
             case AskBehavior():
                 return self.behavior_state()
+            case TakeBranch() as taken:
+                return await self._take(taken)
             case body if isinstance(body, ArcNotice):
                 if self.arc is None:
                     raise NotMyArc(f"{self.name} claims no ARC")
@@ -284,8 +289,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """True if it sends no commands, because it overrides neither ``act`` nor ``suspending``."""
         return type(self).act is BehaviorHooks.act and type(self).suspending is BehaviorHooks.suspending
 
-    async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
-        parameters = claim_parameters(
+    def _claim_of(self, need: ArcNeed) -> dict[str, object]:
+        return claim_parameters(
             self.address,
             path=[PathNode(name, priority) for name, priority in self.path],
             minimum_runtime_s=need.minimum_runtime_s,
@@ -296,8 +301,11 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             stops_at_once=self._commands_nothing,
             may_say_not_now=type(self).not_now is not BehaviorHooks.not_now,
         )
+
+    async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
+        self._claim = self._claim_of(need)
         try:
-            await arc.keep(self.clock, need.kind, parameters, patience_s=START_PATIENCE_S, on_changed=self.changed)
+            await arc.keep(self.clock, need.kind, self._claim, patience_s=START_PATIENCE_S, on_changed=self.changed)
         except Refusal as refusal:
             self.report(f"no ARC: {refusal}")
             self.finish(BehaviorStatus.FAILURE, why(refusal))
@@ -353,6 +361,24 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 log.info("%s is not released: %s", self.arc.arc, refusal)
                 return None
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
+
+    # ------------------------------------------------------------------ the tree
+    async def _take(self, taken: TakeBranch) -> BranchTaken:
+        """Take the place in the changed tree; a message that comes again waits for the same ends."""
+        if taken.version >= self._tree_version:
+            anew = taken.anew if taken.version > self._tree_version else []
+            self._tree_version = taken.version
+            self.parameters = self._with_parameters(taken.place)
+            before, nodes = set(self._nodes), {node.name: node for node in self.parameters.children}
+            self._left = (self._left | before) - nodes.keys()
+            self._nodes.clear()
+            self._nodes.update(nodes)
+            if self._claim and (need := self.need()) is not None:
+                self._claim.update(self._claim_of(need))
+            self.story.note(self.name, f"takes its place in version {taken.version} of the tree")
+            self.children_changed()
+            await self._children.rearranged(self._left, anew)
+        return BranchTaken(str(self.status) if self.status.is_final else "")
 
     # ------------------------------------------------------------------ the children and the parent
     def _children_arranged(self) -> None:

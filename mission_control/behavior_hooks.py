@@ -26,8 +26,8 @@ class BehaviorHooks:
     def need(self) -> ArcNeed | None:
         """Return the ARC to claim.
 
-        When: once, after ``start``. What: by default the ARC of the tree; a behavior that computes better run times
-        returns the same need with these. Not: ask for another kind of ARC.
+        When: after ``start``, and after a change of the tree at this behavior. What: by default the ARC of the tree; a
+        behavior that computes better run times returns the same need with these. Not: ask for another kind of ARC.
         """
         return None
 
@@ -117,6 +117,13 @@ class BehaviorHooks:
         """Report which children run.
 
         When: after each event of the children and each start and stop. What: by default, nothing.
+        """
+
+    def children_changed(self) -> None:
+        """Take notice of other children.
+
+        When: after a change of the tree at or below this behavior, before children of it start or stop; the parameters
+        have the new nodes. What: subscribe to new ones. Not: start or stop children here.
         """
 
     async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:

@@ -15,7 +15,7 @@ from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import PathStep
 from backbone.naming import Subsystem, address, component_of
-from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, StopComponent
+from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
 from backbone.wire import Envelope
 from mission_control.behavior_tree import BehaviorNode
@@ -52,7 +52,7 @@ class ChildKeeper:
         Args:
             bus: Bus of the behavior.
             clock: The mission's clock.
-            nodes: Name of a child → its node.
+            nodes: Name of a child → its node, as they are now.
             path: Names and priorities from the mission's root to the behavior, as they are now.
             reported: A child's status, payload, and why it is suspended: it finished, cannot run, or is adopted.
             left: An order stopped a child.
@@ -80,8 +80,17 @@ class ChildKeeper:
 
     async def _keep_child(self, name: str) -> None:
         """Keep the child running until an order stops it; adopt a child of an earlier life of this behavior."""
-        wish = self._wishes[name] = Wish(name)
-        order, at = self._nodes[name].order(self._path()), address(Subsystem.MISSION_CONTROL, name)
+        node = self._nodes.get(name)
+        if node is None:  # it left the tree before its start
+            return
+        wish, at = Wish(name), address(Subsystem.MISSION_CONTROL, name)
+        self._wishes[name], latest = wish, node
+
+        def order() -> Start:
+            nonlocal latest
+            latest = self._nodes.get(name, latest)
+            return latest.order(self._path())
+
         try:
             stopped = await keep_placed(
                 self._bus,

@@ -8,6 +8,8 @@ Rules of this file:
 * After each event the rules compare the children that shall run now (``wanted``) with those that run.
 * A child is stopped before it is started again; none is started after the parent has finished; the parent finishes at
   most once, and by then everything that was started is stopped.
+* The children may change at any time. A new one counts as in the file from the beginning and not run yet, one that is
+  gone as never in it. A change interrupts no child that stays: one that was put before a running one comes after it.
 
 Source: SMC 2000, "Mission Control": behaviors spawn children; a finished child returns its status
 to its parent, which decides what comes next.
@@ -16,7 +18,7 @@ to its parent, which decides what comes next.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import ClassVar
@@ -89,6 +91,7 @@ class Children:
     def __init__(self, names: Sequence[str], *, together: bool = True) -> None:
         self._names, self._together = tuple(names), together
         self._open, self._running = list(names), list[str]()
+        self._has_begun = False
         self.has_finished = False
         """True once the parent has finished; from then on no instruction follows."""
         self.status: dict[str, BehaviorStatus] = {}
@@ -121,7 +124,30 @@ class Children:
     # ------------------------------------------------------------------ events
     def begin(self, now_s: float) -> list[Instruction]:
         """Return the orders for the children that run first; none for a behavior without children."""
-        return self._arrange(now_s) if self._names else []
+        self._has_begun = True
+        return self._settle(now_s)
+
+    def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
+        """Return the instructions after the children were changed.
+
+        Args:
+            names: Names of all children from now on, in the order of the mission file.
+            anew: Those of them that begin again as new ones.
+        """
+        gone = [name for name in self._names if name not in names or name in anew]
+        new = [name for name in names if name not in self._names or name in anew]
+        stops: list[Instruction] = [StopChild(name) for name in reversed(self._running) if name in gone]
+        for name in gone:
+            for known in (self.status, self.payload, self.suspensions):
+                known.pop(name, None)
+        self._running = [name for name in self._running if name not in gone]
+        self._names = tuple(names)
+        if self.has_finished:
+            return []
+        still = [name for name in self._open if name not in gone]
+        self._open = [name for name in still if name in self._running]
+        self._open += [name for name in names if name in (*still, *new) and name not in self._running]
+        return [*stops, *self._settle(now_s)] if self._has_begun else []
 
     def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
         """Record a report; return True if the child has newly finished and the parent must decide."""
@@ -221,6 +247,10 @@ class Children:
         return f"{name} failed ({given})" if given else f"{name} failed"
 
     # ------------------------------------------------------------------ within
+    def _settle(self, now_s: float) -> list[Instruction]:
+        """Arrange; a behavior that has no children waits for none."""
+        return self._arrange(now_s) if self._names else []
+
     def _remark(self, name: str) -> str:
         if name in self.suspensions:
             return f"suspended: {self.suspensions[name].because}"

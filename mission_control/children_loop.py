@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Collection, Coroutine, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
@@ -56,7 +56,7 @@ class ChildrenLoop:
         Args:
             bus: Bus of the behavior.
             clock: The mission's clock.
-            nodes: Name of a child → its node.
+            nodes: Name of a child → its node, as they are now.
             path: Names and priorities from the mission's root to the behavior, as they are now.
             rules: What follows an event.
             hooks: The behavior's decisions.
@@ -69,7 +69,7 @@ class ChildrenLoop:
         """
         self.rules = rules
         """The state of the children."""
-        self._clock, self._hooks, self._owner, self._has_children = clock, hooks, owner, bool(nodes)
+        self._clock, self._hooks, self._owner, self._nodes = clock, hooks, owner, nodes
         self._begin, self._note, self._changed, self._arranged = begin, note, changed, arranged
         self._keeper = ChildKeeper(
             bus,
@@ -93,7 +93,7 @@ class ChildrenLoop:
     def begin(self) -> None:
         """Start the children that run first; end those of an earlier life that do not."""
         self._carry_out(self.rules.begin(self._now_s()))
-        if self._has_children:
+        if self._nodes:
             self._begin(
                 self._keeper.stop_those_of_an_earlier_life(lambda name: name in self.rules.status),
                 "children of an earlier life",
@@ -112,6 +112,21 @@ class ChildrenLoop:
     def look_again(self) -> None:
         """Apply the rules now, after a change of their settings."""
         self._carry_out(self.rules.time_passed(self._now_s()))
+
+    async def rearranged(self, gone: Collection[str], anew: Collection[str]) -> None:
+        """Apply the rules to the nodes as they are now; return when no child that is gone runs any more.
+
+        Args:
+            gone: Names that are not among the nodes any more.
+            anew: Names of nodes that end and begin anew.
+        """
+        for name in (*gone, *anew):
+            if self._given_up.pop(name, None) is not None:
+                self._changed()
+        self._carry_out(self.rules.rearranged(list(self._nodes), anew, self._now_s()))
+        for name in gone:
+            if name in self._last_orders:
+                await self._last_orders[name].wait()
 
     async def end(self) -> None:
         """Return when all started children have ended; no other is started."""

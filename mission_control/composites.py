@@ -14,7 +14,7 @@ Each rule reads its settings when it is applied, so that the owner may change th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from enum import StrEnum
 from typing import ClassVar
 
@@ -39,8 +39,8 @@ class Composite(Children):
     expects_failures = True
     in_file_order = True
 
-    def begin(self, now_s: float) -> list[Instruction]:
-        """Return the orders for the children that run first, or the end of a parent that has nothing to wait for."""
+    def _settle(self, now_s: float) -> list[Instruction]:
+        """Arrange, also without children: then the parent has nothing to wait for."""
         return self._arrange(now_s)
 
     @property
@@ -211,6 +211,12 @@ class Again(Composite):
         self._ends += has_finished
         return has_finished
 
+    def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
+        """Count from the beginning for a new child; see ``Children.rearranged``."""
+        if any(name not in self._names or name in anew for name in names):
+            self._ends, self._starts_at_s = 0, -math.inf
+        return super().rearranged(names, anew, now_s)
+
     def decision(self, name: str) -> Decision:
         """Return retry while starts are left."""
         if self.status[name] is self.again_after and (self.most < 0 or self._ends < self.most):
@@ -302,6 +308,14 @@ class WithTimeout(Composite):
         is_counted = not because or self.while_suspended is WhileSuspended.COUNT
         self._watch.run(now_s, running=is_counted)
         return super().suspended(name, because, now_s)
+
+    def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
+        """Let the clock go on if the suspended child is gone; see ``Children.rearranged``."""
+        was_suspended = bool(self.suspensions)
+        instructions = super().rearranged(names, anew, now_s)
+        if was_suspended and not self.suspensions:
+            self._watch.run(now_s, running=True)
+        return instructions
 
     def verdict(self, now_s: float) -> FinishParent | None:
         """Return failure when the time is over."""

@@ -36,6 +36,7 @@ from backbone.command_line.options import (
     named_value,
     run,
 )
+from backbone.command_line.tree_commands import tree
 from backbone.component.log_level import LogLevel
 from backbone.launcher.endings import ExitCode, say
 from backbone.spoken import counted
@@ -331,6 +332,9 @@ def set_(
     if parameter is not None and value is not None:
         run(lambda: set_attribute(where, name, parameter, json_or_text(value)))
     run(lambda: print_attributes(where, name, parameter, as_json=as_json))
+
+
+app.add_typer(tree, name="tree")
 
 
 @app.command()

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Mapping
 from pathlib import Path
 from typing import ClassVar, Generic, TypeVar, cast
 
@@ -448,7 +448,7 @@ class Component(Generic[P_co]):
         old = msgspec.to_builtins(self.parameters)
         if name not in old:
             raise WrongParameter(f"{self.name} has no parameter {name!r}; it has: {', '.join(sorted(old)) or 'none'}")
-        before, self.parameters = self.parameters, cast(P_co, _convert({**old, name: value}, self.parameters_type))
+        before, self.parameters = self.parameters, self._with_parameters({name: value})
         try:
             self.parameters_changed()
         except Refusal:
@@ -456,6 +456,14 @@ class Component(Generic[P_co]):
             raise
         self.story.note(name, f"{user} set {name} from {value_text(old[name])} to {value_text(value)}")
         return Parameters(msgspec.to_builtins(self.parameters))
+
+    def _with_parameters(self, changed: Mapping[str, object]) -> P_co:
+        """Return the parameters with other values for these.
+
+        Raises:
+            WrongParameter: The values do not fit.
+        """
+        return cast(P_co, _convert({**msgspec.to_builtins(self.parameters), **changed}, self.parameters_type))
 
 
 AnyComponent = Component[msgspec.Struct]

@@ -90,6 +90,21 @@ class Spawned(Message, frozen=True):
     pid: Pid
 
 
+class ReviseSpawn(Message, frozen=True):
+    """Start the component with these parameters from its next start on. Only the placer asks this.
+
+    Attributes:
+        parameters: All of them; the running process keeps its own.
+    """
+
+    name: Name
+    parameters: Values
+
+
+class SpawnRevised(Message, frozen=True):
+    """Answer to ``ReviseSpawn``: each restart from now on uses the new parameters."""
+
+
 class EndProcess(Message, frozen=True):
     """End a component's whole process tree: ask, then SIGTERM, then SIGKILL.
 
@@ -233,7 +248,7 @@ class NotThePlacer(Refusal):
     remedy = "Ask the placer to start or stop the component."
 
 
-CreatorQuestion = Spawn | EndProcess | ListProcesses
+CreatorQuestion = Spawn | ReviseSpawn | EndProcess | ListProcesses
 
 
 def creator_name(host: str) -> str:

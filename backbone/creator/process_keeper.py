@@ -166,6 +166,18 @@ class ProcessKeeper:
         except TimeoutError:
             raise self._failed(name, f"was not ready within {within_s:g} s") from None
 
+    def revise(self, name: str, parameters: dict[str, Any]) -> None:
+        """Start the component with these parameters from its next start on; its running process stays as it is.
+
+        Raises:
+            NotHere: No component of this name is here.
+        """
+        kept = self._kept.get(name)
+        if kept is None:
+            raise NotHere(f"no {name} here", name=name)
+        kept.launch = msgspec.structs.replace(kept.launch, parameters=parameters)
+        kept.order = msgspec.structs.replace(kept.order, parameters=parameters)
+
     # End
     async def end(
         self, name: str, reason: str = "", ask_s: float = _DEFAULTS.ask_s, term_s: float = _DEFAULTS.term_s

@@ -30,8 +30,10 @@ from backbone.creator.messages import (
     NotThePlacer,
     Processes,
     ProcessFell,
+    ReviseSpawn,
     Spawn,
     Spawned,
+    SpawnRevised,
     UnlistedType,
 )
 from backbone.creator.process_keeper import ProcessKeeper
@@ -116,12 +118,17 @@ class Creator(Component[CreatorParameters]):
             await self.clock.sleep_s(LOAD_EACH_S * self.clock.rate)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``Spawn`` and ``EndProcess`` of the placer, and ``ListProcesses`` of any component."""
+        """Answer ``ListProcesses``, and the placer's ``Spawn``, ``ReviseSpawn`` and ``EndProcess``."""
         question: Message = asked.body
         match question:
             case Spawn():
                 self._refuse_strangers(asked)
                 return await self._spawn(question)
+            case ReviseSpawn(name=name, parameters=parameters):
+                self._refuse_strangers(asked)
+                self._keeper.revise(name, parameters)
+                self.story.note(name, "starts with other parameters from its next start on")
+                return SpawnRevised()
             case EndProcess(name=name, reason=reason, ask_s=ask_s, term_s=term_s):
                 self._refuse_strangers(asked)
                 ended = await self._keeper.end(name, reason, ask_s, term_s)

@@ -18,15 +18,17 @@ from backbone.authentication import SECRET_NAME
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, LogLevel, Stop, Stopping
+from backbone.component.messages import Absence, LifeState, LogLevel, Stop, Stopping
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnded, Processes, ProcessFell, StartFailed
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.health_watch import HealthWatch
+from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
+from backbone.launcher.tree_keeper import TreeKeeper
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
@@ -49,7 +51,7 @@ MEET_EACH_S = 0.1  # chosen: too short to notice, and a hundred times the cost o
 class Launcher(Component[NoParameters]):
     """Starts the core services and the mission, restarts core services, stops all."""
 
-    accepts: ClassVar[Accepts | None] = ListProcesses | AskLog | AskPeople
+    accepts: ClassVar[Accepts | None] = ListProcesses | AskLog | AskPeople | AskTree | TreeChange
 
     def __init__(
         self,
@@ -67,6 +69,16 @@ class Launcher(Component[NoParameters]):
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
         self._wishes: list[Wish] = []
+        self._keeping: dict[str, asyncio.Task[None]] = {}
+        self._tree = TreeKeeper(
+            bus,
+            clock,
+            description,
+            begin_root=self._begin_root,
+            leave_root=self._leave_root,
+            begin=self.start_task,
+            note=self.story.note,
+        )
         self._awaited: set[str] = set()
         self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
         self._log = LogKeeper(bus)
@@ -83,6 +95,7 @@ class Launcher(Component[NoParameters]):
             async with self._step(launch.name):
                 await self._keeper.start(launch, CORE_POLICY, READY_WITHIN_S)
         self.bus.watch_alive(f"{Subsystem.BACKBONE}/*", self._backbone_changed)
+        self._tree.watch()
 
     async def serve(self) -> None:
         """Start the mission through the placer and keep it running; publish its health."""
@@ -113,7 +126,7 @@ class Launcher(Component[NoParameters]):
         self.end(signal.SIGINT.name)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``ListProcesses`` for the core services, ``AskLog`` and ``AskPeople``."""
+        """Answer ``ListProcesses`` for the core services, ``AskLog``, ``AskPeople``, and all about the tree."""
         match asked.body:
             case ListProcesses():
                 return Processes(self.launch.host, [], self._keeper.processes())
@@ -121,6 +134,12 @@ class Launcher(Component[NoParameters]):
                 return self._log.log.answer(wanted)
             case AskPeople():
                 return PeopleKnown(self._log.log.people.consoles)
+            case AskTree():
+                return self._tree.tree()
+            case change if isinstance(change, TreeChange):
+                if self.outcome.ready_after_s is None or self.state is not LifeState.READY:
+                    raise NotUpYet(f"{self._description.name} is coming up or ending")
+                return await self._tree.change(change, asked.source)
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
@@ -198,10 +217,32 @@ class Launcher(Component[NoParameters]):
         Raises:
             Refusal: The first refusal of a start.
         """
-        placed = [asyncio.get_running_loop().create_future() for _ in orders]
-        for order, first in zip(orders, placed, strict=True):
-            self.start_task(self._keep(order, first), f"keep {order.name}")
-        await asyncio.gather(*placed)
+        await asyncio.gather(*map(self._begin_keeping, orders))
+
+    def _begin_keeping(self, order: Start) -> asyncio.Future[None]:
+        """Keep the component running from now on; the result is there when it runs, or is its refusal."""
+        placed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._keeping[order.name] = self.start_task(self._keep(order, placed), f"keep {order.name}")
+        return placed
+
+    async def _begin_root(self, order: Start) -> None:
+        """Start a root that came into the tree.
+
+        Raises:
+            Refusal: It was not started, and is not wanted.
+        """
+        try:
+            await self._begin_keeping(order)
+        except Refusal:
+            await self._leave_root(order.name)
+            raise
+
+    async def _leave_root(self, name: str) -> None:
+        """Want a root no longer."""
+        if (keeping := self._keeping.pop(name, None)) is not None:
+            await end_tasks(keeping)
+        self._awaited.discard(name)
+        self.changed()
 
     async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
         """Keep one wish of the mission file; an order to stop suspends it until the component is started again."""
@@ -238,11 +279,15 @@ class Launcher(Component[NoParameters]):
         self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
     ) -> str:
         """Keep it placed; repeat a refused start while another machine is missing or is new to the placer."""
+
+        def newest() -> Start:
+            return self._tree.newest(order)
+
         until_s = time.monotonic() + MEET_TIME_S
         while True:
             try:
                 return await keep_placed(
-                    self.bus, self.clock, wish, order, at, on_placed=now_placed, on_changed=self.changed
+                    self.bus, self.clock, wish, newest, at, on_placed=now_placed, on_changed=self.changed
                 )
             except (NoHost, StartFailed):
                 if not self._others.names or (not self._others.missing and time.monotonic() >= until_s):
@@ -266,7 +311,7 @@ class Launcher(Component[NoParameters]):
 
     async def _stop_mission(self) -> None:
         """Stop behaviors first, which stop their children, then the remaining ARCs, then hardware."""
-        description = self._description
+        description = self._tree.description
         roots = [order.name for order in behavior_orders(description)]
         hardware = [r.name for r in description.resources] + [c.name for c in description.components]
         for name in reversed(roots):

@@ -27,6 +27,7 @@ __all__ = [
     "Node",
     "Path",
     "add",
+    "insert",
     "move",
     "outline",
     "place_for",
@@ -111,6 +112,24 @@ def add(data: bytes, parent: Path, new: NewElement, at: int | None = None) -> by
     indent = _indent_of_children(data, node)
     lines = _written(new, indent)
     return _insert(data, node, number, lines, apart=parent == () and _stands_apart(data, node))
+
+
+def insert(data: bytes, parent: Path, other: bytes, at: int) -> bytes:
+    """Return the text with the root of another text in it, as it is written there, comments inside too.
+
+    Args:
+        parent: Where it goes in.
+        other: The other text.
+        at: Its number among its siblings afterwards.
+
+    Raises:
+        EditRefused: It cannot stand there.
+        MissionInvalid: The other text cannot be read.
+    """
+    node, new = outline(data).at(parent), outline(other)
+    _may_hold(node, new.tag)
+    text = _indented(other[new.begin : new.end], _indent(other, new.begin), _indent_of_children(data, node))
+    return _insert(data, node, min(max(at, 0), len(node.children)), text)
 
 
 def place_for(parent: Node, tag: str, at: int | None = None) -> int:
@@ -340,7 +359,7 @@ def _indented(text: bytes, old: str, new: str) -> bytes:
 
 
 def _shifted(text: bytes, old: str, new: str) -> bytes:
-    return text.replace(b"\n" + old.encode(), b"\n" + new.encode())
+    return re.sub(rb"\n" + re.escape(old.encode()) + rb"(?!\r?\n)", b"\n" + new.encode(), text)
 
 
 def _stands_apart(data: bytes, node: Node) -> bool:

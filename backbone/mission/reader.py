@@ -64,7 +64,7 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
     faults = report.faults()
     if faults or mission is None:
         raise MissionInvalid(faults)
-    return describe(mission, source, known)
+    return describe(mission, source, known, data)
 
 
 def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:

@@ -38,6 +38,7 @@ class OperatorAction(StrEnum):
     STOP_MISSION = "stop_mission"
     START_COMPONENT = "start_component"
     STOP_COMPONENT = "stop_component"
+    CHANGE_TREE = "change_tree"
 
 
 _SENTENCES = {
@@ -63,6 +64,7 @@ _SENTENCES = {
     OperatorAction.STOP_MISSION: "{user} ends it",
     OperatorAction.START_COMPONENT: "{user} started it",
     OperatorAction.STOP_COMPONENT: "{user} stopped it",
+    OperatorAction.CHANGE_TREE: "{user} changes the behavior tree",
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from typing import Any
 
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
@@ -16,6 +17,8 @@ from backbone.creator.messages import (
     NotHere,
     ProcessEnded,
     Processes,
+    ReviseSpawn,
+    SpawnRevised,
     creator_name,
 )
 from backbone.creator.messages import TYPE as CREATOR
@@ -72,6 +75,29 @@ class Creators:
             except LinkError:
                 await self._news.or_at(self._clock.now_s() + ANSWER_EACH_S / 5 * self._clock.rate)
         return None
+
+    async def revise(self, host: str, name: str, parameters: dict[str, Any]) -> None:
+        """Have the component start with these parameters from its next start on this host on.
+
+        Raises:
+            CreatorSilent: The creator lives but does not answer; the outcome is unknown.
+        """
+        try:
+            await ask_until_answered(
+                self._bus,
+                self._clock,
+                creator_of(host),
+                ReviseSpawn(name, parameters),
+                SpawnRevised,
+                each_s=ANSWER_EACH_S,
+                within_s=ANSWER_WITHIN_S,
+            )
+        except NotHere:  # it is on its way to this host, or was lost: the next start has the book's parameters
+            return
+        except LinkError as error:
+            raise CreatorSilent(
+                f"{name}: {error}; {host} may start it as before", name=name, outcome="unknown"
+            ) from error
 
     async def end(self, host: str, name: str, reason: str) -> EndedBy:
         """End the component on this host.

@@ -42,6 +42,21 @@ class Started(Message, frozen=True):
     reasons: Annotated[list[Text], MANY]
 
 
+class ReviseStart(Message, frozen=True):
+    """Start a component with these parameters from its next start on, on whichever host; its owner asks.
+
+    Attributes:
+        parameters: All of them; the running component keeps its own.
+    """
+
+    name: Mention
+    parameters: Values
+
+
+class StartRevised(Message, frozen=True):
+    """Answer to ``ReviseStart``: each restart from now on uses the new parameters."""
+
+
 class StopComponent(Message, frozen=True):
     """End a component; it is no longer wanted."""
 
@@ -123,4 +138,4 @@ class NotPlaced(Refusal):
     remedy = "See 'scout-backbone status' for the names of all components."
 
 
-PlacerQuestion = Start | StopComponent | AskPlacement | ListPlacements
+PlacerQuestion = Start | ReviseStart | StopComponent | AskPlacement | ListPlacements

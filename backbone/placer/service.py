@@ -13,7 +13,9 @@ from collections.abc import Callable
 from contextlib import AsyncExitStack
 from functools import partial
 from itertools import chain, repeat
-from typing import assert_never
+from typing import Any, assert_never
+
+import msgspec
 
 from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock
@@ -41,8 +43,10 @@ from backbone.placer.messages import (
     NotPlaced,
     Placements,
     PlacerQuestion,
+    ReviseStart,
     Start,
     Started,
+    StartRevised,
     StopComponent,
     StoppedMeanwhile,
 )
@@ -105,10 +109,12 @@ class Placer(Component[NoParameters]):
             begin()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``Start``, ``StopComponent``, ``AskPlacement`` and ``ListPlacements``."""
+        """Answer ``Start``, ``ReviseStart``, ``StopComponent``, ``AskPlacement`` and ``ListPlacements``."""
         match asked.body:
             case Start() as order:
                 return await self._start(order, asked.source)
+            case ReviseStart(name=name, parameters=parameters):
+                return await self._revise(name, parameters)
             case StopComponent(name=name, reason=reason):
                 return await self._stop(name, reason or f"asked by {asked.source}")
             case AskPlacement(name=name):
@@ -181,6 +187,13 @@ class Placer(Component[NoParameters]):
         except LinkError as error:
             raise NoHost(f"{name}: the component database does not admit it: {error}", name=name) from error
         return admitted.component_type
+
+    async def _revise(self, name: str, parameters: dict[str, Any]) -> StartRevised:
+        record = self._book.record(name)
+        record.spawn = msgspec.structs.replace(record.spawn, parameters=parameters)
+        if record.host:
+            await self._creators.revise(record.host, name, parameters)
+        return StartRevised()
 
     # ------------------------------------------------------------------ stop
     async def _stop(self, name: str, reason: str) -> Ended:

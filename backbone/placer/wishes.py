@@ -98,7 +98,7 @@ async def keep_placed(
     bus: Bus,
     clock: Clock,
     wish: Wish,
-    order: Start,
+    order: Callable[[], Start],
     address: str,
     on_placed: Callable[[Placement, bool], None] = lambda _placement, _was_there: None,
     on_changed: Callable[[], None] = lambda: None,
@@ -108,7 +108,7 @@ async def keep_placed(
 
     Args:
         wish: The owner's wish for this component.
-        order: Order that starts it.
+        order: Returns the order that starts it, as it is now.
         on_placed: Called after each start, with True if the component ran already.
         on_changed: Called when ``wish.absence()`` may have changed.
         patience_s: Time in which a refused first start is repeated, seconds of the machine, because a host may be
@@ -139,10 +139,11 @@ async def keep_placed(
 
 
 async def _start(
-    bus: Bus, clock: Clock, wish: Wish, order: Start, on_changed: Callable[[], None], give_up_s: float
+    bus: Bus, clock: Clock, wish: Wish, ordered: Callable[[], Start], on_changed: Callable[[], None], give_up_s: float
 ) -> tuple[Placement, bool]:
     """Return the placement, and whether the component ran already."""
     while True:
+        order = ordered()
         try:
             started = await ask_to_start(bus, clock, wish, order, START_WITHIN_S, on_changed)
         except NameTaken:

@@ -39,12 +39,19 @@ class Surveillance(Behavior[SurveillanceParameters]):
         super().__init__(launch, bus, clock)
         self._events, self._failures = Counter[str](), Counter[str]()
         self._last: MotionSeen | None = None
+        self._watched = set[str]()
 
     async def start(self) -> None:
         """Subscribe to all watchers of this branch."""
+        self.children_changed()
+
+    def children_changed(self) -> None:
+        """Subscribe to those that are new; one that is gone publishes no more."""
         for path, _node in walk(self.parameters.children):
-            watcher = f"mission_control/{path[-1][0]}"
-            self.bus.subscribe(watcher, Conversation.EVENTS, MotionSeen, self._heard)
+            if path[-1][0] not in self._watched:
+                self._watched.add(path[-1][0])
+                watcher = f"mission_control/{path[-1][0]}"
+                self.bus.subscribe(watcher, Conversation.EVENTS, MotionSeen, self._heard)
         self._say()
 
     async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:

@@ -7,7 +7,7 @@ differ from start to start. At one instant, children come before their parent's 
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -95,11 +95,14 @@ def trees(draw: st.DrawFn, depth: int = 4, name: str = "n") -> Plan:
 class ByEvents:
     """Runs a tree through the rules, and checks on the way that nothing starts twice or after the end."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, changes: Mapping[int, tuple[Plan, ...]] | None = None) -> None:
+        """Args: changes: At the begin of a tick → the children of the root from then on."""
         self.now = 0
         self.runs = Counter[str]()
+        self.began: dict[str, int] = {}
         self.result: Result = None
         self.kids: dict[str, _Node] = {}
+        self._changes = changes or {}
         self._root = self.make(plan)
 
     def run(self) -> Result:
@@ -107,11 +110,15 @@ class ByEvents:
         self._root.begin()
         while self.result is None and self.now < LONGEST:
             self.now += 1
-            self._root.visit()
+            if self.now in self._changes and isinstance(self._root, _Inner):
+                self._root.rearrange(self._changes[self.now])
+            if self.result is None:
+                self._root.visit()
         return self.result
 
     def make(self, plan: Plan, parent: _Inner | None = None) -> _Node:
         self.runs[plan.name] += 1
+        self.began.setdefault(plan.name, self.now)
         return (_Leaf if plan.kind == "leaf" else _Inner)(self, plan, parent)
 
 
@@ -176,6 +183,12 @@ class _Inner(_Node):
         if not self.is_over and self.rules.wakes_at_s <= self.world.now:
             self.carry_out(self.rules.time_passed(self.world.now))
             assert self.is_over or self.rules.wakes_at_s > self.world.now, "it would wake for ever"
+        self.settle()
+
+    def rearrange(self, children: tuple[Plan, ...]) -> None:
+        anew = {one.name for one in children if self.plans.get(one.name, one) is not one}
+        self.plans = {child.name: child for child in children}
+        self.carry_out(self.rules.rearranged(list(self.plans), anew, self.world.now))
         self.settle()
 
     def settle(self) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import pytest
-from composed_trees import ByEvents, Plan, by_ticks, decide, trees
-from hypothesis import HealthCheck, given, settings
+from composed_trees import LONGEST, ByEvents, Plan, by_ticks, decide, trees
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from mission_control.children import Children, FinishParent, Instruction, StartChild, StopChild
@@ -35,6 +37,64 @@ def test_a_tree_ends_as_the_reference_does_at_the_same_instant_after_the_same_st
     assert events.runs == starts
 
 
+@st.composite
+def roots(draw: st.DrawFn, *kinds: str) -> Plan:
+    """Draw a parent of three random children, of one of these kinds."""
+    kind = draw(st.sampled_from(kinds))
+    given: dict[str, Any] = {"success_count": -1, "failure_count": 1} if kind == "parallel" else {}
+    return Plan(kind, "n", tuple(draw(trees(2, f"n{number}")) for number in range(3)), settings=given)
+
+
+@given(roots("sequence", "fallback"), st.integers(1, 40), st.integers(0, 2))
+def test_what_is_added_before_its_turn_counts_as_in_the_file_from_the_beginning(root: Plan, at: int, one: int) -> None:
+    result, starts = by_ticks(root)
+    undisturbed = ByEvents(root)
+    undisturbed.run()
+    assume(undisturbed.began.get(root.children[one].name, LONGEST) >= at)
+    short = tuple(child for child in root.children if child is not root.children[one])
+    events = ByEvents(replace(root, children=short), {at: root.children})
+    assume(events_last(replace(root, children=short)) >= at)
+    assert (events.run(), events.runs) == (result, starts)
+
+
+@given(roots("sequence", "fallback"), st.integers(1, 40), st.integers(0, 2))
+def test_what_is_removed_before_its_turn_counts_as_never_in_the_file(root: Plan, at: int, one: int) -> None:
+    events = ByEvents(root, {at: (short := tuple(child for child in root.children if child is not root.children[one]))})
+    result = events.run()
+    assume(root.children[one].name not in events.runs)
+    assert (result, events.runs) == by_ticks(replace(root, children=short))
+
+
+@given(roots("sequence", "fallback"), st.integers(1, 40), st.permutations(range(3)))
+def test_children_that_wait_run_in_their_new_order(root: Plan, at: int, order: list[int]) -> None:
+    moved = tuple(root.children[number] for number in order)
+    events = ByEvents(root, {at: moved})
+    result = events.run()
+    begun = [child for child in root.children if events.began.get(child.name, LONGEST) < at]
+    assert result is None or events.result is result
+    waiting = [child for child in moved if child not in begun]
+    assert (result, events.runs) == by_ticks(replace(root, children=(*begun, *waiting)))
+
+
+@given(roots("parallel"), st.integers(1, 12))
+def test_a_child_added_to_a_parallel_counts_as_one_that_began_later(root: Plan, at: int) -> None:
+    [*early, late] = root.children
+    assume(events_last(replace(root, children=tuple(early))) > at)
+    pause = Plan("wait", "pause", settings={"seconds": at})
+    later = replace(root, children=(*early, Plan("sequence", "later", (pause, late))))
+    result, starts = by_ticks(later)
+    events = ByEvents(replace(root, children=tuple(early)), {at: root.children})
+    assert events.run() == result
+    del starts["pause"], starts["later"]
+    assert events.runs == starts
+
+
+def events_last(root: Plan) -> int:
+    """Return the tick at which it ends."""
+    result, _ = by_ticks(root)
+    return LONGEST if result is None else result[1]
+
+
 MAKERS: dict[str, Callable[[], Children]] = {
     "sequence": lambda: InSequence(NAMES),
     "fallback": lambda: InFallback(NAMES),
@@ -49,12 +109,10 @@ MAKERS: dict[str, Callable[[], Children]] = {
     "timeout-count": lambda: WithTimeout(["a"], seconds=7.0, while_suspended=WhileSuspended.COUNT),
     "wait": lambda: WithDelay([], seconds=7.0),
 }
+_kinds = ["success", "failure", "running", "suspended", "resumed", "left", "time", "end", "rearranged", "rearranged"]
+_children = st.lists(st.sampled_from([*NAMES, "d"]), unique=True)
 _events = st.lists(
-    st.tuples(
-        st.sampled_from(NAMES),
-        st.sampled_from(["success", "failure", "running", "suspended", "resumed", "left", "time", "end"]),
-        st.floats(0.0, 3.0),
-    ),
+    st.tuples(st.sampled_from(NAMES), st.sampled_from(_kinds), st.floats(0.0, 3.0), _children),
     max_size=40,
 )
 
@@ -84,14 +142,20 @@ class Watched:
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
 @given(events=_events)
 def test_whatever_happens_children_run_once_and_none_after_the_end(
-    make: Callable[[], Children], events: list[tuple[str, str, float]]
+    make: Callable[[], Children], events: list[tuple[str, str, float, list[str]]]
 ) -> None:
     now, rules = 0.0, make()
     watched = Watched(rules)
     watched.carry_out(rules.begin(now))
-    for name, event, lasts_s in events:
+    for name, event, lasts_s, children in events:
         now += lasts_s
         match event:
+            case "rearranged":
+                before = watched.running - {name}
+                watched.carry_out(rules.rearranged(children, {name}, now))
+                stays = before & set(children) if not rules.has_finished else set()
+                assert watched.running <= set(children), "one that is gone runs on"
+                assert stays <= watched.running, "one that stays was ended"
             case "success" | "failure" | "running":
                 if rules.reported(name, BehaviorStatus(event), {}):
                     watched.carry_out(decide(rules, name, now))

@@ -7,6 +7,8 @@ import signal
 from collections.abc import Callable
 from typing import Any
 
+import msgspec
+
 from backbone.bus.clock import VirtualClock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component, NoParameters
@@ -119,6 +121,18 @@ class Broken(Component[NoParameters]):
 
     async def connect(self) -> None:
         raise RuntimeError("the bug of the sample")
+
+
+class WeightedParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One number."""
+
+    weight: int = 0
+
+
+class Weighted(Component[WeightedParameters]):
+    """Has a parameter."""
+
+    parameters_type = WeightedParameters
 
 
 class Forker(Component[NoParameters]):

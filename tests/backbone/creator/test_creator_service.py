@@ -32,8 +32,10 @@ from backbone.creator.messages import (
     Processes,
     ProcessFell,
     RestartPolicy,
+    ReviseSpawn,
     Spawn,
     Spawned,
+    SpawnRevised,
     StartFailed,
     UnlistedType,
 )
@@ -43,7 +45,7 @@ from backbone.nameserver.messages import Resolve, Resolved
 from backbone.naming import IllegalName, Subsystem
 
 CREATOR = "backbone/creator-lab"
-KINDS = ("Quiet", "Stubborn", "Late", "Leaver", "Failing", "Broken", "Forker")
+KINDS = ("Quiet", "Stubborn", "Late", "Leaver", "Failing", "Broken", "Forker", "Weighted")
 TYPES = [ComponentType(kind.lower(), f"in_process_zygote:{kind}", Subsystem.RESOURCE_POOL) for kind in KINDS]
 TYPES += [ComponentType("rc_manager", "backbone.rc_manager.service:RcManager", Subsystem.BACKBONE, core=True)]
 
@@ -189,6 +191,26 @@ def test_a_fall_is_published_with_what_follows(on_host: Callable) -> None:
             ("scout1", "killed by SIGKILL", RestartPolicy().failing_pause_s),
         ]
         assert host.fell[1].failing
+
+    on_host(body)
+
+
+def test_a_revised_order_is_the_one_that_is_restarted(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        await host.spawn(order("Weighted", "scout1", parameters={"weight": 1}))
+        await host.placer.ask(CREATOR, ReviseSpawn("scout1", {"weight": 2}), SpawnRevised, within_s=1.0)
+        [first] = host.zygote.lives.values()
+        assert first.parameters.weight == 1
+        assert (await host.processes()).processes[0].spawn.parameters == {"weight": 2}
+        host.zygote.kill(next(iter(host.zygote.lives)), signal.SIGKILL)
+        await VirtualClock().sleep_s(1.0)
+        [second] = host.zygote.lives.values()
+        assert second is not first
+        assert second.parameters.weight == 2
+        with pytest.raises(NotHere):
+            await host.placer.ask(CREATOR, ReviseSpawn("scout2", {}), SpawnRevised, within_s=1.0)
+        with pytest.raises(NotThePlacer):
+            await host.stranger.ask(CREATOR, ReviseSpawn("scout1", {}), SpawnRevised, within_s=1.0)
 
     on_host(body)
 

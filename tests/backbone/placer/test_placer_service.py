@@ -40,8 +40,10 @@ from backbone.creator.messages import (
     ProcessEnded,
     Processes,
     ProcessState,
+    ReviseSpawn,
     Spawn,
     Spawned,
+    SpawnRevised,
     StartFailed,
 )
 from backbone.errors import ReplyTimeout
@@ -57,8 +59,10 @@ from backbone.placer.messages import (
     NotPlaced,
     Placement,
     Placements,
+    ReviseStart,
     Start,
     Started,
+    StartRevised,
     StopComponent,
     StoppedMeanwhile,
 )
@@ -95,6 +99,10 @@ class FakeCreator(Component[NoParameters]):
         match asked.body:
             case Spawn() as order:
                 return await self.spawn(order)
+            case ReviseSpawn(name=name, parameters=parameters):
+                order, *life = self.lives[name]
+                self.lives[name] = (msgspec.structs.replace(order, parameters=parameters), *life)
+                return SpawnRevised()
             case EndProcess(name=name):
                 if name not in self.lives:
                     raise NotHere(f"no {name} here")
@@ -619,6 +627,20 @@ async def test_a_restarted_placer_knows_what_runs_and_for_whom(one: Mission) -> 
     await one.clock.sleep_s(10.0)
     assert (await one.placements())["scout1"] == ""
     assert await one.stop("watcher-1") == Ended("watcher-1", EndedBy.ASKING)
+
+
+@on("a", "b")
+async def test_a_revised_order_is_the_one_that_counts_from_the_next_start_on(one: Mission) -> None:
+    await one.start("watcher", "w", host="", parameters={"weight": 0.5})
+    await one.bus.ask(PLACER, ReviseStart("w", {"weight": 0.75}), StartRevised, within_s=5.0)
+    assert one.creators["a"].spawns == ["w"], "it runs on"
+    await one.kill("placer")
+    await one.begin(Placer, "placer")
+    await one.crash("creator-a")
+    await one.clock.sleep_s(10.0)
+    assert one.creators["b"].lives["w"][0].parameters == {"weight": 0.75}
+    with pytest.raises(NotPlaced):
+        await one.bus.ask(PLACER, ReviseStart("v", {}), StartRevised, within_s=5.0)
 
 
 @on("a", "b")

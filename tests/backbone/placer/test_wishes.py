@@ -40,7 +40,9 @@ def test_what_is_back_is_no_longer_missed_however_long_it_was_away(away_s: float
         serve_placer(placer)
         life = component.declare_alive(ADDRESS)
         wish = Wish("grabber")
-        keeping = asyncio.create_task(keep_placed(owner, clock, wish, Start("framegrabber", "grabber"), ADDRESS))
+        keeping = asyncio.create_task(
+            keep_placed(owner, clock, wish, lambda: Start("framegrabber", "grabber"), ADDRESS)
+        )
         await clock.sleep_s(2.0)
         assert wish.absence() is None
         life.close()

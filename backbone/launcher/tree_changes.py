@@ -1,0 +1,283 @@
+"""Tree changes: what an operator's change of the behavior tree makes of the mission file, and of each behavior. Pure.
+
+Rules of this file:
+
+* The change is made in the text of the mission file, which is then read and checked as any other; so a tree that
+  changed while it ran is always one that could have been brought up so.
+* A behavior *stays* if it has the same parent as before and its parent stays. What stays is told of its new place and
+  keeps its process; all else that runs is ended, and begins as what it is now.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from backbone.launcher.messages import (
+    AddBranch,
+    MoveBranch,
+    RemoveBranch,
+    ReplaceBranch,
+    SetInTree,
+    TreeChange,
+    TreeInvalid,
+    UnknownBehavior,
+)
+from backbone.mission import edit
+from backbone.mission.behavior_orders import PathStep, behavior_order
+from backbone.mission.document import parse
+from backbone.mission.edit import NewElement, Node, Path
+from backbone.mission.model import BehaviorDescription, MissionDescription
+from backbone.mission.report import Fault, Report
+from backbone.naming import did_you_mean
+from backbone.placer.messages import Start
+
+SECTION, BEHAVIOR, ARC, PARAMETER = "behaviors", "behavior", "arc", "parameter"
+PRIORITY, RUN_TIMES = "priority", ("minimum_runtime_s", "maximum_runtime_s")
+
+
+# ---------------------------------------------------------------------- the text
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """A branch as its own file has it.
+
+    Attributes:
+        text: What the file holds.
+        source: Its name, for faults.
+        root: Its ``<behavior>``.
+    """
+
+    text: bytes
+    source: str
+    root: Node
+
+    @property
+    def name(self) -> str:
+        """Name of its behavior."""
+        return self.root.text("name")
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """The text of the mission file after a change.
+
+    Attributes:
+        text: All of it.
+        anew: Names of behaviors that are other ones now, although the tree had such names.
+        branch: What came in; None: nothing.
+    """
+
+    text: bytes
+    anew: frozenset[str] = frozenset()
+    branch: Branch | None = None
+
+    def invalid(self, faults: Sequence[Fault]) -> TreeInvalid:
+        """Return the refusal of this change; a fault in the new branch is named where its own file has it."""
+        return TreeInvalid("\n".join(map(str, map(self._named, faults))), faults=len(faults))
+
+    def _named(self, fault: Fault) -> Fault:
+        if self.branch is None:
+            return fault
+        root, whole = self.branch.root, edit.outline(self.text)
+        here = whole.at(_path_of(whole, self.branch.name))
+        line = fault.line - here.line + root.line
+        if not here.line <= fault.line <= here.line + self.text.count(b"\n", here.begin, here.end):
+            return fault
+        column = fault.column - _column(self.text, here) + _column(self.branch.text, root)
+        return Fault(self.branch.source, line, max(1, column), fault.message, fault.remedy)
+
+
+def changed(text: bytes, change: TreeChange) -> Changed:
+    """Return the text of the mission file after a change.
+
+    Raises:
+        UnknownBehavior: The tree has no behavior of this name.
+        EditRefused: It cannot be written so.
+        TreeInvalid: The branch is no ``<behavior>``.
+    """
+    match change:
+        case AddBranch(parent=parent, place=place):
+            branch = _branch(change)
+            text, at = _with_section(text) if parent == edit.outline(text).text("name") else (text, None)
+            at = _path_of(edit.outline(text), parent) if at is None else at
+            number = _number(edit.outline(text).at(at), place)
+            return Changed(edit.insert(text, at, branch.text, number), frozenset({branch.name}), branch)
+        case RemoveBranch(name=name):
+            return Changed(edit.remove(text, _path_of(edit.outline(text), name)))
+        case MoveBranch(name=name, parent=parent, place=place):
+            whole = edit.outline(text)
+            path = _path_of(whole, name)
+            at = _section_of(whole) if parent == whole.text("name") else _path_of(whole, parent)
+            return Changed(edit.move(text, path, at, _number(whole.at(at), place, without=path)))
+        case ReplaceBranch(name=name):
+            branch = _branch(change)
+            path = _path_of(edit.outline(text), name)
+            without = edit.remove(text, path)
+            return Changed(edit.insert(without, path[:-1], branch.text, path[-1]), frozenset({branch.name}), branch)
+        case SetInTree(name=name, parameter=parameter, value=value):
+            return Changed(_with_value(text, name, parameter, written(name, parameter, value)))
+
+
+def written(name: str, parameter: str, value: object) -> str:
+    """Return a value as a mission file has it.
+
+    Raises:
+        TreeInvalid: It is no text, number, true or false.
+    """
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool | int | float):
+        return json.dumps(value)
+    raise TreeInvalid(f"{parameter} of {name} cannot be {value!r}: write a text, a number, true or false")
+
+
+def _with_value(text: bytes, name: str, parameter: str, value: str) -> bytes:
+    whole = edit.outline(text)
+    path = _path_of(whole, name)
+    node = whole.at(path)
+    if parameter == PRIORITY:
+        return edit.set_attribute(text, path, PRIORITY, value)
+    for number, child in enumerate(node.children):
+        if child.tag == ARC and parameter in RUN_TIMES:
+            return edit.set_attribute(text, (*path, number), parameter.replace("_", "-"), value)
+        if child.tag == PARAMETER and child.text("name") == parameter:
+            return edit.set_attribute(text, (*path, number), "value", value)
+    if parameter in RUN_TIMES:
+        raise TreeInvalid(f"{name} claims no ARC: it has no {parameter}", remedy="Set it at a behavior with an ARC.")
+    return edit.add(text, path, NewElement(PARAMETER, {"name": parameter, "value": value}))
+
+
+def _branch(change: AddBranch | ReplaceBranch) -> Branch:
+    data, report = change.branch.encode(), Report(change.source)
+    parse(data, report)
+    if faults := report.faults():
+        raise TreeInvalid("\n".join(map(str, faults)), faults=len(faults))
+    root = edit.outline(data)
+    if root.tag != BEHAVIOR:
+        raise TreeInvalid(f"{change.source}:{root.line}:1: a branch is one <{BEHAVIOR}>, not a <{root.tag[:40]}>")
+    return Branch(data, change.source, root)
+
+
+def _with_section(text: bytes) -> tuple[bytes, Path]:
+    whole = edit.outline(text)
+    if whole.first(SECTION) is None:
+        text = edit.add(text, (), NewElement(SECTION))
+        whole = edit.outline(text)
+    return text, _section_of(whole)
+
+
+def _section_of(whole: Node) -> Path:
+    return next((child.path for child in whole.children if child.tag == SECTION), ())
+
+
+def _path_of(whole: Node, name: str) -> Path:
+    section = whole.first(SECTION)
+    behaviors = {} if section is None else {one.text("name"): one.path for one in section if one.tag == BEHAVIOR}
+    if name not in behaviors:
+        raise UnknownBehavior(f"the tree has no behavior {name!r}{did_you_mean(name, behaviors)}", name=name)
+    return behaviors[name]
+
+
+def _number(parent: Node, place: int, without: Path | None = None) -> int:
+    """Return the number among all elements of the parent, once one is taken out, of a place among its behaviors."""
+    children = [child for child in parent.children if child.path != without]
+    numbers = [number for number, child in enumerate(children) if child.tag == BEHAVIOR]
+    if 0 < place <= len(numbers):
+        return numbers[place - 1]
+    return numbers[-1] + 1 if numbers else len(children)
+
+
+def _column(text: bytes, node: Node) -> int:
+    return len(text[text.rfind(b"\n", 0, node.begin) + 1 : node.begin].decode())
+
+
+# ---------------------------------------------------------------------- what follows
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A behavior that stays and has another place.
+
+    Attributes:
+        order: The order that starts it from now on.
+        anew: Its children that begin anew.
+        gone: Its children that it has no more.
+    """
+
+    order: Start
+    anew: tuple[str, ...]
+    gone: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Consequences:
+    """What follows from a changed tree.
+
+    Attributes:
+        ended: Roots that end.
+        begun: Orders of the roots that begin.
+        told: Behaviors that stay and have another place, parents before their children.
+        priorities: Name → priority, where it is new or another one.
+    """
+
+    ended: list[str]
+    begun: list[Start]
+    told: list[Told]
+    priorities: dict[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    parent: str
+    order: Start
+    priority: int
+    children: tuple[str, ...]
+
+
+def consequences(old: MissionDescription, new: MissionDescription, anew: Collection[str]) -> Consequences:
+    """Return what follows when the tree of a mission is another one.
+
+    Args:
+        anew: Names of behaviors that are other ones now.
+    """
+    before, after = _nodes(old), _nodes(new)
+    stay: dict[str, bool] = {"": True}
+    for name, node in after.items():
+        is_same = name in before and before[name].parent == node.parent and name not in anew
+        stay[name] = is_same and stay[node.parent]
+    told = [
+        Told(
+            node.order,
+            tuple(child for child in node.children if child in anew and child in before[name].children),
+            tuple(child for child in before[name].children if child not in node.children),
+        )
+        for name, node in after.items()
+        if stay[name] and node.order != before[name].order
+    ]
+    return Consequences(
+        ended=[name for name, node in before.items() if not node.parent and not stay.get(name, False)],
+        begun=[node.order for name, node in after.items() if not node.parent and not stay[name]],
+        told=told,
+        priorities={
+            name: node.priority
+            for name, node in after.items()
+            if name not in before or before[name].priority != node.priority
+        },
+    )
+
+
+def orders(mission: MissionDescription) -> dict[str, Start]:
+    """Return the order that starts each behavior of the tree, by name."""
+    return {name: node.order for name, node in _nodes(mission).items()}
+
+
+def _nodes(mission: MissionDescription) -> dict[str, _Known]:
+    found: dict[str, _Known] = {}
+
+    def walk(behaviors: Sequence[BehaviorDescription], parent: str, path: Sequence[PathStep]) -> None:
+        for one in behaviors:
+            order = behavior_order(one.model_dump(mode="json"), path)
+            found[one.name] = _Known(parent, order, one.priority, tuple(child.name for child in one.children))
+            walk(one.children, one.name, [*path, (one.name, one.priority)])
+
+    walk(mission.behaviors, "", [(mission.name, mission.priority)])
+    return found
