@@ -63,11 +63,13 @@ class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True
         path: Names and priorities from the mission's root to this node; empty: started by hand.
         arc: The ARC it claims, if any.
         children: Nodes it starts.
+        is_last: True: it is the root of the last branch, which runs at the end of the mission.
     """
 
     path: list[PathStep] = []
     arc: ArcNeed | None = None
     children: list[BehaviorNode] = []
+    is_last: bool = False
 
 
 class NotAChild(Refusal):
@@ -250,7 +252,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             self.launch.type, self.name, self.path[-1][1], arc=self.parameters.arc, children=self.parameters.children
         )
         rules = self._children.rules
-        about_it = f"{self.status}; {rules.sentence}" if rules.sentence else str(self.status)
+        label = "last branch; " if self.parameters.is_last else ""
+        about_it = f"{label}{self.status}; {rules.sentence}" if rules.sentence else f"{label}{self.status}"
         tree = draw([node], rules.remarks() | {self.name: about_it}, in_file_order=rules.in_file_order)
         return BehaviorState(self.name, self.status, self.payload, dict(self.rcs), self.suspended_because, tree)
 

@@ -109,6 +109,7 @@ def check(
     say(
         f"{mission_file}: mission {description.name} is fine: {counted(len(description.resources), 'resource')}, "
         f"{counted(len(description.types), 'component type')} on {counted(len(description.hosts), 'host')}"
+        + (f"; last branch {last.behavior.name}, within {last.within_s:g} s" if (last := description.last) else "")
     )
     if dry_run:
         from backbone.command_line.rehearsing import print_dry_run
@@ -338,11 +339,14 @@ app.add_typer(tree, name="tree")
 
 
 @app.command()
-def down(mission: MissionName = None) -> None:
-    """Stop a mission of this machine in reverse order: ask, then SIGTERM, then SIGKILL; says which was needed."""
+def down(
+    now: Annotated[bool, typer.Option("--now", help="Without the last branch; a second 'down' ends it, too.")] = False,
+    mission: MissionName = None,
+) -> None:
+    """Stop a mission of this machine: its last branch, then all; ask, then SIGTERM, then SIGKILL; says what helped."""
     from backbone.launcher.detached import take_down
 
-    run(lambda: take_down(mission))
+    run(lambda: take_down(mission, at_once=now))
 
 
 @app.command()

@@ -97,6 +97,8 @@ class DryRun:
         claimed: The requests of its behaviors in the order of the file.
         timetable: The slices of all ARCs.
         trace: Every decision, in the RC manager's format.
+        last: The dry run of the last branch, which finds its resources free; None: the mission has none.
+        last_name: Name of its root; empty: none.
     """
 
     mission: str
@@ -104,11 +106,14 @@ class DryRun:
     claimed: Sequence[Claimed]
     timetable: Timetable
     trace: Sequence[Line]
+    last: DryRun | None = None
+    last_name: str = ""
 
     @property
     def can_come_up(self) -> bool:
-        """True if every component has a host and no request is refused."""
-        return all(placed.host for placed in self.placed) and not any(claimed.refused for claimed in self.claimed)
+        """True if every component has a host and no request is refused, those of the last branch included."""
+        comes_up = all(placed.host for placed in self.placed) and not any(claimed.refused for claimed in self.claimed)
+        return comes_up and (self.last is None or self.last.can_come_up)
 
     def write_trace(self, file: Path) -> None:
         """Write the trace as JSON lines.
@@ -124,7 +129,7 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     """Run a mission from its begin without starting a process.
 
     Args:
-        for_s: Mission seconds, at least 0.
+        for_s: Mission seconds, at least 0; the last branch is tried for at most its own time.
     """
     placed = placements(description)
     hosts = {one.name: one.host for one in placed}
@@ -144,7 +149,11 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     rehearsal.run(for_s)
     timetable = Timetable(rehearsal.trace, rehearsal.now_s)
     claimed = [_claimed(answers, timetable, *one) for one in asked]
-    return DryRun(description.name, placed, claimed, timetable, rehearsal.trace)
+    found = DryRun(description.name, placed, claimed, timetable, rehearsal.trace)
+    at_the_end, last = description.at_the_end, description.last
+    if at_the_end is None or last is None:
+        return found
+    return replace(found, last=dry_run(at_the_end, min(for_s, last.within_s)), last_name=last.behavior.name)
 
 
 # ---------------------------------------------------------------------- placement

@@ -23,12 +23,20 @@ RUNS, SWITCHES, WAITS, FREE = "█", "▒", "·", "·"
 
 
 def screen(dry: DryRun) -> RenderableType:
-    """Return the tables of a dry run."""
-    head = Text(f"mission {dry.mission}: dry run, {dry.timetable.end_s:g} s", style="bold")
+    """Return the tables of a dry run, then those of its last branch."""
+    tables = [_head(f"mission {dry.mission}", dry), *_tables(dry)]
+    if dry.last is not None:
+        tables += [_head(f"last branch {dry.last_name}, which runs at the end", dry.last), *_tables(dry.last)]
+    return Group(*tables)
+
+
+def _head(of: str, dry: DryRun) -> Text:
+    return Text(f"{of}: dry run, {dry.timetable.end_s:g} s", style="bold")
+
+
+def _tables(dry: DryRun) -> list[RenderableType]:
     keys = {claimed.arc: key for claimed, key in zip(dry.claimed, [*KEYS, *NO_KEY * len(dry.claimed)], strict=False)}
-    return Group(
-        head, _placement(dry.placed), _timeline(dry, keys), _requests(dry.claimed, keys), _resources(dry), _never(dry)
-    )
+    return [_placement(dry.placed), _timeline(dry, keys), _requests(dry.claimed, keys), _resources(dry), _never(dry)]
 
 
 def bars(dry: DryRun, keys: Mapping[str, str]) -> dict[str, str]:

@@ -21,7 +21,6 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
-from backbone.component.messages import Stop, Stopping
 from backbone.component.process import run_with_heartbeat
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
@@ -29,11 +28,11 @@ from backbone.errors import BackboneError
 from backbone.heaps import share_heaps
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, launcher_launch, service_launch
 from backbone.launcher.launcher import LISTING_TIME_S, Launcher
+from backbone.launcher.messages import EndMission, MissionEnding
 from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up
 from backbone.mission.model import MissionDescription
-from backbone.naming import component_of
 
 START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of it
 
@@ -114,10 +113,10 @@ async def _with_hub(
     return launcher.outcome
 
 
-async def end_mission(bus: Bus) -> None:
-    """Ask the launcher to take its mission down.
+async def end_mission(bus: Bus, *, at_once: bool = False) -> MissionEnding:
+    """Order the launcher to take its mission down; return what the last branch does meanwhile.
 
     Raises:
         LinkError: The launcher did not answer.
     """
-    await bus.ask(LAUNCHER, Stop(f"ordered by {component_of(bus.source)}"), Stopping, within_s=LISTING_TIME_S)
+    return await bus.ask(LAUNCHER, EndMission(at_once), MissionEnding, within_s=LISTING_TIME_S)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
-import select
 import signal
 import subprocess
 import sys
@@ -12,15 +12,20 @@ from pathlib import Path
 import psutil
 
 from backbone import run_files
+from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.errors import LinkError
 from backbone.launcher.bring_up import end_mission
 from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.messages import AwaitLastBranch, LastBranchOver
 from backbone.launcher.verdict import await_verdict
 from backbone.mission_log.operators import OperatorAction, publish_action
+from backbone.waiting import first_of, set_within
 
 ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty components on a busy machine needs 5 s
+SKIP_S = 0.5  # chosen: two signals in quick succession may become one
 
 
 def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path | None, for_s: float | None) -> int:
@@ -67,35 +72,46 @@ def _died(launcher: subprocess.Popen[bytes]) -> int:
     return ended if ended > 0 else ExitCode.MISSION_FAILED
 
 
-async def take_down(mission: str | None) -> int:
-    """End a mission of this machine and return when its launcher has ended."""
+async def take_down(mission: str | None, *, at_once: bool = False) -> int:
+    """End a mission of this machine and return when its launcher has ended.
+
+    The time of its last branch does not count among the times after which the launcher is urged.
+
+    Args:
+        mission: Its name; None: the only one.
+        at_once: Without the last branch.
+    """
     found = run_files.find(mission)
     launcher = psutil.Process(found.launcher_pid)
-    waiting = os.pidfd_open(launcher.pid)
+    waiting, loop, ended = os.pidfd_open(launcher.pid), asyncio.get_running_loop(), asyncio.Event()
+    loop.add_reader(waiting, ended.set)
     if launcher.status() == psutil.STATUS_STOPPED:
         say(f"the launcher, process {launcher.pid}, was stopped; it is continued so that it can end its mission")
         launcher.send_signal(signal.SIGCONT)
     try:
         for what, seconds, act in (
             ("asking", ASKED_S, None),
-            ("SIGTERM", TERM_S, signal.SIGTERM),
+            ("SIGTERM", SKIP_S if at_once else TERM_S, signal.SIGTERM),
+            ("SIGTERM", TERM_S, signal.SIGTERM),  # the second one ends a last branch
             ("SIGKILL", KILL_S, signal.SIGKILL),
         ):
             if act is None:
-                if not await _ask(found):
+                if not await _ask(found, ended, at_once=at_once):
                     continue
             else:
                 launcher.send_signal(act)
-            if select.select([waiting], [], [], seconds)[0]:
+            if await set_within(ended, seconds):
                 say(f"mission {found.mission} is down; {what} was enough")
                 return ExitCode.DONE if what != "SIGKILL" else ExitCode.MISSION_FAILED
     finally:
+        loop.remove_reader(waiting)
         os.close(waiting)
     say(f"mission {found.mission}: process {launcher.pid} does not end")
     return ExitCode.MISSION_FAILED
 
 
-async def _ask(found: run_files.RunFile) -> bool:
+async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool) -> bool:
+    """Order the mission to end and wait for its last branch; return whether the launcher took the order."""
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     try:
         bus = await ZenohBus.open_when_up(
@@ -109,10 +125,24 @@ async def _ask(found: run_files.RunFile) -> bool:
         return False
     try:
         publish_action(bus, clock, OperatorAction.STOP_MISSION, found.mission, "by command")
-        await end_mission(bus)
+        ending = await end_mission(bus, at_once=at_once)
+        if ending.told:
+            say(ending.told)
+        if ending.within_s:
+            await first_of(_tell_last_branch(bus, ending.within_s / clock.rate + ASKED_S), ended.wait())
     except LinkError as error:
         say(f"the launcher does not answer: {error}")
         return False
     finally:
         await bus.close()
     return True
+
+
+async def _tell_last_branch(bus: Bus, within_s: float) -> None:
+    """Say how the last branch ended, as soon as it is over; ``within_s`` is machine time."""
+    try:
+        over = await bus.ask(LAUNCHER, AwaitLastBranch(), LastBranchOver, within_s=within_s)
+    except LinkError as error:
+        say(f"the launcher does not tell how the last branch ended: {error}")
+    else:
+        say(over.told)

@@ -25,19 +25,29 @@ from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.health_watch import HealthWatch
-from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
+from backbone.launcher.last_branch import LastBranch
+from backbone.launcher.last_run import run_last
+from backbone.launcher.messages import (
+    AskTree,
+    AwaitLastBranch,
+    EndMission,
+    LastBranchOver,
+    MissionEnding,
+    NotUpYet,
+    TreeChange,
+)
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.tree_keeper import TreeKeeper
-from backbone.mission.behavior_orders import behavior_orders
+from backbone.mission.behavior_orders import behavior_orders, last_order
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import Subsystem, address
+from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
-from backbone.waiting import end_tasks
+from backbone.waiting import first_of
 from backbone.wire import Accepts, Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -49,9 +59,11 @@ MEET_EACH_S = 0.1  # chosen: too short to notice, and a hundred times the cost o
 
 
 class Launcher(Component[NoParameters]):
-    """Starts the core services and the mission, restarts core services, stops all."""
+    """Starts the core services and the mission, restarts core services, runs the last branch, stops all."""
 
-    accepts: ClassVar[Accepts | None] = ListProcesses | AskLog | AskPeople | AskTree | TreeChange
+    accepts: ClassVar[Accepts | None] = (
+        ListProcesses | AskLog | AskPeople | AskTree | TreeChange | EndMission | AwaitLastBranch
+    )
 
     def __init__(
         self,
@@ -85,6 +97,8 @@ class Launcher(Component[NoParameters]):
         self.outcome = Outcome()
         self._others = OtherHosts(description, clock.now_s())
         self._others_changed = asyncio.Event()
+        self._last = LastBranch(description.last)
+        self._last_begins, self._last_is_over = asyncio.Event(), asyncio.Event()
         keeper.on_fell = self._core_service_fell
         keeper.on_silent = self._core_service_silent
         keeper.on_changed = self.changed
@@ -107,18 +121,32 @@ class Launcher(Component[NoParameters]):
             self.end(f"could not come up: {error}")
             return
         self.outcome.ready_after_s = time.monotonic() - self._began_s
-        self.report("all ready")
+        self.report(f"all ready; at the end: {self._last.name}" if self._last.name else "all ready")
         source = self._description.source
         publish_action(self.bus, self.clock, OperatorAction.START_MISSION, self._description.name, f"from {source}")
+        if self._options.for_s is not None:
+            self.start_task(self._end_after(self._options.for_s), "end")
         watching = asyncio.create_task(self._observer.up(self.bus, self.clock), name="observer")
-        try:
-            if self._options.for_s is None:
-                await watching
-            else:
-                await self.clock.sleep_s(self._options.for_s)
-                self.end(f"ran for {self._options.for_s:g} s")
-        finally:
-            await end_tasks(watching)
+        await first_of(watching, self._last_begins.wait())
+        if not watching.cancelled():
+            watching.result()
+
+    async def _end_after(self, mission_s: float) -> None:
+        await self.clock.sleep_s(mission_s)
+        self.end(f"ran for {mission_s:g} s")
+
+    def end(self, reason: str, *, at_once: bool = False) -> None:
+        """Run the last branch and end then; without one, at the second order, or if ``at_once``, end now."""
+        if self._last.ordered(self.clock.now_s(), is_up=self._is_up, at_once=at_once):
+            self._last_is_over.set()
+            super().end(reason)
+        else:
+            self._last_begins.set()
+            self.start_task(self._run_last(reason), "last branch")
+
+    @property
+    def _is_up(self) -> bool:
+        return self.state is LifeState.READY and self.outcome.ready_after_s is not None
 
     def interrupted(self) -> None:
         """End because the operator pressed Ctrl-C."""
@@ -126,7 +154,7 @@ class Launcher(Component[NoParameters]):
         self.end(signal.SIGINT.name)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``ListProcesses`` for the core services, ``AskLog``, ``AskPeople``, and all about the tree."""
+        """Answer ``ListProcesses`` for the core services, and the questions about log, people, tree and end."""
         match asked.body:
             case ListProcesses():
                 return Processes(self.launch.host, [], self._keeper.processes())
@@ -140,6 +168,12 @@ class Launcher(Component[NoParameters]):
                 if self.outcome.ready_after_s is None or self.state is not LifeState.READY:
                     raise NotUpYet(f"{self._description.name} is coming up or ending")
                 return await self._tree.change(change, asked.source)
+            case EndMission(at_once=at_once):
+                self.end(f"ordered by {component_of(asked.source)}", at_once=at_once)
+                return MissionEnding(self._last.doing, self._last.within_s if self._last.is_at_work else 0.0)
+            case AwaitLastBranch():
+                await self._last_is_over.wait()
+                return LastBranchOver(self._last.told)
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
@@ -162,6 +196,9 @@ class Launcher(Component[NoParameters]):
 
     async def drain(self) -> None:
         """Stop the mission in reverse order of its start, then the core services except the nameserver."""
+        if self._last.told:
+            self._observer.announce(self._last.told)
+            self.publish_event(self._last.name, self._last.how, LogLevel.NOTICE)
         async with self._step("stop consoles"):
             await self._stop_consoles()
         async with self._step("stop mission"):
@@ -297,6 +334,29 @@ class Launcher(Component[NoParameters]):
             await self.clock.sleep_s(MEET_EACH_S * self.clock.rate)
 
     # ------------------------------------------------------------------ stop
+    async def _run_last(self, reason: str) -> None:
+        """Stop consoles and behaviors, run the last branch, then end."""
+        order = last_order(self._description)
+        assert order is not None  # noqa: S101  the decision is to run it
+        behaviors = {each.name for each in self._description.types if each.subsystem is Subsystem.MISSION_CONTROL}
+        async with self._step("stop consoles"):
+            await self._stop_consoles()
+        async with self._step("stop behaviors"):
+            await self._stop_roots()
+            await self._stop_placed(lambda placed: placed.type in behaviors)
+        until_s = self._last.began(self.clock.now_s())
+        self.report(self._last.doing)
+        self._observer.announce(self._last.doing)
+        self.publish_event(order.name, "begins: the mission ends with this branch", LogLevel.NOTICE)
+        wish, at = Wish(order.name), address(Subsystem.MISSION_CONTROL, order.name)
+        self._wishes.append(wish)
+        try:
+            keeping = self._keep_placed(wish, order, at, lambda _placement, _was_there: None)
+            await run_last(self._last, self.bus, self.clock, at, keeping, until_s)
+        finally:
+            self._wishes.remove(wish)
+        self.end(reason)
+
     async def _stop_consoles(self) -> None:
         """Ask every console to stop; each gives its robot back."""
         with contextlib.suppress(LinkError):  # without a nameserver no console can be reached
@@ -312,16 +372,22 @@ class Launcher(Component[NoParameters]):
     async def _stop_mission(self) -> None:
         """Stop behaviors first, which stop their children, then the remaining ARCs, then hardware."""
         description = self._tree.description
-        roots = [order.name for order in behavior_orders(description)]
         hardware = [r.name for r in description.resources] + [c.name for c in description.components]
-        for name in reversed(roots):
-            await self._stop(name)
-        with contextlib.suppress(LinkError, Refusal):  # without a placer the creators end the rest
-            left = await self.bus.ask(PLACER, ListPlacements(), Placements, within_s=LISTING_TIME_S)
-            others = [p.name for p in left.placements if p.name not in hardware]
-            await asyncio.gather(*(self._stop(name) for name in others))
+        if self._last.name:
+            await self._stop(self._last.name)
+        await self._stop_roots()
+        await self._stop_placed(lambda placed: placed.name not in hardware)
         await asyncio.gather(*(self._stop(r.name) for r in description.resources))
         await asyncio.gather(*(self._stop(c.name) for c in description.components))
+
+    async def _stop_roots(self) -> None:
+        for order in reversed(behavior_orders(self._description)):
+            await self._stop(order.name)
+
+    async def _stop_placed(self, is_meant: Callable[[Placement], bool]) -> None:
+        with contextlib.suppress(LinkError, Refusal):  # without a placer the creators end the rest
+            there = await self.bus.ask(PLACER, ListPlacements(), Placements, within_s=LISTING_TIME_S)
+            await asyncio.gather(*(self._stop(placed.name) for placed in there.placements if is_meant(placed)))
 
     async def _stop(self, name: str) -> None:
         try:

@@ -1,11 +1,11 @@
-"""Messages about the behavior tree of a running mission: to the launcher, which owns it, and from it to behaviors."""
+"""Messages of the launcher: about the behavior tree of a running mission, which it owns, and about the mission's end."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any
 
 from backbone.errors import Refusal
-from backbone.ranges import MANY, Count, Document, Line, Mention, MissionText, Text, Values
+from backbone.ranges import MANY, Count, Document, Duration, Line, Mention, MissionText, Text, Values
 from backbone.wire import Message
 
 
@@ -161,3 +161,40 @@ class BranchTaken(Message, frozen=True):
     """
 
     finished: Mention = ""
+
+
+# ---------------------------------------------------------------------- the end of the mission
+class EndMission(Message, frozen=True):
+    """Run the last branch, if there is one, and end the mission; the same order again ends the branch at once.
+
+    Attributes:
+        at_once: True: without the last branch.
+    """
+
+    at_once: bool = False
+
+
+class MissionEnding(Message, frozen=True):
+    """Answer to ``EndMission``: the mission is ending.
+
+    Attributes:
+        told: What the last branch does, one line; empty: there is none.
+        within_s: Time the branch has from its start, mission seconds; 0: it does not run.
+    """
+
+    told: Text = ""
+    within_s: Duration = 0.0
+
+
+class AwaitLastBranch(Message, frozen=True):
+    """Ask how the last branch ended; answered as soon as it is over."""
+
+
+class LastBranchOver(Message, frozen=True):
+    """Answer to ``AwaitLastBranch``.
+
+    Attributes:
+        told: How it ended, one line; empty: there is none.
+    """
+
+    told: Text = ""

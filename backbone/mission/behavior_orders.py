@@ -1,8 +1,9 @@
 """From the behavior tree of a mission file to the orders that start its roots.
 
-A behavior is launched with its own parameters as the file gives them, and three of the tree:
-``path`` (from the mission's root to this node), ``arc`` (what it claims) and ``children`` (whole
-nodes, which the behavior starts itself, by the same rule). Nothing here imports the mission's model
+A behavior is launched with its own parameters as the file gives them, and those of the tree:
+``path`` (from the mission's root to this node), ``arc`` (what it claims), ``children`` (whole
+nodes, which the behavior starts itself, by the same rule), and for the root of the last branch
+alone ``is_last``. Nothing here imports the mission's model
 at run time, so a behavior's process can apply the rule to its children without loading pydantic.
 """
 
@@ -10,6 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+
+import msgspec
 
 from backbone.errors import Refusal
 from backbone.placer.messages import Start
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
 PathStep = tuple[str, int]
 Node = Mapping[str, Any]
 """A node of the behavior tree as plain data, with the nodes below it."""
-TREE_PARAMETERS = ("path", "arc", "children")
+TREE_PARAMETERS = ("path", "arc", "children", "is_last")
 
 
 class ReservedParameter(Refusal):
@@ -38,6 +41,18 @@ def behavior_orders(description: MissionDescription) -> list[Start]:
     """
     top = [(description.name, description.priority)]
     return [behavior_order(_node(behavior), top) for behavior in description.behaviors]
+
+
+def last_order(description: MissionDescription) -> Start | None:
+    """Return the order that starts the last branch; None: the mission has none.
+
+    Raises:
+        ReservedParameter: A behavior of it has a parameter of a reserved name.
+    """
+    if description.last is None:
+        return None
+    order = behavior_order(_node(description.last.behavior), [(description.name, description.priority)])
+    return msgspec.structs.replace(order, parameters={**order.parameters, "is_last": True})
 
 
 def behavior_order(node: Node, parent_path: Sequence[PathStep]) -> Start:

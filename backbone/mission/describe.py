@@ -14,6 +14,7 @@ from backbone.mission.declaration.elements import (
     ArcElement,
     BehaviorAttributes,
     BehaviorElement,
+    BehaviorsElement,
     MissionElement,
     ResourceElement,
     TypeElement,
@@ -25,6 +26,7 @@ from backbone.mission.model import (
     BehaviorDescription,
     ComponentDescription,
     CoreServiceDescription,
+    LastBranchDescription,
     MissionDescription,
 )
 from backbone.mission.room_files import room_text
@@ -41,7 +43,7 @@ def describe(
         text: What the mission's file holds.
     """
     hosts = () if mission.hosts is None else mission.hosts.host
-    world = mission.world
+    world, tree = mission.world, mission.behaviors or BehaviorsElement()
     resources = () if mission.resources is None else mission.resources.resource
     members = (*resources, *(() if world is None else (world,)))
     host_of_process = {one.process: one.host for one in members if one.process and one.host}
@@ -55,9 +57,14 @@ def describe(
         types=types,
         resources=tuple(_resource(resource, world, host_of_process, robots) for resource in resources),
         components=() if world is None else (_world(world, resources, source, host_of_process, types),),
-        behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
+        behaviors=tuple(map(_behavior, tree.behavior)),
         source=source,
         text=text,
+        last=(
+            None
+            if tree.last is None
+            else LastBranchDescription(behavior=_behavior(tree.last.behavior), within_s=tree.last.within_s)
+        ),
     )
 
 

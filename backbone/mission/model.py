@@ -16,6 +16,7 @@ __all__ = [
     "ComponentDescription",
     "CoreServiceDescription",
     "Host",
+    "LastBranchDescription",
     "MissionDescription",
 ]
 
@@ -78,6 +79,18 @@ class BehaviorDescription(BehaviorAttributes):
     children: tuple[BehaviorDescription, ...] = ()
 
 
+class LastBranchDescription(_Part):
+    """The branch of the behavior tree that runs when the mission is ordered to end.
+
+    Attributes:
+        behavior: Its root.
+        within_s: Its time from its start, seconds of the mission, above 0.
+    """
+
+    behavior: BehaviorDescription
+    within_s: float
+
+
 class MissionDescription(_Part):
     """A whole mission.
 
@@ -91,6 +104,7 @@ class MissionDescription(_Part):
         behaviors: Roots of the behavior tree, children of the mission's own node.
         source: Path of the file.
         text: What the file holds; empty: there is none.
+        last: The branch that runs at the end, instead of the other behaviors; None: none.
     """
 
     name: str
@@ -103,11 +117,19 @@ class MissionDescription(_Part):
     behaviors: tuple[BehaviorDescription, ...]
     source: str
     text: bytes = b""
+    last: LastBranchDescription | None = None
 
     @property
     def other_hosts(self) -> tuple[Host, ...]:
         """Machines besides the one that runs the nameserver; each offers itself by a command typed there."""
         return tuple(host for host in self.hosts[1:] if not host.is_loopback)
+
+    @property
+    def at_the_end(self) -> MissionDescription | None:
+        """The mission as it is while its last branch runs: that branch is its only behavior; None: it has none."""
+        if self.last is None:
+            return None
+        return self.model_copy(update={"behaviors": (self.last.behavior,), "last": None})
 
     def core_parameters(self, service: str) -> dict[str, object]:
         """Return what the file sets of a core service's parameters, of the first of this type."""

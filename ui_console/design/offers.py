@@ -140,7 +140,10 @@ def _offers(mission: Node, node: Node) -> list[Offer]:
             bare = [offer for tag in sections for offer in _generic(mission, node, tag)]
             return [*_behaviors(mission, node), *_resources(mission), *missing, *bare]
         case "behaviors":
-            return _behaviors(mission, node)
+            last = [] if node.first("last") is not None else _generic(mission, node, "last")
+            return [*_behaviors(mission, node), *last]
+        case "last":
+            return [] if node.first("behavior") is not None else _behaviors(mission, node)
         case "behavior":
             return [*_behaviors(mission, node), *_claims(mission, node), _parameter(node)]
         case "arc":

@@ -226,6 +226,8 @@ def summary(node: Node) -> str:
         words.append(f"priority {node.text('priority')}")
     if node.text("minimum-runtime-s"):
         words.append(f"at least {node.text('minimum-runtime-s')} s")
+    if node.text("within-s"):
+        words.append(f"within {node.text('within-s')} s")
     if node.text("x-m"):
         words.append(f"at {node.text('x-m')}, {node.text('y-m')}")
     if node.text("width-m") and not node.text("x-m"):
@@ -302,7 +304,7 @@ def offer_view(offer: Offer, class_doc: str = "") -> OfferView:
 
 
 def rehearsal_view(dry: DryRun) -> RehearsalView:
-    """Return the turns of a dry run."""
+    """Return the turns of a dry run; of its last branch, the outcome of each request."""
     seen = dry.timetable
     arcs = [
         RehearsalRow(one.arc, is_arc=True, turns=tuple(_turn(run, ", ".join(run.uses)) for run in seen.of_arc(one.arc)))
@@ -323,6 +325,10 @@ def rehearsal_view(dry: DryRun) -> RehearsalView:
         if one.never_runs
     ]
     never += [f"{one.name} has no host: {'; '.join(one.reasons)}" for one in dry.placed if not one.host]
+    if dry.last is not None:
+        of_last = rehearsal_view(dry.last)
+        told += [f"last branch {dry.last_name}: {line}" for line in of_last.told]
+        never += [f"last branch {dry.last_name}: {line}" for line in of_last.never if line not in never]
     return RehearsalView(seen.end_s, tuple(arcs + rcs), tuple(told), tuple(never))
 
 

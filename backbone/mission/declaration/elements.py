@@ -232,10 +232,25 @@ class BehaviorElement(BehaviorAttributes):
     behavior: tuple[BehaviorElement, ...] = ()
 
 
+class LastElement(Declared):
+    """The last branch: not started with the mission, but when it is ordered to end.
+
+    Then consoles and all other behaviors are stopped, the hardware stays up, and the branch runs until it has finished
+    or its time is over.
+    """
+
+    within_s: Duration = Field(
+        default=60.0,
+        description="Its time from its start, seconds of the mission, above 0, at most a day; then the mission ends.",
+    )
+    behavior: BehaviorElement
+
+
 class BehaviorsElement(Declared):
-    """The behavior tree's roots."""
+    """The behavior tree's roots, and the branch that runs at the end."""
 
     behavior: tuple[BehaviorElement, ...] = ()
+    last: LastElement | None = None
 
 
 class MissionElement(Declared):

@@ -18,7 +18,14 @@ from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.dry_run.run import dry_run, placements, requests
 from backbone.dry_run.screen import bars, screen
-from backbone.mission.model import ArcWish, BehaviorDescription, CoreServiceDescription, Host, MissionDescription
+from backbone.mission.model import (
+    ArcWish,
+    BehaviorDescription,
+    CoreServiceDescription,
+    Host,
+    LastBranchDescription,
+    MissionDescription,
+)
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
 from backbone.scheduling.requests import RcUse, Usage
@@ -181,6 +188,24 @@ def test_its_requests_are_those_the_arcs_of_the_mission_send() -> None:
             "video1": RcUse(),
             "grabber": RcUse(),
         }
+
+
+def test_the_last_branch_is_tried_by_itself_and_must_find_what_it_needs() -> None:
+    def ends_with(branch: BehaviorDescription) -> MissionDescription:
+        last = LastBranchDescription(behavior=branch, within_s=20.0)
+        return mission(watch("day", robot="scout1")).model_copy(update={"last": last})
+
+    dry = dry_run(ends_with(watch("evening", robot="scout1")))
+    assert [claimed.behavior for claimed in dry.claimed] == ["day"]
+    assert dry.last is not None
+    assert (dry.last_name, dry.last.timetable.end_s) == ("evening", 20.0)
+    assert [(claimed.behavior, claimed.first_grant_s) for claimed in dry.last.claimed] == [("evening", 0.5)]
+    assert dry.can_come_up
+    assert not dry_run(ends_with(watch("evening", robot="scout7"))).can_come_up
+    console = Console(width=180, file=StringIO())
+    console.print(screen(dry))
+    assert isinstance(console.file, StringIO)
+    assert "last branch evening, which runs at the end: dry run, 20 s" in console.file.getvalue()
 
 
 # ---------------------------------------------------------------------- the picture

@@ -430,3 +430,24 @@ def test_the_projects_target_rests_where_no_watching_scout_sees_it() -> None:
             distance_m = math.hypot(x_m - scout.x_m, y_m - scout.y_m)
             off_rad = abs(math.atan2(y_m - scout.y_m, x_m - scout.x_m) - scout.heading_rad)
             assert off_rad - math.asin(radius_m / distance_m) > half_view_rad
+
+
+# ---------------------------------------------------------------------- the branch that runs at the end
+def test_the_last_branch_is_none_of_the_roots_that_start_with_the_mission() -> None:
+    mission = read_mission(HERE.parents[2] / "docs" / "examples" / "home-at-the-end.xml")
+    assert [order.name for order in behavior_orders(mission)] == ["patrol"]
+    assert mission.last is not None
+    assert (mission.last.behavior.name, mission.last.within_s) == ("end-of-day", 60.0)
+    assert [child.name for child in mission.last.behavior.children] == ["drive-home"]
+    assert mission.at_the_end is not None
+    assert [one.name for one in mission.at_the_end.behaviors] == ["end-of-day"]
+
+
+def test_a_mission_has_no_last_branch_and_one_without_a_time_has_a_minute(tmp_path: Path) -> None:
+    assert read_mission(MISSION_XML).last is None
+    text = (HERE.parents[2] / "docs" / "examples" / "home-at-the-end.xml").read_text()
+    file = tmp_path / "m.xml"
+    file.write_text(text.replace(' within-s="60"', ""))
+    last = read_mission(file).last
+    assert last is not None
+    assert last.within_s == 60.0

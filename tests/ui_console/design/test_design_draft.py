@@ -41,7 +41,10 @@ from ui_console.design.views import element_view, problems_view, tree_view
 
 ROOT = Path(__file__).parents[3]
 EVERYTHING_DECLARED = ROOT / "tests" / "backbone" / "mission" / "everything_declared.xml"
-SHIPPED = [ROOT / "mission.xml", ROOT / "docs" / "examples" / "behaviors.xml"]
+SHIPPED = [
+    ROOT / "mission.xml",
+    *(ROOT / "docs" / "examples" / name for name in ("behaviors.xml", "home-at-the-end.xml")),
+]
 COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 
 
@@ -77,7 +80,7 @@ def watchers() -> Draft:
 
 # ---------------------------------------------------------------------- laws
 NAMES = st.sampled_from(["scout1", "scout9", "radio", "world", "watch-scout1", "base", "Not Legal", ""])
-START = st.sampled_from([Draft.opened(str(SHIPPED[0])), Draft.opened(str(SHIPPED[1])), Draft.new("new.xml")])
+START = st.sampled_from([*(Draft.opened(str(file)) for file in SHIPPED), Draft.new("new.xml")])
 
 
 def commands(draft: Draft) -> st.SearchStrategy[Command]:
@@ -200,6 +203,34 @@ def test_two_watchers_are_built_from_nothing_and_take_turns() -> None:
     assert set(turns) == {"watch-scout1", "watch-scout2"}
     assert min(turns.values()) >= 5
     assert max(turns.values()) - min(turns.values()) <= 1
+
+
+def test_a_last_branch_is_offered_once_gets_one_root_and_is_told_with_its_time() -> None:
+    draft = watchers()
+    roots = next(node for node in draft.mission if node.tag == "behaviors")
+    [offer] = [one for one in offers(draft.mission, roots.path) if one.label == "last"]
+    draft = draft.do(offer.command([]))
+    assert [row.message for row in problems_view(draft)] == ["<last> lacks <behavior>"]
+    last = draft.step.touched
+    [patrol] = [one for one in offers(draft.mission, last) if one.label == "behavior patrol"]
+    draft = designed(
+        patrol.command(["drive-home", "1"]),
+        SetValue(last, "within-s", "30"),
+        WriteParameter((*last, 0), "waypoints", "1,1"),
+        WriteParameter((*last, 0), "localizer", "world"),
+        ClaimArc((*last, 0), "drive", "5"),
+        draft=draft,
+    )
+    assert problems_view(draft) == []
+    [row] = [row for row in tree_view(draft) if row.tag == "last"]
+    assert row.told == "within 30 s"
+    assert draft.description is not None
+    assert draft.description.last is not None
+    assert draft.description.last.behavior.name == "drive-home"
+    roots = next(node for node in draft.mission if node.tag == "behaviors")
+    assert "last" not in [one.label for one in offers(draft.mission, roots.path)]
+    with pytest.raises(Refusal, match="has its <behavior> already"):
+        draft.do(AddBehavior(last, "wait", "rest"))
 
 
 def test_the_shipped_types_are_those_that_an_old_file_declares() -> None:

@@ -1,0 +1,124 @@
+"""Last branch: whether an order to end runs it, ends it, or takes the mission down.
+
+Pure: orders and ends go in with the time of the event, the decision comes out. Times are mission seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import Enum, auto
+
+from backbone.component.messages import StoryEvent
+from backbone.mission.model import LastBranchDescription
+from backbone.naming import component_of
+
+_FINISHED = {"success": "succeeded", "failure": "failed"}
+
+
+class Stage(Enum):
+    """What became of the last branch; it only moves downwards in this list."""
+
+    WAITS = auto()  # no order to end was given
+    FREES = auto()  # consoles and other behaviors are being stopped
+    RUNS = auto()
+    OVER = auto()  # the mission goes down
+
+
+class LastBranch:
+    """The decisions about the last branch of one mission.
+
+    Args:
+        declared: The branch; None: the mission has none.
+    """
+
+    def __init__(self, declared: LastBranchDescription | None) -> None:
+        self._declared = declared
+        self._began_s = 0.0
+        self.stage = Stage.WAITS
+        self.how = ""
+        """How it ended, as in *succeeded after 8.3 s*; empty before its end, and without a branch."""
+
+    @property
+    def name(self) -> str:
+        """Name of its root; empty: there is none."""
+        return self._declared.behavior.name if self._declared is not None else ""
+
+    @property
+    def within_s(self) -> float:
+        """Time that it has from its start; 0: there is none."""
+        return self._declared.within_s if self._declared is not None else 0.0
+
+    @property
+    def told(self) -> str:
+        """How it ended, as a line of its own; empty before its end, and without a branch."""
+        return f"last branch {self.name}: {self.how}" if self.how else ""
+
+    @property
+    def is_at_work(self) -> bool:
+        """True from the order to end until the branch is over."""
+        return self.stage in (Stage.FREES, Stage.RUNS)
+
+    @property
+    def doing(self) -> str:
+        """What it does or how it ended, one line; empty: there is none, or no order to end was given."""
+        if self.is_at_work:
+            return f"last branch {self.name} runs, for at most {self.within_s:g} s; a second order ends it at once"
+        return self.told
+
+    def ordered(self, now_s: float, *, is_up: bool, at_once: bool = False) -> bool:
+        """Take in an order to end; return False if the branch goes first, True if the mission goes down now.
+
+        Args:
+            is_up: False: the mission is still coming up, so that no branch can run.
+            at_once: True: the order is to do without the branch.
+        """
+        if self.stage is Stage.WAITS and self._declared is not None and is_up and not at_once:
+            self.stage, self._began_s = Stage.FREES, now_s
+            return False
+        match self.stage:
+            case Stage.WAITS:
+                self._end("skipped, as ordered" if at_once else "skipped, because the mission was not up")
+            case Stage.FREES | Stage.RUNS:
+                self._end_after("ended by a second order", now_s)
+        return True
+
+    def began(self, now_s: float) -> float:
+        """Take in that all else is stopped and the branch starts; return the time at which it must be over."""
+        if self.stage is Stage.FREES:
+            self.stage, self._began_s = Stage.RUNS, now_s
+        return self._began_s + self.within_s
+
+    def finished(self, how: str, now_s: float) -> None:
+        """Take in the end of the branch; an earlier end stands.
+
+        Args:
+            how: As in *succeeded*, or *stopped by anna*.
+        """
+        self._end_after(how, now_s)
+
+    def not_started(self, why: str) -> None:
+        """Take in that the branch cannot start; an earlier end stands."""
+        self._end(f"could not be started: {why}")
+
+    def _end_after(self, how: str, now_s: float) -> None:
+        self._end(f"{how} after {now_s - self._began_s:.1f} s")
+
+    def _end(self, how: str) -> None:
+        if self.stage is not Stage.OVER:
+            self.stage = Stage.OVER
+            self.how = how if self.name else ""
+
+
+def how_it_finished(events: Iterable[StoryEvent], name: str) -> str:
+    """Return how a behavior finished by its own story, *succeeded* or *failed*; empty: not yet.
+
+    Args:
+        events: Its story, oldest first.
+        name: Its name.
+    """
+    for event in events:
+        head, _, status = event.what.partition(": ")
+        is_its_own = component_of(event.where) == event.subject == name
+        if is_its_own and head == "finished" and status in _FINISHED:
+            return _FINISHED[status]
+    return ""
