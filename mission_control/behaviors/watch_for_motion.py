@@ -22,9 +22,10 @@ from mission_control.behavior import Behavior, BehaviorParameters, suspended_bec
 from mission_control.behavior_tree import ArcNeed
 from mission_control.behaviors.run_times import RunTimes, useful_run_times
 from mission_control.messages import MotionSeen, Region
-from mission_control.vision.motion_detection import FAST_FRAMES, VOTES, MotionDetector
+from mission_control.vision.motion_detection import FAST_FRAMES, VOTES, MotionDetector, Stages
 from resource_pool.arc_client import Frame
 
+BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is well seen
 REPORT_EVERY_FRAMES = 30  # chosen: about once a second
 
 
@@ -59,6 +60,7 @@ class WatchForMotion(Behavior[WatchParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._detector = MotionDetector()
+        self._shown: Stages | None = None
         self._robot, self._events, self._last_told_s = "", 0, -float("inf")
         self._certain_frames, self._told_in_slice = 0, False
         self._times: RunTimes | None = None
@@ -100,6 +102,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
         self._robot = frame.robot
         blob = self._detector.look(pixels)
+        self._show_stages()
         self._certain_frames += blob is not None
         is_certain = blob is not None and self._certain_frames >= self.parameters.frames_wanted
         if blob is not None and is_certain and frame.captured_s >= self._last_told_s + self.parameters.again_after_s:
@@ -119,6 +122,15 @@ class WatchForMotion(Behavior[WatchParameters]):
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, the events, and the pictures that were too torn to use."""
         return {**super().statistics(), "events": self._events, "frames_rejected": self._detector.rejected}
+
+    def _show_stages(self) -> None:
+        stages, views = self._detector.stages, self.views
+        if stages is not None and stages is not self._shown:  # the first pictures of a slice are not judged
+            self._shown = stages
+            views.picture("difference", lambda: BRIGHTER * stages.difference)
+            views.picture("changed", lambda: 127 * (stages.changed.astype(np.uint8) + stages.kept))
+            views.value("threshold", stages.bar)
+            views.value("votes", sum(self._detector.votes))
 
     def _ask_for_more(self, captured_s: float) -> None:
         """Extend the slice until motion is certain, if there was a glimpse that is not published yet."""
