@@ -22,7 +22,7 @@ from mission_control.behavior import Behavior, BehaviorParameters, suspended_bec
 from mission_control.behavior_tree import ArcNeed
 from mission_control.behaviors.run_times import RunTimes, useful_run_times
 from mission_control.messages import MotionSeen, Region
-from mission_control.vision.motion_detection import FAST_FRAMES, VOTES, MotionDetector, Stages
+from mission_control.vision.motion_detection import FAST_FRAMES, VOTES, MotionDetector
 from resource_pool.arc_client import Frame
 
 BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is well seen
@@ -60,7 +60,6 @@ class WatchForMotion(Behavior[WatchParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._detector = MotionDetector()
-        self._shown: Stages | None = None
         self._robot, self._events, self._last_told_s = "", 0, -float("inf")
         self._certain_frames, self._told_in_slice = 0, False
         self._times: RunTimes | None = None
@@ -125,8 +124,7 @@ class WatchForMotion(Behavior[WatchParameters]):
 
     def _show_stages(self) -> None:
         stages, views = self._detector.stages, self.views
-        if stages is not None and stages is not self._shown:  # the first pictures of a slice are not judged
-            self._shown = stages
+        if stages is not None:  # the first pictures of a slice are not judged
             views.picture("difference", lambda: BRIGHTER * stages.difference)
             views.picture("changed", lambda: 127 * (stages.changed.astype(np.uint8) + stages.kept))
             views.value("threshold", stages.bar)

@@ -193,7 +193,7 @@ class MotionDetector:
     def __init__(self, *, filters_rows: bool = True) -> None:
         self._filters_rows = filters_rows
         self.stages: Stages | None = None
-        """The pictures on the way to the last judgment, None before the second picture."""
+        """The pictures on the way to the last judgment; None: the last picture was one of the first after a swap."""
         self._average: NDArray[np.float32] | None = None
         self._fresh: list[NDArray[np.float32]] = []
         self._is_settling = True
@@ -226,7 +226,7 @@ class MotionDetector:
         """
         if frame.ndim != 2 or min(frame.shape) < 2:
             raise ValueError(f"a grey picture has shape (height, width), not {frame.shape}")
-        self.frames += 1
+        self.frames, self.stages = self.frames + 1, None
         picture = np.asarray(cv2.blur(halve(frame), (3, 3)), np.float32)
         if self._average is not None and self._average.shape != picture.shape:
             self._average = None

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import re
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -167,9 +169,9 @@ class Watcher(Behavior[Any]):
 
 
 @asynccontextmanager
-async def watching(local_mission: Any) -> AsyncIterator[tuple[FakePlacer, Bus]]:
+async def watching(local_mission: Any, kind: type[Behavior[Any]]) -> AsyncIterator[tuple[FakePlacer, Bus]]:
     async with local_mission("iros2001") as network:
-        placer = FakePlacer(network, VirtualClock(), {"watcher": Watcher})
+        placer = FakePlacer(network, VirtualClock(), {"watcher": kind})
         try:
             arc = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
             given = {"type": "watcher", "name": "watch1", "priority": 3, "arc": arc}
@@ -190,9 +192,11 @@ async def film(placer: FakePlacer, seconds: float) -> None:
         await placer.clock.sleep_s(1 / 30)
 
 
-def scene_of(play: Callable[[FakePlacer, Bus], Awaitable[None]], local_mission: Any) -> None:
+def scene_of(
+    play: Callable[[FakePlacer, Bus], Awaitable[None]], local_mission: Any, kind: type[Behavior[Any]] = Watcher
+) -> None:
     async def scene() -> None:
-        async with watching(local_mission) as (placer, looker):
+        async with watching(local_mission, kind) as (placer, looker):
             await play(placer, looker)
 
     run_virtual(scene())
@@ -243,6 +247,31 @@ def test_the_views_are_listed_with_their_newest_values_and_a_wrong_name_is_refus
             await looker.ask(BEHAVIOR, Look("pictur"), LookedAt, within_s=1.0)
 
     scene_of(play, local_mission)
+
+
+def test_the_behavior_of_the_guide_shows_what_the_guide_says(local_mission: Any) -> None:
+    guide = Path(__file__).parents[2] / "docs/how-to/look-into-a-behavior.md"
+    [code] = re.findall(r"```python\n(.*?)```", guide.read_text(), re.S)
+    written: dict[str, Any] = {}
+    exec(code, written)  # noqa: S102  the guide is ours
+
+    async def play(placer: FakePlacer, looker: Bus) -> None:
+        listed = await looker.ask(BEHAVIOR, ListViews(), Views, within_s=1.0)
+        assert listed.views == []
+        await film(placer, 0.2)
+        listed = await looker.ask(BEHAVIOR, ListViews(), Views, within_s=1.0)
+        assert [(entry.view, entry.kind) for entry in listed.views] == [
+            ("brightness", ViewKind.VALUE),
+            ("edges", ViewKind.PICTURE),
+        ]
+        heard: list[ViewPicture] = []
+        at = view_address(BEHAVIOR, "edges")
+        looker.subscribe(at, Conversation.VIEWS, ViewPicture, lambda envelope: heard.append(envelope.body))
+        await looker.ask(BEHAVIOR, Look("edges"), LookedAt, within_s=1.0)
+        await film(placer, 0.5)
+        assert {(shown.width_px, shown.height_px) for shown in heard} == {(1, 2)}
+
+    scene_of(play, local_mission, written["Edges"])
 
 
 @pytest.mark.processes
