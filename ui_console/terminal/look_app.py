@@ -44,7 +44,7 @@ class LookApp(EndingApp):
 
     def on_mount(self) -> None:
         """Begin to redraw."""
-        self.redraw()
+        self.call_after_refresh(self.redraw)
         self.set_interval(REDRAW_EVERY_S, self.redraw)
 
     def redraw(self) -> None:
