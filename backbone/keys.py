@@ -28,6 +28,7 @@ class Conversation(StrEnum):
     READINGS = "readings"  # what the hardware measures, by name
     POSES = "poses"  # where a localizer believes robots to be
     FRAMES = "frames"  # pictures
+    VIEWS = "views"  # debug views of a behavior, while somebody looks
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each
     SCHEDULE = "schedule"  # the RC manager's decisions and leases

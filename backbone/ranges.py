@@ -63,7 +63,8 @@ MissionText = Annotated[str, Meta(max_length=LONGEST_MISSION)]
 # ---------------------------------------------------------------------- bytes
 Payload = Annotated[bytes, Meta(max_length=4_096)]  # chosen: forty times the radio's longest packet
 StateVector = Annotated[bytes, Meta(max_length=524_288)]  # chosen: 65 536 numbers; three Scouts need 700
-Pixels = Annotated[memoryview, Meta(max_length=8_000_000)]  # chosen: a frame of 1080p in color is 6.2 MB
+MOST_PIXEL_BYTES = 8_000_000  # chosen: a frame of 1080p in color is 6.2 MB
+Pixels = Annotated[memoryview, Meta(max_length=MOST_PIXEL_BYTES)]
 
 # ---------------------------------------------------------------------- counts and ids
 EXACT = 2**53  # up to here integers are exact in a double, a JSON trace and JavaScript
@@ -80,7 +81,8 @@ ExitCode = Annotated[int, Meta(ge=-255, le=255)]  # POSIX: a byte; Python: minus
 Signal = Annotated[int, Meta(ge=1, le=64)]  # Linux, the real-time signals included
 Priority = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]  # the mission file's xs:int
 Rank = Annotated[int, Meta(ge=-1, le=MOST_ENTRIES)]  # place among the holders of one RC; -1: unchanged
-PixelCount = Annotated[int, Meta(ge=0, le=8_192)]  # chosen: twice the width of a 4K picture
+MOST_PX = 8_192  # chosen: twice the width of a 4K picture
+PixelCount = Annotated[int, Meta(ge=0, le=MOST_PX)]
 PixelPlace = Annotated[int, Meta(ge=-8_192, le=8_192)]  # a region may begin outside the picture
 
 # ---------------------------------------------------------------------- times, seconds
@@ -110,7 +112,8 @@ Radians = Annotated[float, Meta(ge=-1e6, le=1e6)]  # chosen: a heading may count
 Speed = Annotated[float, Meta(ge=-100, le=100)]  # chosen: m/s, three hundred times a Scout's; RCs clip
 TurnRate = Annotated[float, Meta(ge=-1e3, le=1e3)]  # chosen: rad/s, a hundred times a Scout's; RCs clip
 WheelSpeed = Annotated[float, Meta(ge=-1e4, le=1e4)]  # chosen: a hundred times a Scout's; RCs clip
-Measure = Annotated[float, Meta(ge=-1e18, le=1e18)]
+MOST_MEASURE = 1e18  # chosen: far beyond every counter
+Measure = Annotated[float, Meta(ge=-MOST_MEASURE, le=MOST_MEASURE)]
 """A number whose meaning is in its name: statistics, facts."""
 Whole = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
 """An integer whose meaning is in its name."""

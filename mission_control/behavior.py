@@ -22,6 +22,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
+from backbone.debug_views import ListViews, Look
 from backbone.errors import LinkError, Refusal
 from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
@@ -32,6 +33,7 @@ from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw
 from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_task, why
 from mission_control.children import Children, Decision
 from mission_control.children_loop import ChildrenLoop
+from mission_control.debug_views import DebugViews
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
 from mission_control.parent_reports import ParentReports
 from resource_pool.arc_client import (
@@ -91,7 +93,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior | TakeBranch
+    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior | TakeBranch | ListViews | Look
     children_together: ClassVar[bool] = True
     children_allowed: ClassVar[tuple[int, int] | None] = None
     may_claim: ClassVar[bool] = True
@@ -105,6 +107,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """The granted RC that has a body; empty while suspended, and without one."""
         self.arc: ArcClient | None = None
         """The client of its ARC; None without an ARC."""
+        self.views = DebugViews(bus, clock)
+        """Its debug views: pictures and values that cost nothing while nobody looks."""
         self.times_resumed = self.times_suspended = self.frames_seen = 0
         self._nodes = {node.name: node for node in self.parameters.children}
         self._children = ChildrenLoop(
@@ -202,7 +206,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self._children.begin()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer the ARC, the children, ``AskBehavior`` and ``TakeBranch``."""
+        """Answer the ARC, the children, who asks about it or looks at debug views, and ``TakeBranch``."""
         match asked.body:
             case ChildReport(child=child) as report:
                 if child not in self._nodes or child != component_of(asked.source):
@@ -213,6 +217,10 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 return self.behavior_state()
             case TakeBranch() as taken:
                 return await self._take(taken)
+            case ListViews():
+                return self.views.listed()
+            case Look() as look:
+                return self.views.look(look)
             case body if isinstance(body, ArcNotice):
                 if self.arc is None:
                     raise NotMyArc(f"{self.name} claims no ARC")

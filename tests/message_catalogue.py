@@ -20,7 +20,10 @@ from backbone.wire import Message, schema_of
 
 PACKAGES = ("backbone", "resource_pool", "mission_control", "ui_console", "scout_model")
 A_MEGABYTE = 1_000_000
-TIED = {("Frame", "pixels")}  # as many as rows and columns have: no value of one field alone is at its limit
+TIED = {
+    ("Frame", "pixels"),
+    ("ViewPicture", "pixels"),
+}  # as many as rows and columns have: no value of one field alone is at its limit
 
 
 class Sample(NamedTuple):

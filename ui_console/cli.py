@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -29,6 +30,7 @@ WEB_PORT = 8420  # chosen: free on most machines
 LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
 LONGEST_WAIT_S = 86_400.0  # chosen: a day, as in a mission file
 SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
+BEHAVIORS = "mission_control"
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
@@ -47,6 +49,13 @@ def complete_robot(ctx: typer.Context) -> list[str]:
     picture = picture_for(ctx)
     rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
     return sorted(rc.rc for rc in rcs if rc.is_robot)
+
+
+def complete_behavior(ctx: typer.Context) -> list[str]:
+    """Return the behaviors of the mission that is up, for a shell."""
+    picture = picture_for(ctx)
+    addresses = picture.components if picture is not None else ()
+    return sorted(name for subsystem, _, name in (one.partition("/") for one in addresses) if subsystem == BEHAVIORS)
 
 
 Mission = Annotated[
@@ -157,6 +166,33 @@ def monitor(
 
         run(lambda: look_once(where, user))
     _watch(where, user, as_json=as_json)
+
+
+@app.command()
+def look(
+    behavior: Annotated[str, typer.Argument(autocompletion=complete_behavior, help="A behavior of the mission.")],
+    view: Annotated[str, typer.Argument(help="One of its debug views; none: list them with their newest values.")] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="The list as one JSON object; a view as JSON lines.")] = False,
+    save: Annotated[
+        Path | None, typer.Option(help="Save one picture of the view and end.", metavar="FILE.png", dir_okay=False)
+    ] = None,
+    for_s: Annotated[
+        float,
+        typer.Option(
+            "--for", min=0.0, max=LONGEST_WAIT_S, callback=finite, help="End after so many seconds; 0: at Ctrl-C."
+        ),
+    ] = 0.0,
+    mission: Mission = None,
+    connect: Connect = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Look into a behavior: the pictures and values that it goes by, live; it makes them only while you look."""
+    where = chosen(mission, connect, secret_file)
+    if save is not None and not view:
+        raise _usage("--save needs a view")
+    from ui_console.terminal.look import LookOptions, look_into
+
+    run(lambda: look_into(where, behavior, view, LookOptions(as_json, save, for_s)))
 
 
 @app.command()

@@ -336,7 +336,7 @@ class Launcher(Component[NoParameters]):
     # ------------------------------------------------------------------ stop
     async def _run_last(self, reason: str) -> None:
         """Stop consoles and behaviors, run the last branch, then end."""
-        order = last_order(self._description)
+        order = last_order(self._tree.description)
         assert order is not None  # noqa: S101  the decision is to run it
         behaviors = {each.name for each in self._description.types if each.subsystem is Subsystem.MISSION_CONTROL}
         async with self._step("stop consoles"):
@@ -381,7 +381,7 @@ class Launcher(Component[NoParameters]):
         await asyncio.gather(*(self._stop(c.name) for c in description.components))
 
     async def _stop_roots(self) -> None:
-        for order in reversed(behavior_orders(self._description)):
+        for order in reversed(behavior_orders(self._tree.description)):
             await self._stop(order.name)
 
     async def _stop_placed(self, is_meant: Callable[[Placement], bool]) -> None:

@@ -70,7 +70,11 @@ class Hide(Driver[HideParameters]):
             self._unusable = UnusablePicture(f"{frame.rc} delivers {frame.width_px} by {frame.height_px} pixels")
             return
         pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
-        self._motion = self.search.decide(glimpse(pixels), frame.captured_s)
+        seen = glimpse(pixels)
+        self._motion = self.search.decide(seen, frame.captured_s)
+        self.views.picture("glimpse", lambda: seen.view)
+        self.views.value("ahead", seen.ahead)
+        self.views.value("ground", seen.ground)
 
     async def drive_on(self, robot: str) -> None:
         """Carry out the decision of each picture; see ``Driver.drive_on``."""

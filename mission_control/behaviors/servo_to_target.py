@@ -23,8 +23,10 @@ from backbone.errors import Refusal
 from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import Driver
 from mission_control.messages import BehaviorStatus
+from mission_control.vision.landmark import Picture
 from mission_control.vision.servo_law import STOP_M, Stage
-from mission_control.vision.skeleton_tracking import TrackingPhase
+from mission_control.vision.servo_views import blobs_view, skeleton_view
+from mission_control.vision.skeleton_tracking import Track, TrackingPhase
 from mission_control.vision.visual_servo import FARTHEST_STOP_M, LATENCY_S, NEAREST_STOP_M, ServoStep, VisualServo
 from resource_pool.arc_client import Frame
 
@@ -103,6 +105,7 @@ class Servo(Driver[S]):
         elapsed_s = 0.0 if self._seen_s is None else max(0.0, frame.captured_s - self._seen_s)
         self.step, self._seen_s = self._servo.see(pixels, elapsed_s), frame.captured_s
         self._note_phase(frame.robot, self.step)
+        self._show(pixels, self.step.track)
 
     def not_now(self) -> float:
         """Return the time that settling before the target needs; see ``Behavior.not_now``."""
@@ -162,6 +165,13 @@ class Servo(Driver[S]):
         if pose is not None:
             at |= {"ahead_m": pose.ahead_m, "left_m": pose.left_m, "heading_rad": pose.heading_rad}
         self.finish(BehaviorStatus.SUCCESS, at)
+
+    def _show(self, pixels: Picture, track: Track) -> None:
+        sighting, model = track.sighting, self._servo.tracker.model
+        self.views.picture("blobs", lambda: blobs_view(pixels, None if sighting is None else sighting.blobs_px))
+        self.views.picture("skeleton", lambda: skeleton_view(pixels, model))
+        self.views.value("match", track.match)
+        self.views.value("phase", track.phase)
 
     def _plan(self) -> VisualServo:
         return VisualServo(stop_m=self.parameters.stop_m, latency_s=self.parameters.latency_s)

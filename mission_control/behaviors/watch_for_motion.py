@@ -25,6 +25,7 @@ from mission_control.messages import MotionSeen, Region
 from mission_control.vision.motion_detection import FAST_FRAMES, VOTES, MotionDetector
 from resource_pool.arc_client import Frame
 
+BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is well seen
 REPORT_EVERY_FRAMES = 30  # chosen: about once a second
 
 
@@ -100,6 +101,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
         self._robot = frame.robot
         blob = self._detector.look(pixels)
+        self._show_stages()
         self._certain_frames += blob is not None
         is_certain = blob is not None and self._certain_frames >= self.parameters.frames_wanted
         if blob is not None and is_certain and frame.captured_s >= self._last_told_s + self.parameters.again_after_s:
@@ -119,6 +121,14 @@ class WatchForMotion(Behavior[WatchParameters]):
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, the events, and the pictures that were too torn to use."""
         return {**super().statistics(), "events": self._events, "frames_rejected": self._detector.rejected}
+
+    def _show_stages(self) -> None:
+        stages, views = self._detector.stages, self.views
+        if stages is not None:  # the first pictures of a slice are not judged
+            views.picture("difference", lambda: BRIGHTER * stages.difference)
+            views.picture("changed", lambda: 127 * (stages.changed.astype(np.uint8) + stages.kept))
+            views.value("threshold", stages.bar)
+            views.value("votes", sum(self._detector.votes))
 
     def _ask_for_more(self, captured_s: float) -> None:
         """Extend the slice until motion is certain, if there was a glimpse that is not published yet."""

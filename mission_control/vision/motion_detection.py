@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -56,12 +56,16 @@ class Stages:
     Attributes:
         picture: The new picture, blurred, grey levels.
         average: What it was compared with; changes when the next picture is looked at.
+        difference: How far it was from the average, grey levels.
+        bar: Grey levels above which a difference is more than noise.
         changed: Where it differed by more than noise does.
         kept: The same without rows that changed as a whole; all False if the picture was not judged.
     """
 
     picture: NDArray[np.float32]
     average: NDArray[np.float32]
+    difference: NDArray[np.float32]
+    bar: float
     changed: NDArray[np.bool_]
     kept: NDArray[np.bool_]
 
@@ -111,6 +115,11 @@ def median_of(pictures: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
     return np.asarray((ordered[middle - 1] + ordered[middle]) / 2, np.float32)
 
 
+def noise_bar(difference: NDArray[np.float32]) -> float:
+    """Return the grey levels above which a difference of two pictures is more than noise."""
+    return max(LEAST_DIFFERENCE, MEAN_DIFFERENCES * float(difference.mean()))
+
+
 def changed_pixels(average: NDArray[np.float32], picture: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Return where the picture differs from the average by more than noise does.
 
@@ -121,9 +130,8 @@ def changed_pixels(average: NDArray[np.float32], picture: NDArray[np.float32]) -
     Returns:
         True where the difference exceeds ``LEAST_DIFFERENCE`` and ``MEAN_DIFFERENCES`` times its mean.
     """
-    difference = cv2.absdiff(picture, average)
-    bar = max(LEAST_DIFFERENCE, MEAN_DIFFERENCES * float(difference.mean()))
-    return np.asarray(difference > bar, np.bool_)
+    difference = np.asarray(cv2.absdiff(picture, average), np.float32)
+    return np.asarray(difference > noise_bar(difference), np.bool_)
 
 
 def torn_rows(changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -185,7 +193,7 @@ class MotionDetector:
     def __init__(self, *, filters_rows: bool = True) -> None:
         self._filters_rows = filters_rows
         self.stages: Stages | None = None
-        """The pictures on the way to the last judgment, None before the second picture."""
+        """The pictures on the way to the last judgment; None: the last picture was one of the first after a swap."""
         self._average: NDArray[np.float32] | None = None
         self._fresh: list[NDArray[np.float32]] = []
         self._is_settling = True
@@ -218,7 +226,7 @@ class MotionDetector:
         """
         if frame.ndim != 2 or min(frame.shape) < 2:
             raise ValueError(f"a grey picture has shape (height, width), not {frame.shape}")
-        self.frames += 1
+        self.frames, self.stages = self.frames + 1, None
         picture = np.asarray(cv2.blur(halve(frame), (3, 3)), np.float32)
         if self._average is not None and self._average.shape != picture.shape:
             self._average = None
@@ -226,9 +234,11 @@ class MotionDetector:
         if self._is_settling or self._average is None:
             self._settle(picture)
             return None
-        changed = changed_pixels(self._average, picture)
+        difference = np.asarray(cv2.absdiff(picture, self._average), np.float32)
+        bar = noise_bar(difference)
+        changed = np.asarray(difference > bar, np.bool_)
         torn = torn_rows(changed) if self._filters_rows else np.zeros(len(changed), np.bool_)
-        self.stages = Stages(picture, self._average, changed, np.zeros_like(changed))
+        self.stages = Stages(picture, self._average, difference, bar, changed, np.zeros_like(changed))
         if torn.mean() > ROWS_SHARE or (self._filters_rows and edges_moved(self._average, picture) > EDGES_SHARE):
             self.rejected += 1
             self._rejected_in_turn += 1
@@ -237,7 +247,7 @@ class MotionDetector:
             return None
         self._rejected_in_turn = 0
         sound = np.repeat(~torn[:, np.newaxis], picture.shape[1], axis=1)
-        self.stages = Stages(picture, self._average, changed, changed & sound)
+        self.stages = replace(self.stages, kept=changed & sound)
         cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT, mask=sound.astype(np.uint8))
         blob = largest_blob(self.stages.kept, drop_streaks=self._filters_rows)
         self._votes.append(blob is not None)

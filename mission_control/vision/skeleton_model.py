@@ -116,10 +116,16 @@ def landmark_match(frame: Picture, blobs_px: Floats) -> float:
 def _share(
     levels: NDArray[np.int16], is_inside: NDArray[np.bool_], middle: float, is_bright: NDArray[np.bool_]
 ) -> float:
-    agrees = ((levels > middle) == is_bright) & is_inside
+    agrees = _agreement(levels, is_inside, middle, is_bright)
     if int(agrees[:_DISCS].sum()) < LEAST_DISCS or contrast(levels) < LEAST_CONTRAST:
         return 0.0
     return float(agrees.sum()) / SKELETON_PIXELS
+
+
+def _agreement(
+    levels: NDArray[np.int16], is_inside: NDArray[np.bool_], middle: float, is_bright: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    return np.asarray(((levels > middle) == is_bright) & is_inside, np.bool_)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,6 +170,17 @@ class TargetModel:
         levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
         middle = self.middle_level
         return _share(levels, is_inside, middle, self.levels > middle)
+
+    def agreement(self, frame: Picture, blobs_px: Floats) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Return the pixels of the skeleton if the discs are here, and which of them agree, as ``match`` counts them.
+
+        Returns:
+            Column and row, shape (17, 2), and shape (17,).
+        """
+        pixels = skeleton_px(blobs_px)
+        levels, is_inside = levels_at(frame, pixels)
+        middle = self.middle_level
+        return pixels, _agreement(levels, is_inside, middle, self.levels > middle)
 
     def subimage_match(self, frame: Picture, blobs_px: Floats) -> float:
         """Return how well the subimage correlates with the picture if the discs are here, -1 to 1.

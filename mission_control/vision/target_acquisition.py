@@ -39,14 +39,14 @@ def acquire(frame: Picture) -> Sighting | None:
     if frame.ndim != 2 or frame.dtype != np.uint8:
         raise ValueError(f"a grey picture has shape (height, width) and bytes, not {frame.shape} of {frame.dtype}")
     best: Sighting | None = None
-    for blobs_px in _tees(*_dark_regions(frame)):
+    for blobs_px in _tees(*dark_regions(frame)):
         found = _confirmed(frame, blobs_px)
         if found is not None and (best is None or found.match > best.match):
             best = found
     return best
 
 
-def _dark_regions(frame: Picture) -> tuple[Floats, Floats]:
+def dark_regions(frame: Picture) -> tuple[Floats, Floats]:
     """Return what could be discs: middles (column and row), shape (n, 2), and areas, (n,); the largest first."""
     _, binary = cv2.threshold(frame, THRESHOLD, 255, cv2.THRESH_BINARY_INV)
     _, _, stats, middles = cv2.connectedComponentsWithStats(binary, connectivity=4)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable
 from datetime import datetime
 from typing import Any
 
@@ -10,7 +12,8 @@ from console_scenes import model
 from numpy.typing import NDArray
 from textual.pilot import Pilot
 
-from backbone.errors import Refusal
+from backbone.debug_views import ViewPicture, Views, ViewValue
+from backbone.errors import LinkError, Refusal
 from backbone.mission_log.log import AskLog, Log
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
@@ -32,6 +35,8 @@ class WrittenSession(Session):
         self.shown: NDArray[np.uint8] | None = None
         self.is_sure = True
         self.log: Log | Refusal = Log([])
+        self.views: dict[str, Views] = {}
+        self.seen: list[ViewPicture | ViewValue | Refusal] = []
 
     def picture(self) -> NDArray[np.uint8] | None:
         return self.shown
@@ -113,6 +118,28 @@ class WrittenSession(Session):
     async def set_parameter(self, name: str, parameter: str, value: object) -> bool:
         self.wanted.append(("set", name, parameter, value))
         return self.is_sure
+
+    async def debug_views(self) -> dict[str, Views]:
+        self.wanted.append("views")
+        return self.views
+
+    async def keep_looking(
+        self,
+        behavior: str,
+        view: str,
+        show: Callable[[ViewPicture | ViewValue], None],
+        trouble: Callable[[Refusal | LinkError], None],
+    ) -> None:
+        self.wanted.append(("look", behavior, view))
+        for seen in self.seen:
+            if isinstance(seen, Refusal):
+                trouble(seen)
+            else:
+                show(seen)
+        try:
+            await asyncio.Event().wait()
+        finally:
+            self.wanted.append("looks no more")
 
 
 async def settle(pilot: Pilot[Any]) -> None:

@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from backbone.component.messages import LifeState
+from backbone.debug_views import ViewPicture, Views, ViewValue
+from backbone.errors import LinkError, Refusal
 from backbone.mission_log.log import AskLog, Log
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import GiveWish, MoveWish, move_by_stick
+from ui_console.session.looking import all_views, keep_looking
 from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 
@@ -146,6 +149,25 @@ class Session:
     async def set_parameter(self, name: str, parameter: str, value: object) -> bool:
         """Set a parameter; return whether the component applied it."""
         return await self._ready_console().set_parameter(name, parameter, value)
+
+    async def debug_views(self) -> dict[str, Views]:
+        """Return address and debug views of each behavior that has shown some.
+
+        Raises:
+            LinkError: The nameserver did not answer.
+        """
+        return await all_views(self._ready_console().bus)
+
+    async def keep_looking(
+        self,
+        behavior: str,
+        view: str,
+        show: Callable[[ViewPicture | ViewValue], None],
+        trouble: Callable[[Refusal | LinkError], None],
+    ) -> None:
+        """Look at a debug view until cancelled; see ``looking.keep_looking``."""
+        console = self._ready_console()
+        await keep_looking(console.bus, console.clock, behavior, view, show, trouble=trouble)
 
     def _with_robot(self, act: Callable[[Teleoperation], None]) -> None:
         if isinstance(self._console, Teleoperation) and self._console.is_ready:

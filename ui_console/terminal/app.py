@@ -11,10 +11,12 @@ from textual import work
 from textual.events import AppBlur, AppFocus, Key, MouseDown
 from textual.widgets import Input
 
-from backbone.errors import Refusal
+from backbone.errors import LinkError, Refusal
 from backbone.launcher.endings import ExitCode
+from backbone.naming import component_of
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.driving import DIRECTIONS, STICK_LASTS_S, Direction, faster
+from ui_console.model.profile import Profile
 from ui_console.model.views import AlarmView
 from ui_console.session.gamepad import buttons_help
 from ui_console.terminal.dialogs import CommandDialog, Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker
@@ -23,6 +25,7 @@ from ui_console.terminal.keys import keys_help, stop_meant
 from ui_console.terminal.lines import robot_rows
 from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
 from ui_console.terminal.tables import FIXED, PanelName
+from ui_console.terminal.view_dialogs import ViewDialog, ViewPicker
 from ui_console.terminal.widgets import DrivePad, Panel
 
 A = TypeVar("A")
@@ -314,6 +317,27 @@ class ConsoleApp(ConsoleDisplay):
         self._found = found
         self.chosen = self._turn = PanelName.LOG
         self.redraw()
+
+    def action_look(self) -> None:
+        """Choose a debug view of a behavior, and look at it live."""
+        self._list_views()
+
+    @work(group="look", exclusive=True)
+    async def _list_views(self) -> None:
+        try:
+            views = await self._session.debug_views()
+        except LinkError as error:
+            self.notify(str(error), severity="warning", markup=False)
+            return
+        if not views:
+            self.notify("no behavior shows anything yet", severity="warning")
+            return
+        self._open(ViewPicker(views), lambda chosen: self._look(*chosen))
+
+    def _look(self, behavior: str, view: str) -> None:
+        keep_looking = partial(self._session.keep_looking, behavior, view)
+        has_pixels = self._has_pixels and self.profile is Profile.MONITOR  # the terminal keeps one picture
+        self._open(ViewDialog(f"{component_of(behavior)}: {view}", keep_looking, has_pixels=has_pixels))
 
     def action_bare(self) -> None:
         """Show the picture alone, or everything again."""

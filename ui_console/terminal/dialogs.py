@@ -32,6 +32,8 @@ Dialog > Vertical { width: 90%; max-width: 100; height: auto; max-height: 90%; p
 Dialog > Vertical { border: thick $primary; background: $surface; }
 Dialog OptionList { height: auto; max-height: 20; }
 Dialog VerticalScroll { height: auto; max-height: 100%; }
+ViewDialog > Vertical { height: 90%; }
+ViewDialog Video { height: 1fr; }
 Dialog .remark { color: $text-muted; }
 """
 READ_S = 0.5  # chosen: people need longer to read a line

@@ -60,6 +60,7 @@ KEYS = [
         "search",
         "search the mission's log: words, a robot, a person, a level, a time",
     ),
+    Binding("b", "look", "what the behaviors see: choose a view, and look at it live"),
     Binding("v", "bare", "picture alone, and back"),
     Binding("question_mark,f1", "keys", "these keys"),
     Binding("q,alt+q", "quit", "give the robot back and leave"),

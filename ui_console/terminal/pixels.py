@@ -23,6 +23,7 @@ from rich.style import Style
 IMAGE = 42  # chosen: any number of 24 bits can be named by a color
 PLACEHOLDER = "\U0010eeee"
 CHUNK_BYTES = 4096  # the protocol's most
+GREY, TRUE_COLOR = 0, 2  # PNG, "Color type"
 PNG_LEVEL = 1  # chosen: analog noise does not compress anyway
 ROW_MARKS = (
     "\u0305\u030d\u030e\u0310\u0312\u033d\u033e\u033f\u0346\u034a\u034b\u034c\u0350\u0351\u0352\u0357"
@@ -54,7 +55,7 @@ def send(picture: NDArray[np.uint8], columns: int, rows: int) -> Segment:
     """Return the escape sequence that shows this picture at the placeholders.
 
     Args:
-        picture: Grey levels 0 to 255, shape (height, width), row 0 on top.
+        picture: As for ``png``.
         columns: Cells across.
         rows: Cells down, at most ``MOST_ROWS``.
     """
@@ -74,15 +75,17 @@ def row_of_cells(row: int, columns: int) -> Segment:
 
 
 def png(picture: NDArray[np.uint8]) -> bytes:
-    """Return the picture as PNG, 8 bits of grey.
+    """Return the picture as PNG, 8 bits of grey, or of red, green and blue each.
 
     Args:
-        picture: Grey levels 0 to 255, shape (height, width), row 0 on top.
+        picture: Grey levels 0 to 255 of shape (height, width), or red, green and blue of shape (height, width, 3), row
+            0 on top.
     """
-    height, width = picture.shape
-    filtered = np.zeros((height, width + 1), np.uint8)  # every row begins with its filter: 0, none
-    filtered[:, 1:] = picture
-    header = struct.pack("!IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    height, width = picture.shape[:2]
+    channels = 1 if picture.ndim == 2 else 3
+    filtered = np.zeros((height, channels * width + 1), np.uint8)  # every row begins with its filter: 0, none
+    filtered[:, 1:] = picture.reshape(height, channels * width)
+    header = struct.pack("!IIBBBBB", width, height, 8, GREY if channels == 1 else TRUE_COLOR, 0, 0, 0)
     body = zlib.compress(filtered.tobytes(), PNG_LEVEL)
     return b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + _chunk(b"IDAT", body) + _chunk(b"IEND", b"")
 

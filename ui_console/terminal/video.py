@@ -1,4 +1,4 @@
-"""Pictures in a terminal: two pixels a cell, 24 greys, equal neighbors drawn at once.
+"""Pictures in a terminal: two pixels a cell, 24 greys or 216 colors, equal neighbors drawn at once.
 
 Half blocks in the 24 greys of the 256-color palette hold 15 pictures a second in a terminal; more
 colors cost a new style for nearly every cell and fall to 4.
@@ -17,34 +17,37 @@ from rich.style import Style
 
 GREYS = 24
 FIRST_GREY = 232  # of the terminal's 256 colors; the last grey is 255
+FIRST_COLOR, CUBE = 16, 6  # of the same: six steps of red, green and blue each
 UPPER_HALF = "▀"
-STYLES_KEPT = 4096  # chosen: all pairs of 24 greys are 576
+STYLES_KEPT = 4096  # chosen: all pairs of 24 greys are 576, and few colors stand beside each other
 
 
 def shrink(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.uint8]:
-    """Return the picture in grey steps for that many cells, each pixel the mean of its area.
+    """Return the picture in steps for that many cells, each pixel the mean of its area.
 
     Args:
-        picture: Grey levels 0 to 255, shape (height, width), row 0 on top.
+        picture: Grey levels 0 to 255 of shape (height, width), or red, green and blue of shape (height, width, 3), row
+            0 on top.
         columns: Cells across, at least 1.
         rows: Cells down, at least 1.
 
     Returns:
-        Grey steps 0 to 23, shape (2 × rows, columns).
+        Steps 0 to 23 of grey, shape (2 × rows, columns), or of red, green and blue, shape (2 × rows, columns, 3).
 
     Example:
         >>> shrink(np.array([[0, 255], [255, 255]], np.uint8), columns=2, rows=1)
         array([[ 0, 23],
                [23, 23]], dtype=uint8)
     """
-    height, width = picture.shape
+    height, width = picture.shape[:2]
     top = np.arange(2 * rows) * height // (2 * rows)
     left = np.arange(columns) * width // columns
     # reduceat returns the single element where two neighbors share a start, as enlarging needs.
     sums = np.add.reduceat(np.add.reduceat(picture.astype(np.uint32), top, axis=0), left, axis=1)
     tall = np.maximum(1, np.diff(np.append(top, height)))
     wide = np.maximum(1, np.diff(np.append(left, width)))
-    means = sums // (tall[:, np.newaxis] * wide[np.newaxis, :])
+    areas = tall[:, np.newaxis] * wide[np.newaxis, :]
+    means = sums // (areas if picture.ndim == 2 else areas[:, :, np.newaxis])
     return np.asarray(means * GREYS // 256, np.uint8)
 
 
@@ -70,15 +73,25 @@ def fit(width_px: int, height_px: int, columns: int, rows: int) -> tuple[int, in
 
 
 def _runs(steps: NDArray[np.uint8], row: int) -> Iterator[tuple[int, int, int]]:
-    upper, lower = steps[2 * row].astype(np.int32), steps[2 * row + 1].astype(np.int32)
-    pairs = upper * GREYS + lower
+    upper, lower = _colors(steps[2 * row]), _colors(steps[2 * row + 1])
+    pairs = upper * 256 + lower
     starts = np.flatnonzero(np.diff(pairs, prepend=-1))
     lengths = np.diff(np.append(starts, len(pairs)))
     for start, length in zip(starts.tolist(), lengths.tolist(), strict=True):
         pair = int(pairs[start])
-        yield length, pair // GREYS, pair % GREYS
+        yield length, pair // 256, pair % 256
+
+
+def _colors(steps: NDArray[np.uint8]) -> NDArray[np.int32]:
+    """Return the numbers of a row's colors in the terminal's palette; what has no hue is one of the 24 greys."""
+    whole = steps.astype(np.int32)
+    if whole.ndim == 1:
+        return whole + FIRST_GREY
+    red, green, blue = (whole[:, channel] for channel in range(3))
+    cubed = (whole * CUBE // GREYS) @ np.array([CUBE * CUBE, CUBE, 1], np.int32) + FIRST_COLOR
+    return np.where((red == green) & (green == blue), red + FIRST_GREY, cubed)
 
 
 @lru_cache(maxsize=STYLES_KEPT)
 def _style(upper: int, lower: int) -> Style:
-    return Style(color=Color.from_ansi(FIRST_GREY + upper), bgcolor=Color.from_ansi(FIRST_GREY + lower))
+    return Style(color=Color.from_ansi(upper), bgcolor=Color.from_ansi(lower))

@@ -31,7 +31,7 @@ class Video(Widget):
     """The newest picture, as large as fits; an old one is dark and has a remark, for it must not look alive.
 
     Args:
-        newest: Returns the newest picture, grey levels, shape (height, width), or None.
+        newest: Returns the newest picture, as ``video.shrink`` takes it, or None.
         has_pixels: True if the terminal shows real pixels.
     """
 
@@ -57,7 +57,7 @@ class Video(Widget):
                 self.refresh()
             return
         columns, rows = self._cells(picture)
-        fits = self._steps is not None and self._steps.shape == (2 * rows, columns)
+        fits = self._steps is not None and self._steps.shape[:2] == (2 * rows, columns)
         if picture is self._shown and fits and remark == self._remark:
             return
         self._shown, self._remark = picture, remark

@@ -79,6 +79,7 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("i", [("ask", "scout1")]),
     ("k", [("acknowledge", "no_answer:")]),
     ("K", [("acknowledge", "")]),
+    ("b", ["views"]),
     ("enter", []),
 ]
 

@@ -80,3 +80,9 @@ def test_the_color_that_names_the_picture_stays_as_it_is_on_the_way_to_the_termi
 )
 def test_only_terminals_that_know_the_protocol_are_sent_pixels(environment: dict[str, str], can: bool) -> None:
     assert can_show_pixels(environment) is can
+
+
+def test_a_picture_in_color_is_packed_as_it_is() -> None:
+    picture = np.random.default_rng(1).integers(0, 256, (5, 7, 3)).astype(np.uint8)
+    unpacked = cv2.imdecode(np.frombuffer(png(picture), np.uint8), cv2.IMREAD_UNCHANGED)
+    assert (unpacked[:, :, ::-1] == picture).all()

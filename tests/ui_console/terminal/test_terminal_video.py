@@ -40,3 +40,22 @@ def test_a_picture_fits_into_its_room(width: int, height: int, columns: int, row
     fitted_columns, fitted_rows = fit(width, height, columns, rows)
     assert 1 <= fitted_columns <= columns
     assert 1 <= fitted_rows <= rows
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60), st.integers(1, 20))
+def test_a_picture_in_color_fills_every_row_and_without_hue_is_drawn_as_the_grey_one(
+    seed: int, columns: int, rows: int
+) -> None:
+    grey = np.random.default_rng(seed).integers(0, 256, (48, 64)).astype(np.uint8)
+    steps, colored = shrink(grey, columns, rows), shrink(np.repeat(grey[:, :, np.newaxis], 3, axis=2), columns, rows)
+    assert colored.shape == (2 * rows, columns, 3)
+    assert [row_segments(colored, row) for row in range(rows)] == [row_segments(steps, row) for row in range(rows)]
+
+
+def test_colors_are_those_of_the_terminals_cube() -> None:
+    steps = shrink(np.array([[[255, 0, 0]], [[0, 255, 0]]], np.uint8), 1, 1)
+    [segment] = row_segments(steps, 0)
+    assert segment.style is not None
+    assert segment.style.color is not None
+    assert segment.style.bgcolor is not None
+    assert (segment.style.color.number, segment.style.bgcolor.number) == (196, 46)

@@ -1,0 +1,192 @@
+"""Debug views of a behavior: named intermediate pictures and values that cost nothing while nobody looks.
+
+A behavior shows what it has whenever it has it. A picture's maker is called only while somebody looks at that view, at
+most once in ``SHOWN_EVERY_S``; otherwise nothing is made and nothing goes over the bus.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from backbone.bus.interface import Bus, Clock
+from backbone.debug_views import (
+    MOST_VIEWS,
+    SHOWN_EVERY_S,
+    Look,
+    LookedAt,
+    UnknownView,
+    ViewEntry,
+    ViewKind,
+    ViewPicture,
+    Views,
+    ViewValue,
+    view_address,
+)
+from backbone.keys import Conversation
+from backbone.naming import did_you_mean, legal
+from backbone.ranges import LONGEST_LINE, MOST_MEASURE, MOST_PIXEL_BYTES, MOST_PX
+
+if TYPE_CHECKING:  # most behaviors see no pictures and stay without NumPy
+    from numpy.typing import NDArray
+
+Shown = float | bool | str
+
+
+class LookBook:
+    """Which views somebody looks at, and when each may be shown again. Pure: times are arguments.
+
+    Args:
+        every_s: Shortest time between two of one view.
+    """
+
+    def __init__(self, every_s: float) -> None:
+        self._every_s = every_s
+        self._until_s: dict[str, float] = {}
+        self._again_s: dict[str, float] = {}
+
+    def look(self, view: str, until_s: float) -> float:
+        """Note that somebody looks until then; return until when the view is looked at by anybody."""
+        self._until_s[view] = max(until_s, self._until_s.get(view, until_s))
+        return self._until_s[view]
+
+    @property
+    def is_empty(self) -> bool:
+        """True as long as no view is looked at."""
+        return not self._until_s
+
+    def take(self, view: str, now_s: float) -> bool:
+        """Return whether the view is to be shown now; if so, it is not for the next ``every_s``."""
+        until_s = self._until_s.get(view)
+        if until_s is None:
+            return False
+        if now_s >= until_s:
+            del self._until_s[view]
+            return False
+        if now_s < self._again_s.get(view, now_s):
+            return False
+        self._again_s[view] = now_s + self._every_s
+        return True
+
+
+class DebugViews:
+    """The views of one behavior. A view exists from its first ``picture`` or ``value`` on, at most ``MOST_VIEWS``.
+
+    Args:
+        bus: Of the behavior.
+        clock: The mission's.
+    """
+
+    def __init__(self, bus: Bus, clock: Clock) -> None:
+        self._bus, self._clock = bus, clock
+        self._book = LookBook(SHOWN_EVERY_S * clock.rate)
+        self._kinds: dict[str, ViewKind] = {}
+        self._values: dict[str, Shown] = {}
+
+    def picture(self, view: str, make: Callable[[], NDArray[Any]]) -> None:
+        """Show a picture, if somebody looks at the view and its last picture is old enough.
+
+        Args:
+            view: A legal name, the same for each picture of this view.
+            make: Returns the picture; called at once or never. Grey levels 0 to 255 of shape (height, width), red,
+                green and blue of shape (height, width, 3), or True and False of shape (height, width). Other numbers
+                are rounded down, and those outside 0 to 255 cut off.
+
+        Raises:
+            ValueError: The view shows values, there are too many views, or the picture has another shape or more than
+                8 MB.
+        """
+        if self._kinds.get(view) is not ViewKind.PICTURE:
+            self._add(view, ViewKind.PICTURE)
+        if not self._book.is_empty and self._book.take(view, now_s := self._clock.now_s()):
+            self._publish(view, picture_of(view, now_s, make()))
+
+    def value(self, view: str, value: Shown) -> None:
+        """Show a value; the newest is in the list of views, and published while somebody looks.
+
+        Args:
+            view: A legal name with the value's unit, the same for each value of this view.
+            value: A number, a flag or a line.
+
+        Raises:
+            ValueError: The view shows pictures, or there are too many views.
+        """
+        if self._kinds.get(view) is not ViewKind.VALUE:
+            self._add(view, ViewKind.VALUE)
+        self._values[view] = value
+        if not self._book.is_empty:
+            self._show_newest(view)
+
+    def listed(self) -> Views:
+        """Return the views shown so far, with their newest values."""
+        entries = ((view, kind, self._values.get(view, "")) for view, kind in sorted(self._kinds.items()))
+        return Views([ViewEntry(view, kind, sendable(value)) for view, kind, value in entries])
+
+    def look(self, asked: Look) -> LookedAt:
+        """Show this view from now on for the time asked; of a value the newest at once.
+
+        Raises:
+            UnknownView: No such view was shown so far.
+        """
+        kind = self._kinds.get(asked.view)
+        if kind is None:
+            known = ", ".join(sorted(self._kinds)) or "none yet"
+            meant = did_you_mean(asked.view, self._kinds)
+            raise UnknownView(f"there is no view {asked.view!r}{meant}; there is: {known}", view=asked.view)
+        until_s = self._book.look(asked.view, self._clock.now_s() + asked.for_s * self._clock.rate)
+        if kind is ViewKind.VALUE:
+            self._show_newest(asked.view)
+        return LookedAt(asked.view, kind, until_s)
+
+    def _add(self, view: str, kind: ViewKind) -> None:
+        known = self._kinds.get(legal(view), kind)
+        if known is not kind:
+            raise ValueError(f"the view {view!r} shows a {known}, not a {kind}")
+        if len(self._kinds) >= MOST_VIEWS:
+            raise ValueError(f"{MOST_VIEWS} views are shown already, {view!r} is one too many")
+        self._kinds[view] = kind
+
+    def _show_newest(self, view: str) -> None:
+        now_s = self._clock.now_s()
+        if self._book.take(view, now_s):
+            self._publish(view, ViewValue(view, now_s, sendable(self._values[view])))
+
+    def _publish(self, view: str, shown: ViewPicture | ViewValue) -> None:
+        self._bus.publish(view_address(self._bus.source, view), Conversation.VIEWS, shown)
+
+
+def sendable(value: Shown) -> Shown:
+    """Return the value in a form that fits a message: a number beyond its range, or none at all, as text.
+
+    Example:
+        >>> sendable(3), sendable(True), sendable(float("nan"))
+        (3.0, True, 'nan')
+    """
+    if isinstance(value, str):
+        return value[:LONGEST_LINE]
+    if isinstance(value, bool):
+        return value
+    number = float(value)
+    return number if math.isfinite(number) and abs(number) <= MOST_MEASURE else str(number)
+
+
+def picture_of(view: str, at_s: float, made: NDArray[Any]) -> ViewPicture:
+    """Return the message with a copy of this picture; see ``DebugViews.picture``.
+
+    Raises:
+        ValueError: It has another shape, or is too large for a message.
+    """
+    is_color = made.ndim == 3
+    if made.ndim not in (2, 3) or (is_color and made.shape[2] != 3):
+        raise ValueError(f"the picture {view!r} has shape {made.shape}, not (height, width) or (height, width, 3)")
+    if made.nbytes // made.itemsize > MOST_PIXEL_BYTES or max(made.shape) > MOST_PX:
+        raise ValueError(f"the picture {view!r} has shape {made.shape}: at most {MOST_PX} pixels wide and 8 MB")
+    if made.dtype.kind == "b":
+        made = made.astype("uint8") * 255
+    elif made.dtype != "uint8":
+        levels = made.clip(0, 255)
+        levels[levels != levels] = 0  # noqa: PLR0124  only NaN differs from itself
+        made = levels.astype("uint8")
+    height, width = made.shape[:2]
+    return ViewPicture(view, at_s, width, height, is_color, memoryview(made.tobytes()))

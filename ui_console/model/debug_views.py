@@ -1,0 +1,48 @@
+"""Debug views of behaviors, as rows for screens. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+
+from backbone.debug_views import ViewEntry, ViewKind
+
+
+class ViewRow(msgspec.Struct, frozen=True):
+    """One view of a behavior.
+
+    Attributes:
+        view: Its name.
+        is_picture: True: it shows pictures; False: values.
+        text: The newest value for people; empty for pictures.
+    """
+
+    view: str
+    is_picture: bool
+    text: str = ""
+
+
+def view_rows(entries: Sequence[ViewEntry]) -> list[ViewRow]:
+    """Return a row for each view, in the same order."""
+    return [_picture_row(entry) if entry.kind is ViewKind.PICTURE else _value_row(entry) for entry in entries]
+
+
+def shown_text(value: float | bool | str) -> str:
+    """Return a value of a view for people.
+
+    Example:
+        >>> shown_text(28.0), shown_text(0.7300001), shown_text(True), shown_text("tracking")
+        ('28', '0.73', 'yes', 'tracking')
+    """
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
+def _picture_row(entry: ViewEntry) -> ViewRow:
+    return ViewRow(entry.view, True)
+
+
+def _value_row(entry: ViewEntry) -> ViewRow:
+    return ViewRow(entry.view, False, shown_text(entry.value))

@@ -1,0 +1,139 @@
+"""Looks at debug views: finds the behaviors that have some, and renews the lease on the one that somebody looks at."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from backbone.addresses import NAMESERVER
+from backbone.bus.interface import Bus, Clock
+from backbone.debug_views import (
+    LOOK_AGAIN_S,
+    ListViews,
+    Look,
+    LookedAt,
+    UnknownView,
+    ViewPicture,
+    Views,
+    ViewValue,
+    view_address,
+)
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved
+from backbone.naming import Subsystem
+from backbone.wire import Envelope, UnknownMessage
+
+log = logging.getLogger(__name__)
+
+REPLY_TIME_S = 1.0  # chosen: a person waits this long; machine seconds
+
+
+class NoViews(Refusal):
+    """The component is no behavior, so it has no debug views."""
+
+    code = "views.no_behavior"
+    remedy = "Look into a behavior; 'scout-backbone components' lists them all."
+
+
+async def find_behavior(bus: Bus, name: str) -> str:
+    """Return the address of the behavior of this name.
+
+    Raises:
+        Refusal: There is no such component, or it is no behavior; the detail names the nearest.
+        LinkError: The nameserver did not answer.
+    """
+    found = (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component
+    if not found.address.startswith(f"{Subsystem.MISSION_CONTROL}/"):
+        raise NoViews(f"{name} is a {found.type}, no behavior")
+    return found.address
+
+
+async def views_of(bus: Bus, behavior: str) -> Views:
+    """Return the views that a behavior has shown so far, with their newest values.
+
+    Args:
+        bus: The bus.
+        behavior: Its address.
+
+    Raises:
+        NoViews: It answers no such question.
+        LinkError: It did not answer.
+    """
+    try:
+        return await bus.ask(behavior, ListViews(), Views, within_s=REPLY_TIME_S)
+    except UnknownMessage as unknown:
+        raise NoViews(f"{behavior} has no debug views") from unknown
+
+
+async def all_views(bus: Bus) -> dict[str, Views]:
+    """Return address and views of each behavior that has some and answered, sorted by address.
+
+    Raises:
+        LinkError: The nameserver did not answer.
+    """
+    question = ListComponents(subsystem=str(Subsystem.MISSION_CONTROL))
+    there = (await bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)).components
+    addresses = [one.address for one in there]
+    answers = await asyncio.gather(*(views_of(bus, one) for one in addresses), return_exceptions=True)
+    found = dict[str, Views]()
+    for address, answer in zip(addresses, answers, strict=True):
+        if isinstance(answer, Views):
+            found |= {address: answer} if answer.views else {}
+        elif isinstance(answer, Refusal | LinkError):
+            log.info("%s did not answer with its views: %s", address, answer)
+        else:
+            raise answer
+    return found
+
+
+async def keep_looking(
+    bus: Bus,
+    clock: Clock,
+    behavior: str,
+    view: str,
+    show: Callable[[ViewPicture | ViewValue], None],
+    *,
+    trouble: Callable[[Refusal | LinkError], None] = lambda _error: None,
+) -> None:
+    """Look at a view until cancelled; the behavior may end and come back meanwhile.
+
+    Args:
+        bus: The bus.
+        clock: The mission's.
+        behavior: Its address.
+        view: Name of the view.
+        show: Called in the event loop with each picture or value.
+        trouble: Called when the behavior does not answer or has not shown the view again, each time it is asked.
+
+    Raises:
+        Refusal: The first answer is a refusal.
+        LinkError: There was no first answer.
+    """
+
+    def heard(envelope: Envelope[ViewPicture | ViewValue]) -> None:
+        show(envelope.body)
+
+    kinds = ViewPicture | ViewValue
+    at = view_address(behavior, view)
+    hearing = bus.subscribe(at, Conversation.VIEWS, kinds, heard, latest=True)  # type: ignore[arg-type]
+    try:
+        await bus.ask(behavior, Look(view), LookedAt, within_s=REPLY_TIME_S)
+        while True:
+            await clock.sleep_s(LOOK_AGAIN_S * clock.rate)
+            try:
+                await bus.ask(behavior, Look(view), LookedAt, within_s=REPLY_TIME_S)
+            except (UnknownView, LinkError) as error:
+                trouble(error)
+    finally:
+        hearing.close()
+
+
+def pixels_of(picture: ViewPicture) -> NDArray[np.uint8]:
+    """Return grey levels of shape (height, width), or red, green and blue of shape (height, width, 3)."""
+    shape = (picture.height_px, picture.width_px, 3) if picture.is_color else (picture.height_px, picture.width_px)
+    return np.frombuffer(picture.pixels, np.uint8).reshape(shape)
