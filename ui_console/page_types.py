@@ -30,6 +30,7 @@ from ui_console.design.views import (
 )
 from ui_console.model import views
 from ui_console.model.arc_abilities import ArcAbilities
+from ui_console.model.map import BodyView, FloorView
 from ui_console.model.timeline import TimelineView
 from ui_console.web.login import BeatRequest, Hello
 from ui_console.web.protocol import Intent
@@ -88,6 +89,8 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parameters: list[views.ParameterView]
     components: list[ComponentState]
     log: list[LoggedEvent]
+    floor: FloorView | None
+    bodies: list[BodyView]
     now_s: float
     beat: int
 

@@ -17,7 +17,7 @@ from backbone.component_database.messages import ComponentType, Types
 from backbone.naming import Subsystem, address
 from backbone.picture.mission import MissionPicture
 from backbone.scheduling.views import RcView
-from resource_pool.arc_client import FloorPlan, Pose, PoseSource
+from resource_pool.arc_client import FloorPlan, FloorShape, Pose, PoseSource
 from ui_console.model.floor_pick import NoFloorThere, Stand, floor_place
 from ui_console.model.link_board import LinkBoard
 
@@ -34,6 +34,22 @@ SOURCES = {
     PoseSource.LANDMARK: "from a landmark it sees",
 }
 """For people."""
+
+
+class FloorView(msgspec.Struct, frozen=True):
+    """The plan of the floor, as a page draws it.
+
+    Attributes:
+        width_m: Along x.
+        depth_m: Along y.
+        shapes: What stands on it.
+        image: A JPEG that covers the whole floor, in base64; empty: none.
+    """
+
+    width_m: float
+    depth_m: float
+    shapes: list[FloorShape]
+    image: str = ""
 
 
 class BodyView(msgspec.Struct, frozen=True):

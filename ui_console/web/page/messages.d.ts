@@ -53,6 +53,21 @@ export interface ArcAbilities {
   gives_pictures: boolean;
 }
 
+export interface BodyView {
+  name: string;
+  is_robot: boolean;
+  x_m: number;
+  y_m: number;
+  heading_rad: number;
+  spread_m: number;
+  source: string;
+  is_stale: boolean;
+  age_s: number;
+  trail: number[];
+  sees_rad: number;
+  link: string;
+}
+
 export type Certainty =
   | "next"
   | "now"
@@ -101,6 +116,23 @@ export interface FieldForm {
   is_required: boolean;
   choices: string[];
   doc: string;
+}
+
+export interface FloorShape {
+  name: string;
+  kind: ShapeKind;
+  x_m: number;
+  y_m: number;
+  width_m: number;
+  depth_m: number;
+  heading_rad: number;
+}
+
+export interface FloorView {
+  width_m: number;
+  depth_m: number;
+  shapes: FloorShape[];
+  image: string;
 }
 
 export interface FoundEvent {
@@ -315,6 +347,13 @@ export type Severity =
   | "notice"
   | "warning";
 
+export type ShapeKind =
+  | "dark"
+  | "furniture"
+  | "landmark"
+  | "ramp"
+  | "wall";
+
 export interface SliceView {
   who: string;
   arc: string;
@@ -388,6 +427,8 @@ export interface View {
   parameters: ParameterView[];
   components: ComponentState[];
   log: LoggedEvent[];
+  floor: FloorView | null;
+  bodies: BodyView[];
   now_s: number;
   beat: number;
 }
