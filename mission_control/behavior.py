@@ -31,7 +31,16 @@ from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw
 from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_task, why
 from mission_control.children import Children, Decision
 from mission_control.children_loop import ChildrenLoop
-from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
+from mission_control.keeper_reports import KeeperReports
+from mission_control.messages import (
+    AskBehavior,
+    BehaviorState,
+    BehaviorStatus,
+    BreakOff,
+    BrokenOff,
+    ChildReport,
+    ReportNoted,
+)
 from mission_control.parent_reports import ParentReports
 from resource_pool.arc_client import (
     ArcClient,
@@ -52,6 +61,7 @@ from resource_pool.arc_client import (
 log = logging.getLogger(__name__)
 
 DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before SIGTERM
+REST_S = 0.5  # chosen: as a slice's end gives; a behavior that stops needs one command
 NO_GRANT_YET = "no grant yet"
 
 
@@ -62,11 +72,13 @@ class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True
         path: Names and priorities from the mission's root to this node; empty: started by hand.
         arc: The ARC it claims, if any.
         children: Nodes it starts.
+        keeper: Address of the console that ordered it; empty: it is a node of the mission's tree.
     """
 
     path: list[PathStep] = []
     arc: ArcNeed | None = None
     children: list[BehaviorNode] = []
+    keeper: str = ""
 
 
 class NotAChild(Refusal):
@@ -88,7 +100,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior
+    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior | BreakOff
     children_together: ClassVar[bool] = True
     children_allowed: ClassVar[tuple[int, int] | None] = None
     may_claim: ClassVar[bool] = True
@@ -120,7 +132,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         )
         self._suspended_because = self._reported_because = ""
         self._is_wound_up = False
-        self._parent: ParentReports | None = None
+        self._parent: ParentReports | KeeperReports | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._acting: asyncio.Task[None] | None = None
 
@@ -178,13 +190,17 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
-        """Watch the parent, if it is a behavior; the first step of a path is the mission."""
-        if len(self.path) > 2:
+        """Watch the parent: a behavior, or the console of an order; the first step of a path is no behavior."""
+        if self.parameters.keeper:
+            self._parent = KeeperReports(self.bus, self.clock, self.parameters.keeper, self._report, self.end)
+        elif len(self.path) > 2:
             parent = address(Subsystem.MISSION_CONTROL, self.path[-2][0])
             self._parent = ParentReports(self.bus, self.clock, parent, self._report, self._begin)
 
     async def serve(self) -> None:
         """Start, claim the ARC, start the children; then react to events."""
+        if isinstance(self._parent, KeeperReports):
+            self._begin(self._parent.run(), "keeper")
         await self.start()
         need = self.need()
         if need is not None and not self.status.is_final:
@@ -206,6 +222,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 return ReportNoted()
             case AskBehavior():
                 return self.behavior_state()
+            case BreakOff():
+                self.finish(BehaviorStatus.FAILURE, {"detail": "broken off by its operator"})
+                return BrokenOff()
             case body if isinstance(body, ArcNotice):
                 if self.arc is None:
                     raise NotMyArc(f"{self.name} claims no ARC")
@@ -295,6 +314,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
             stops_at_once=self._commands_nothing,
             may_say_not_now=type(self).not_now is not BehaviorHooks.not_now,
+            console=bool(self.parameters.keeper),
         )
         try:
             await arc.keep(self.clock, need.kind, parameters, patience_s=START_PATIENCE_S, on_changed=self.changed)
@@ -360,12 +380,29 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self._send_report_if_suspension_changed()
 
     async def _wind_up(self) -> None:
-        """Give the ARC back, end the children, and repeat the report until the parent notes it."""
+        """Give the ARC back, end the children, and repeat the report until the parent notes it.
+
+        A behavior that a console ordered keeps its ARC, so that nobody lower has the robot before the operator.
+        """
         await self._stop_acting()
+        if isinstance(self._parent, KeeperReports):
+            await self._keep_for_operator(self._parent)
+            return
         await asyncio.gather(self._release(), self._children.end())
         if self._parent is not None:
             self._is_wound_up = True
             await self._parent.conclude()
+
+    async def _keep_for_operator(self, keeper: KeeperReports) -> None:
+        """Bring the robot to rest, and keep it until the console has it and ends this behavior."""
+        if self.rcs and not self._commands_nothing:
+            try:
+                await self.suspending(REST_S)
+            except (Refusal, LinkError) as error:  # the grant ended first, or the robot is stopped
+                log.info("%s did not bring its robot to rest: %s", self.name, error)
+        await self._children.end()
+        self._is_wound_up = True
+        keeper.send()
 
     def _send_report_if_suspension_changed(self) -> None:
         if self.suspended_because != self._reported_because:

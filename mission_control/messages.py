@@ -2,43 +2,24 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from typing import Annotated
 
+from backbone.mission.behavior_reports import BehaviorStatus, BreakOff, BrokenOff, ChildReport, ReportNoted
 from backbone.ranges import MANY, Count, Instant, Mention, PixelCount, PixelPlace, Text, Values
 from backbone.wire import Message
 
-
-class BehaviorStatus(StrEnum):
-    """Progress of a behavior."""
-
-    RUNNING = "running"  # at work, or suspended
-    SUCCESS = "success"  # its aim is reached; final
-    FAILURE = "failure"  # its aim cannot be reached; final
-
-    @property
-    def is_final(self) -> bool:
-        """True for success and failure."""
-        return self is not BehaviorStatus.RUNNING
-
-
-class ChildReport(Message, frozen=True, tag="ChildReport/2"):
-    """Progress of a child, sent to its parent on each change, and again until the parent notes it.
-
-    Attributes:
-        status: Its status; a final one is sent once and never changes.
-        payload: Data for the parent's decision: plain values only.
-        suspended_because: As in ``BehaviorState``.
-    """
-
-    child: Mention
-    status: BehaviorStatus
-    payload: Values = {}
-    suspended_because: Text = ""
-
-
-class ReportNoted(Message, frozen=True):
-    """Answer to ``ChildReport``."""
+__all__ = [
+    "AskBehavior",
+    "BehaviorState",
+    "BehaviorStatus",
+    "BreakOff",
+    "BrokenOff",
+    "ChildReport",
+    "MotionSeen",
+    "Region",
+    "ReportNoted",
+    "WaypointReached",
+]
 
 
 class AskBehavior(Message, frozen=True):

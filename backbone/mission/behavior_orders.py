@@ -2,7 +2,8 @@
 
 A behavior is launched with its own parameters as the file gives them, and three of the tree:
 ``path`` (from the mission's root to this node), ``arc`` (what it claims) and ``children`` (whole
-nodes, which the behavior starts itself, by the same rule). Nothing here imports the mission's model
+nodes, which the behavior starts itself, by the same rule). A behavior that a console ordered has a fourth, ``keeper``
+(the console). Nothing here imports the mission's model
 at run time, so a behavior's process can apply the rule to its children without loading pydantic.
 """
 
@@ -20,14 +21,14 @@ if TYPE_CHECKING:
 PathStep = tuple[str, int]
 Node = Mapping[str, Any]
 """A node of the behavior tree as plain data, with the nodes below it."""
-TREE_PARAMETERS = ("path", "arc", "children")
+TREE_PARAMETERS = ("path", "arc", "children", "keeper")
 
 
 class ReservedParameter(Refusal):
     """A behavior's own parameter has a name that belongs to the tree."""
 
     code = "mission.reserved_parameter"
-    remedy = f"Give the parameter another name; {', '.join(TREE_PARAMETERS)} are set by the behavior tree."
+    remedy = f"Give the parameter another name; {', '.join(TREE_PARAMETERS)} are set by what starts a behavior."
 
 
 def behavior_orders(description: MissionDescription) -> list[Start]:

@@ -23,6 +23,8 @@ class OperatorAction(StrEnum):
     DRIVE_BEGIN = "drive_begin"  # the first command of a drive was applied
     DRIVE_END = "drive_end"  # the drive ended, or the robot was lost or given back
     COMMAND = "command"  # gave a command that is none of driving
+    ORDER = "order"  # told a robot to do something by itself
+    ORDER_END = "order_end"  # the order was done, failed, or was ended by its operator
     STOP_ROBOT = "stop_robot"  # emergency stop
     STOP_ALL = "stop_all"
     LIFT_STOP = "lift_stop"
@@ -48,6 +50,8 @@ _SENTENCES = {
     OperatorAction.DRIVE_BEGIN: "is driven by {user}",
     OperatorAction.DRIVE_END: "is no longer driven by {user}",
     OperatorAction.COMMAND: "{user} commands it",
+    OperatorAction.ORDER: "{user} orders it",
+    OperatorAction.ORDER_END: "{user}'s order is over",
     OperatorAction.STOP_ROBOT: "{user} stops it",
     OperatorAction.STOP_ALL: "{user} stops all",
     OperatorAction.LIFT_STOP: "{user} lifts its stop",

@@ -26,6 +26,7 @@ from backbone.wire import plain
 from resource_pool.arc_client import FloorPlan, Pose, Readings, StopState, Suspended
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import Settled, Sought, Topic
+from ui_console.model.orders import GivenOrder
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,6 +218,20 @@ class ConsentHeard(Event):
     topic: Topic = Topic.TAKE
 
 
+@dataclass(frozen=True, slots=True)
+class TurnedTo(Event):
+    """The stick turned to a robot that carries out an order of this console; it asks for nothing."""
+
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class OrderChanged(Event):
+    """An order of this console was given, or its state changed; of each order the last one has a final state."""
+
+    given: GivenOrder
+
+
 # ---------------------------------------------------------------------- of the whole mission
 Said = (
     Schedule
@@ -288,6 +303,8 @@ OwnEvent = (
     | Attention
     | ConsentAsked
     | ConsentHeard
+    | TurnedTo
+    | OrderChanged
     | Sought
     | Settled
 )
@@ -306,6 +323,8 @@ _WORDS: dict[type[object], str] = {
     PictureSeen: "picture",
     ConsentAsked: "consent_asked",
     ConsentHeard: "consent_heard",
+    TurnedTo: "turned_to",
+    OrderChanged: "order",
     Sought: "consent_sought",
     Settled: "consent_settled",
     LinkHeard: "link",
@@ -355,6 +374,9 @@ def event_json(event: ConsoleEvent) -> bytes:
         case Heard():
             where = {"where": event.source} if event.source else {}
             fields = {"at_s": event.at_s, "act" if word == "operator" else word: fields["body"], **where}
+        case OrderChanged(given=given):
+            state = {"number": given.number, "state": given.state, "why": given.why, "by": given.by}
+            fields = {"at_s": event.at_s, **plain(given.order), **state, "line": given.line}
         case Granted():
             fields["after_s"] = event.after_s
     return msgspec.json.encode({"event": word, **fields})

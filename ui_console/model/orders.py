@@ -2,6 +2,7 @@
 
 An order is a behavior that the console starts for one robot with the operator's priority. The robot carries it out
 until it is done, until the operator touches the stick or gives another order, or until the operator gives it back.
+``OrderBook`` decides what follows from each of these.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ class Order:
         x_m: Of the place to go to, in the room's frame; ``GO_TO`` only.
         y_m: Same.
         target: Name of the body to follow; ``FOLLOW`` only.
+        then_release: The robot is given back when the order is done or failed; False: the operator has it again.
     """
 
     kind: OrderKind
@@ -36,6 +38,72 @@ class Order:
     x_m: float = 0.0
     y_m: float = 0.0
     target: str = ""
+    then_release: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """The order in words for people, without the robot.
+
+        Example:
+            >>> Order(OrderKind.GO_TO, "scout1", 2.0, 1.25).sentence
+            'go to 2, 1.25'
+        """
+        match self.kind:
+            case OrderKind.GO_TO:
+                return f"go to {self.x_m:g}, {self.y_m:g}"
+            case OrderKind.WATCH:
+                return "watch from here"
+            case OrderKind.RETURN:
+                return "return"
+            case OrderKind.FOLLOW:
+                return f"follow {self.target}"
+
+
+class OrderState(StrEnum):
+    """State of an order; done, failed and ended are final."""
+
+    STARTING = "starting"  # its behavior starts; until it is ready the robot stays with the stick
+    RUNNING = "running"  # the robot carries it out
+    WAITING = "waiting"  # the robot is stopped, or somebody higher has it
+    DONE = "done"  # its behavior has finished
+    FAILED = "failed"  # its behavior cannot reach its aim, was refused, or is gone
+    ENDED = "ended"  # the operator touched the stick, gave another order, or gave the robot back
+
+    @property
+    def is_final(self) -> bool:
+        """True if nothing more comes of the order."""
+        return self in (OrderState.DONE, OrderState.FAILED, OrderState.ENDED)
+
+
+@dataclass(frozen=True, slots=True)
+class GivenOrder:
+    """An order that was given, as it is now.
+
+    Attributes:
+        number: Of the order, from 1, unique at its console.
+        state: Its state.
+        why: Why it waits, failed or ended; of an order that is done what its behavior told; may be empty.
+        by: What the robot's position comes from, for people; empty: the order needs none, or it is not known yet.
+    """
+
+    order: Order
+    number: int
+    state: OrderState = OrderState.STARTING
+    why: str = ""
+    by: str = ""
+
+    @property
+    def line(self) -> str:
+        """The order and its state in one line for people.
+
+        Example:
+            >>> GivenOrder(Order(OrderKind.RETURN, "scout1"), 3, OrderState.WAITING, "stopped by anna").line
+            'scout1: return (waiting: stopped by anna)'
+        """
+        remarks = [f"{self.state}: {self.why}" if self.why else str(self.state)]
+        if self.by and not self.state.is_final:
+            remarks.append(self.by)
+        return f"{self.order.robot}: {self.order.sentence} ({'; '.join(remarks)})"
 
 
 APART_M = 0.5  # chosen: two Scouts of 11 cm pass each other, and a rover of 45 cm has a place of its own

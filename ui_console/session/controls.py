@@ -74,15 +74,18 @@ class Controls:
         self._console.show(MomentBegan(self._console.clock.now_s()))
 
     # ------------------------------------------------------------------ the operator's controls
-    def hold(self, drive: Motion, lasts_s: float | None = None) -> None:
+    def hold(self, drive: Motion, lasts_s: float | None = None) -> bool:
         """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
+
+        Return whether that counts: not before a control that is held was let go.
 
         Args:
             drive: The command of the key.
             lasts_s: How long the press counts, machine seconds, for a control that repeats while held; None: as keys.
         """
-        self._dead_man.press(drive, asyncio.get_running_loop().time(), lasts_s)
+        counts = self._dead_man.press(drive, asyncio.get_running_loop().time(), lasts_s)
         self._pressed.set()
+        return counts
 
     def press_once(self, word: str) -> bool:
         """Take in that the control for one command is pressed; return whether that counts, see ``DeadMan``."""

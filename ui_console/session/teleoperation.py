@@ -3,14 +3,14 @@
 The console claims an ARC as a behavior does, with a priority of its own beside the mission's, and gives it back on
 request, at its end, or by its death, which the ARC sees. Faces (terminal, script) receive events through ``show`` and
 pictures through ``see``, and call the verbs. Commands go through ``controls``, the operators' questions about the robot
-through ``consent_talk``.
+through ``consent_talk``, orders to robots through ``order_keeper``.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import ClassVar
 
 import msgspec
@@ -19,6 +19,7 @@ from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
+from backbone.mission.behavior_reports import ChildReport
 from backbone.mission_log.operators import OperatorAction
 from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
@@ -27,6 +28,7 @@ from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, GiveWish, HaltWish, Motion
 from ui_console.model.lifting import AskLift
+from ui_console.model.orders import GivenOrder, Order
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
@@ -34,6 +36,7 @@ from ui_console.session.controls import Controls
 from ui_console.session.hand_over import AskHandOver, HandOver
 from ui_console.session.kind_finder import KindFinder
 from ui_console.session.observer import Observer
+from ui_console.session.order_keeper import OrderKeeper
 from ui_console.session.presence import Presence
 from ui_console.session.stop_ear import StopEar
 from ui_console.session.waiting import Waiting
@@ -57,7 +60,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
-    accepts: ClassVar[Accepts | None] = ArcNotice | AskConsent | AskHandOver | AskLift
+    accepts: ClassVar[Accepts | None] = ArcNotice | AskConsent | AskHandOver | AskLift | ChildReport
 
     def __init__(
         self,
@@ -95,6 +98,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._waiting = Waiting(self, self._hand_over, self._waits_for)
         self._ear = StopEar(self, self._heard_stop)
         self._presence = Presence(self)
+        self._orders = OrderKeeper(self, lambda: self._robot, self._hand_to_order, self._take_back)
         self._holding = ""
         self._next_robot = ""
         self._switching = asyncio.Lock()
@@ -119,8 +123,45 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """True while verbs can be called."""
         return self.state is LifeState.READY
 
+    @property
+    def orders(self) -> Mapping[str, GivenOrder]:
+        """Robot → its order; one that is done, failed or ended keeps its robot for the operator until it is taken."""
+        return self._orders.orders
+
+    def order(self, order: Order) -> None:
+        """Tell a robot to do something by itself; see ``order_group``."""
+        self.order_group([order])
+
+    def order_group(self, orders: Sequence[Order]) -> None:
+        """Tell robots to do something by themselves, all at once; ``OrderChanged`` shows what becomes of each.
+
+        An order claims its robot with this console's priority, whether the stick holds it or not; a robot in hand stays
+        with the stick until the order's behavior can have it. An earlier order of the robot ends. A held control moves
+        nothing before it was let go; a new press, ``take`` and ``interrupt`` end the order of the robot at the stick.
+
+        Args:
+            orders: One for each robot.
+        """
+        self.touch()
+        self.require_let_go()
+        self._orders.give(orders)
+
+    def interrupt(self) -> None:
+        """Take the robot at the stick from its order, if one goes on; it comes to rest."""
+        if self._orders.goes_on(self._robot):
+            self._orders.touched(self._robot)
+
+    async def end_order(self, robot: str) -> None:
+        """Give this robot back to the mission, if it has an order; return when its behavior has let it go."""
+        if await self._orders.give_back(robot, f"{self.user} gave it back"):
+            self.acted(OperatorAction.RELEASE, robot, "its order was ended")
+
     def take(self) -> None:
-        """Claim the robot unless it is claimed; if its release is under way, right afterwards."""
+        """Claim the robot unless it is claimed; if its release is under way, right afterwards; its order ends."""
+        if not self._orders.touched(self._robot):
+            self._take()
+
+    def _take(self) -> None:
         if self._giving_back.locked():
             self._takes_next = True
             self._decided.clear()
@@ -155,6 +196,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def switch(self, robot: str) -> None:
         """Claim another robot in place of the present one, which is stopped and given back first.
 
+        An order of the present robot goes on, and so does one of the other robot: then the stick only turns to it.
         After several calls in a row the console claims the last robot.
         """
         self._next_robot = robot
@@ -164,8 +206,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
             if robot != self.parameters.robot:
                 kind = "" if self._finds_kind else self.parameters.kind
                 self.parameters = msgspec.structs.replace(self.parameters, robot=robot, kind=kind)
-                await self.give_back(f"{self.user} takes {robot}", for_good=True)
-            self.take()
+                await self._give_back_stick(f"{self.user} takes {robot}", for_good=True)
+            if self._orders.goes_on(robot):
+                self.show(events.TurnedTo(self.clock.now_s(), robot))
+            else:
+                self.take()
 
     def touch(self) -> None:
         """Note that the operator is there; driving shows that by itself."""
@@ -201,7 +246,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
             lasts_s: How long the press counts, machine seconds, for a control that repeats while held; None: as keys.
         """
         self.touch()
-        self._controls.hold(drive, lasts_s)
+        if self._controls.hold(drive, lasts_s):
+            self.interrupt()
 
     def stop(self) -> None:
         """Stop the wheels now; sticks, pads and pages report their release by this call."""
@@ -210,8 +256,10 @@ class Teleoperation(Observer[TeleoperationParameters]):
     def give(self, wish: GiveWish) -> None:
         """Take in that the control for one command is pressed: give it, unless the control has to be let go first."""
         self.touch()
-        if self._controls.press_once(wish.word) and self.is_held:
-            self.start_task(self._give(wish), "command")
+        if self._controls.press_once(wish.word):
+            self.interrupt()
+            if self.is_held:
+                self.start_task(self._give(wish), "command")
 
     async def do(self, command: Command) -> bool:
         """Send one command and show its outcome; return True if it was applied."""
@@ -222,20 +270,50 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self.start_task(self.give_back(), "release")
 
     async def give_back(self, reason: str = "released", *, for_good: bool = False, wanted: bool = True) -> None:
-        """Give the robot back; afterwards the console watches until the next ``take``.
+        """Give the robot back, also from an order, which ends; afterwards the console watches until the next ``take``.
 
         Args:
             reason: For people.
             for_good: End the ARC also if the console keeps it otherwise.
             wanted: False if the operator did not ask for it.
         """
+        robot, had_stick = self._robot, self._is_asking
+        had_order = await self._orders.give_back(robot, reason)
+        await self._give_back_stick(reason, for_good=for_good, wanted=wanted)
+        if had_order and not had_stick:
+            self.given_back = True
+            self.acted(OperatorAction.RELEASE, robot, reason)
+            self.show(events.GivenBack(self.clock.now_s(), reason, True, wanted))
+
+    async def _give_back_stick(self, reason: str, *, for_good: bool = False, wanted: bool = True) -> None:
         async with self._giving_back:
             self._kinds.cancel()
             if self._arc is not None and (self._is_asking or for_good):
                 await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
         if self._takes_next and self.is_ready:
             self._takes_next = False
-            self.take()
+            self._take()
+
+    async def _hand_to_order(self, robot: str, order: str) -> None:
+        """Give the robot from the stick to its order, which waits for it: nobody lower gets it in between."""
+        if robot == self._robot and self._is_asking:
+            self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
+            await self._give_back_stick(f"ordered: {order}")
+
+    def _take_back(self, robot: str) -> None:
+        """Claim the robot by the stick, which goes before its order."""
+        if robot != self._robot:
+            return
+        if self.is_held and self._holding == robot:
+            self._orders.taken(robot)
+        else:
+            self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
+            self._take()
+
+    @property
+    def _robot(self) -> str:
+        """The robot that the stick is at; empty: any, or none."""
+        return self._holding or self.parameters.robot
 
     async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool, wanted: bool) -> None:
         keeping, self._keeping = self._keeping, None
@@ -316,6 +394,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if isinstance(asked.body, AskLift) and self._work is not None:
             stopped_it = asked.body.console == self.address
             return Consent(False, self.user, "a script drives, and stopped it", is_here=stopped_it)
+        if isinstance(asked.body, ChildReport):
+            return self._orders.reported(asked.source, asked.body)
         if not isinstance(asked.body, ArcNotice):
             return await super().answer(asked)
         if self._arc is None:
@@ -323,8 +403,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         return await self._arc.handle(asked.body)
 
     async def drain(self) -> None:
-        """Give the robot back if it was not."""
-        await self.give_back("the console ends", for_good=True)
+        """Give the robots back if they were not."""
+        await asyncio.gather(self._orders.drain(), self._give_back_stick("the console ends", for_good=True))
         await super().drain()
 
     async def connect(self) -> None:
@@ -356,6 +436,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not again:
             self.publish_event(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
+        self._orders.taken(robot)
         now_s, epochs = self.clock.now_s(), notice.epochs
         self.show(events.Granted(now_s, robot, notice.rcs, epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
@@ -384,7 +465,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     def _kind_found(self, wished: TeleoperationParameters, kind: str) -> None:
         if self.parameters == wished:
             self.parameters = msgspec.structs.replace(wished, kind=kind)
-            self.take()
+            self._take()
 
     def _claim_refused(self, refusal: Refusal) -> None:
         self.refusal = refusal
@@ -415,7 +496,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def _go_away(self) -> None:
         """Let the robot go on with useful work while its operator is away."""
         self.leave()
-        await self.give_back(f"{self.user} is away", wanted=False)
+        self._orders.away(f"{self.user} is away")
+        await self._give_back_stick(f"{self.user} is away", wanted=False)
 
     async def _give(self, wish: GiveWish) -> None:
         await self.do(wish)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 
 import numpy as np
@@ -15,6 +15,7 @@ from backbone.moments import Now
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import GiveWish, MoveWish, move_by_stick
+from ui_console.model.orders import GivenOrder, Order
 from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 
@@ -71,6 +72,25 @@ class Session:
     def release(self) -> None:
         """Give the robot back."""
         self._with_robot(Teleoperation.begin_release)
+
+    # ------------------------------------------------------------------ orders
+    @property
+    def orders(self) -> Mapping[str, GivenOrder]:
+        """Robot → its order; see ``Teleoperation.orders``."""
+        return self._console.orders if isinstance(self._console, Teleoperation) else {}
+
+    def order(self, order: Order) -> None:
+        """Tell a robot to do something by itself."""
+        self._with_robot(lambda console: console.order(order))
+
+    def order_group(self, orders: Sequence[Order]) -> None:
+        """Tell robots to do something by themselves, all at once."""
+        self._with_robot(lambda console: console.order_group(orders))
+
+    def halt(self) -> None:
+        """Stop the wheels now; an order of the robot at the stick ends."""
+        self.stop()
+        self._with_robot(Teleoperation.interrupt)
 
     def ask_consent(self, why: str = "") -> None:
         """Ask the operator who holds the robot for it."""

@@ -1,0 +1,54 @@
+"""Messages between a behavior and what keeps it running: its parent in the tree, or the console that ordered it."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from backbone.ranges import Mention, Text, Values
+from backbone.wire import Message
+
+
+class BehaviorStatus(StrEnum):
+    """Progress of a behavior."""
+
+    RUNNING = "running"  # at work, or suspended
+    SUCCESS = "success"  # its aim is reached; final
+    FAILURE = "failure"  # its aim cannot be reached; final
+
+    @property
+    def is_final(self) -> bool:
+        """True for success and failure."""
+        return self is not BehaviorStatus.RUNNING
+
+
+class ChildReport(Message, frozen=True, tag="ChildReport/2"):
+    """Progress of a behavior, sent to its parent on each change, and again until the parent notes it.
+
+    A behavior that a console ordered sends it to that console, also without a change, several times a second.
+
+    Attributes:
+        status: Its status; a final one is sent once and never changes.
+        payload: Data for the parent's decision: plain values only.
+        suspended_because: Why it is not at work, also before its first grant; empty: it is, or has finished.
+    """
+
+    child: Mention
+    status: BehaviorStatus
+    payload: Values = {}
+    suspended_because: Text = ""
+
+
+class ReportNoted(Message, frozen=True):
+    """Answer to ``ChildReport``."""
+
+
+class BreakOff(Message, frozen=True):
+    """A console asks the behavior of its order to bring the robot to rest and to do nothing more.
+
+    Afterwards the behavior has failed, and keeps the robot until it is ended, so that no other behavior gets it
+    before the operator.
+    """
+
+
+class BrokenOff(Message, frozen=True):
+    """Answer to ``BreakOff``: it gives no commands any more."""

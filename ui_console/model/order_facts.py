@@ -1,0 +1,128 @@
+"""From an order to the behavior that carries it out: kind of ARC, localizer, path and parameters. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from backbone.component.messages import ComponentState
+from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
+from backbone.errors import Refusal
+from backbone.naming import component_of, did_you_mean
+from backbone.placer.messages import Start
+from resource_pool.arc_client import ROBOT
+from ui_console.model.arc_abilities import arc_abilities
+from ui_console.model.arc_kinds import arc_kind
+from ui_console.model.orders import Order, OrderKind
+from ui_console.model.profile import Sight
+
+LOCALIZER, SIMULATED_WORLD = "localizer", "simulated_world"
+NEEDS_PLACES = frozenset({OrderKind.GO_TO, OrderKind.RETURN, OrderKind.FOLLOW})
+
+
+class NoLocalizer(Refusal):
+    """The mission has no component that knows where robots are."""
+
+    code = "order.no_localizer"
+    remedy = "Start a component of type localizer, as the mission file names it; or drive by the stick."
+
+
+class CannotOrder(Refusal):
+    """The robot, or the mission, cannot carry out this order."""
+
+    code = "order.impossible"
+    remedy = "Give another order, or drive by the stick."
+
+
+@dataclass(frozen=True, slots=True)
+class Localizer:
+    """Who tells where robots are.
+
+    Attributes:
+        address: Its address.
+        words: What positions come from, for people.
+    """
+
+    address: str
+    words: str
+
+
+def localizer_of(components: Sequence[ComponentState]) -> Localizer:
+    """Return the mission's localizer, else its simulated world.
+
+    Args:
+        components: Components of the mission that are there.
+
+    Raises:
+        NoLocalizer: It has neither.
+    """
+    for kind in (LOCALIZER, SIMULATED_WORLD):
+        found = sorted(one.address for one in components if one.type == kind)
+        if found:
+            name = component_of(found[0])
+            simulated = f"positions from {name}, the simulator itself: no real room has it"
+            return Localizer(found[0], simulated if kind == SIMULATED_WORLD else f"positions from {name}")
+    raise NoLocalizer("no component of this mission tells where robots are")
+
+
+def kind_for(order: Order, types: Sequence[ComponentType], resources: Collection[Resource]) -> str:
+    """Return the kind of ARC that the order's behavior claims: one with pictures to watch, else one that drives.
+
+    Raises:
+        CannotOrder: The robot cannot, or the mission knows no such behavior.
+        NoArcKind: No robot has this name.
+    """
+    names = [one.name for one in types]
+    if order.kind not in names:
+        raise CannotOrder(f"this mission has no behavior {order.kind}{did_you_mean(order.kind, names)}")
+    watches = order.kind is OrderKind.WATCH
+    arc_kind(order.robot, Sight.NOTHING, types, resources)  # a wrong name is refused by its own sentence
+    able = [
+        one
+        for one in types
+        if (can := arc_abilities(one.name, types)) is not None
+        and (can.gives_pictures if watches else can.reach is not None)
+    ]
+    bodies = {resource.type for resource in resources if resource.name == order.robot}
+    if not any(one.needs.get(one.abilities.body, "") in bodies for one in able):
+        what = "gives no pictures to this mission" if watches else "cannot drive"
+        raise CannotOrder(f"{order.robot} {what}", robot=order.robot)
+    return arc_kind(order.robot, Sight.PICTURES if watches else Sight.NOTHING, able, resources)
+
+
+def behavior_of(console: str, number: int) -> str:
+    """Return the name of the behavior that carries out an order.
+
+    Example:
+        >>> behavior_of("console-7", 3)
+        'console-7-order-3'
+    """
+    return f"{console}-order-{number}"
+
+
+def start_of(
+    order: Order, number: int, kind: str, localizer: Localizer | None, *, console: str, priority: int, runtime_s: float
+) -> Start:
+    """Return what starts the behavior of an order.
+
+    Its path is the console's own with one node more: the stick goes before it, the newer of two orders before the
+    older, and both before whatever the console's priority outranks.
+
+    Args:
+        number: Of the order.
+        kind: Of the ARC.
+        localizer: Who tells where robots are; None: the order needs none.
+        console: Address of the console.
+        priority: Of the console, among the consoles and the mission.
+        runtime_s: Shortest useful time, seconds.
+    """
+    name = behavior_of(component_of(console), number)
+    own: dict[str, object] = {"localizer": localizer.address} if localizer is not None else {}
+    if order.kind is OrderKind.GO_TO:
+        own |= {"x_m": order.x_m, "y_m": order.y_m}
+    elif order.kind is OrderKind.FOLLOW:
+        own |= {"target": order.target}
+    arc = {"kind": kind, "minimum_runtime_s": runtime_s, "wish": {ROBOT: order.robot}}
+    path = [[component_of(console), priority], [name, number]]
+    return Start(order.kind.value, name, {**own, "path": path, "arc": arc, "children": [], "keeper": console})

@@ -1,0 +1,304 @@
+"""Order keeper: carries out what the order book decides, with behaviors that the placer starts and ends.
+
+A behavior reports to its console several times a second and ends by itself if the console does not answer, so no order
+outlives its console. An order is given once: the console does not start its behavior again if that is gone.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from typing import TypeVar, assert_never
+
+from backbone.addresses import COMPONENT_DATABASE, DEPENDENCY_DATABASE, NAMESERVER, PLACER, RC_MANAGER
+from backbone.component.asking import ask_until_answered
+from backbone.component.peer_monitor import PeerMonitor
+from backbone.component_database.messages import ListTypes, Types
+from backbone.dependency_database.messages import AskResources, Resources
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.mission.behavior_reports import BehaviorStatus, BreakOff, BrokenOff, ChildReport, ReportNoted
+from backbone.mission_log.operators import OperatorAction
+from backbone.nameserver.messages import Components, ListComponents
+from backbone.naming import Subsystem, address, component_of
+from backbone.placer.messages import CreatorSilent, Ended, Start, Started, StopComponent
+from backbone.placer.wishes import START_WITHIN_S
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import Schedule
+from backbone.waiting import end_tasks
+from backbone.wire import Message
+from ui_console.model.events import OrderChanged
+from ui_console.model.order_book import Begin, Changed, Instruction, OrderBook, Remove, Rest, Take, Yield
+from ui_console.model.order_facts import NEEDS_PLACES, behavior_of, kind_for, localizer_of, start_of
+from ui_console.model.orders import GivenOrder, Order
+from ui_console.session.claim import TeleoperationParameters
+from ui_console.session.observer import Observer
+
+Reply = TypeVar("Reply", bound=Message)
+log = logging.getLogger(__name__)
+
+REPLY_TIME_S = 1.0  # chosen: core services and behaviors answer in milliseconds
+FACTS_WITHIN_S = 5.0  # chosen: a restarted core service is back within a second or two; machine seconds
+END_WITHIN_S = 30.0  # chosen: as for ARCs, a host may be busy
+AGAIN_AFTER_S = 0.2  # chosen: a restarted placer is back within one or two of these; machine seconds
+DRAIN_WITHIN_S = 1.0  # chosen: behaviors that were not ended by then end themselves as soon as the console is gone
+
+
+class UnknownOrder(Refusal):
+    """This console gave no such order, or ended it."""
+
+    code = "order.unknown"
+    remedy = "Nothing to do: a behavior whose console does not know it ends by itself."
+
+
+class OrderKeeper:
+    """The orders of one console.
+
+    Args:
+        console: The console.
+        robot: Returns the robot that the stick is at; empty: none.
+        hand_over: Gives this robot from the stick to its order, which waits for it; does nothing if the stick has not
+            asked for it.
+        take: Asks for this robot by the stick.
+    """
+
+    def __init__(
+        self,
+        console: Observer[TeleoperationParameters],
+        robot: Callable[[], str],
+        hand_over: Callable[[str, str], Awaitable[None]],
+        take: Callable[[str], None],
+    ) -> None:
+        self._console, self._robot, self._hand_over, self._take = console, robot, hand_over, take
+        self._book = OrderBook()
+        self._carrying: dict[int, asyncio.Task[None]] = {}
+        self._removals: dict[int, asyncio.Task[None]] = {}
+
+    # ------------------------------------------------------------------ the operator
+    @property
+    def orders(self) -> Mapping[str, GivenOrder]:
+        """Robot → its order; a final one still keeps the robot for the operator."""
+        return self._book.orders
+
+    def goes_on(self, robot: str) -> bool:
+        """Return whether an order of this robot goes on."""
+        return self._book.goes_on(robot)
+
+    def give(self, orders: Sequence[Order]) -> None:
+        """Give these orders, all at once; each is shown with its outcome."""
+        for order in orders:
+            self._console.acted(OperatorAction.ORDER, order.robot, order.sentence)
+            self._do(self._book.give(order))
+
+    def touched(self, robot: str) -> bool:
+        """End the order of this robot, because its operator wants it by the stick; return whether it had one."""
+        todo = self._book.touched(robot)
+        self._do(todo)
+        return bool(todo)
+
+    def taken(self, robot: str) -> None:
+        """Note that the stick has the robot."""
+        self._do(self._book.taken(robot))
+
+    async def give_back(self, robot: str, why: str) -> bool:
+        """End the order of this robot; return, once its behavior has let the robot go, whether it had one."""
+        todo = self._book.given_back(robot, why)
+        self._do(todo)
+        ends = [self._removals[step.number] for step in todo if isinstance(step, Remove)]
+        await asyncio.gather(*ends, return_exceptions=True)
+        return bool(todo)
+
+    def away(self, why: str) -> None:
+        """Note that the operator is away: each robot goes back to the mission when its order is over."""
+        self._do(self._book.away(why))
+
+    # ------------------------------------------------------------------ the behaviors
+    def reported(self, source: str, report: ChildReport) -> ReportNoted:
+        """Note the report of a behavior.
+
+        Raises:
+            UnknownOrder: It carries out no order of this console; it ends then.
+        """
+        number = self._number_of(report.child)
+        if number is None or component_of(source) != report.child:
+            raise UnknownOrder(f"{source} carries out no order of {self._console.name}", child=report.child)
+        if report.status.is_final:
+            is_done, said = report.status is BehaviorStatus.SUCCESS, _told(report.payload)
+            front = self._is_in_front(number)
+            self._do(self._book.finished(number, is_done=is_done, why=said, in_front=front))
+        elif report.suspended_because:
+            self._do(self._book.waits(number, report.suspended_because))
+        else:
+            self._do(self._book.runs(number))
+        return ReportNoted()
+
+    async def drain(self) -> None:
+        """End all orders, because the console ends; those that are not ended in time end themselves."""
+        for robot in list(self._book.orders):
+            for step in self._book.given_back(robot, "the console ends"):
+                if isinstance(step, Changed):
+                    self._show(step.given)
+        ends = [self._end(number) for number in self._book.numbers]
+        try:
+            async with asyncio.timeout(DRAIN_WITHIN_S):
+                await asyncio.gather(*ends)
+        except TimeoutError:
+            log.warning("%s leaves before its orders have ended", self._console.name)
+
+    # ------------------------------------------------------------------ within
+    def _do(self, steps: Sequence[Instruction]) -> None:
+        start_task = self._console.start_task
+        for step in steps:
+            match step:
+                case Changed(given):
+                    self._show(given)
+                case Begin(number):
+                    self._carrying[number] = start_task(self._carry(number), f"order {number}")
+                case Yield(number, order):
+                    start_task(self._pass_on(order), f"robot for order {number}")
+                case Rest(number):
+                    start_task(self._rest(number), f"rest of order {number}")
+                case Remove(number):
+                    self._removals[number] = start_task(self._remove(number), f"end of order {number}")
+                case Take(robot):
+                    self._take(robot)
+                case _:
+                    assert_never(step)
+
+    def _show(self, given: GivenOrder) -> None:
+        self._console.show(OrderChanged(self._console.clock.now_s(), given))
+        if given.state.is_final:
+            why = f"{given.state}: {given.why}" if given.why else str(given.state)
+            self._console.acted(OperatorAction.ORDER_END, given.order.robot, f"{given.order.sentence}, {why}")
+
+    def _is_in_front(self, number: int) -> bool:
+        given = self._book.get(number)
+        return given is not None and given.order.robot == self._robot()
+
+    def _number_of(self, behavior: str) -> int | None:
+        return next(
+            (number for number in self._book.numbers if behavior_of(self._console.name, number) == behavior), None
+        )
+
+    def _address(self, number: int) -> str:
+        return address(Subsystem.MISSION_CONTROL, behavior_of(self._console.name, number))
+
+    async def _pass_on(self, order: Order) -> None:
+        await self._hand_over(order.robot, order.sentence)
+
+    # ------------------------------------------------------------------ the life of a behavior
+    async def _carry(self, number: int) -> None:
+        """Start the behavior of an order, and wait until it is gone; meanwhile it reports."""
+        console = self._console
+        try:
+            start = await self._start_of(number)
+            await console.bus.ask(PLACER, start, Started, within_s=START_WITHIN_S)
+        except Refusal as refusal:
+            self._lost(number, f"{refusal.detail} {refusal.remedy}")
+            return
+        except LinkError as error:
+            self._lost(number, f"it is not known whether it began: {error}")
+            return
+        behavior = PeerMonitor(console.bus, self._address(number))
+        queueing = console.start_task(self._wait_queued(number), f"queue of order {number}")
+        try:
+            await behavior.wait_gone()
+        finally:
+            behavior.close()
+            queueing.cancel()
+        self._lost(number, "its behavior is gone")
+
+    def _lost(self, number: int, why: str) -> None:
+        self._do(self._book.lost(number, why, in_front=self._is_in_front(number)))
+
+    async def _start_of(self, number: int) -> Start:
+        """Return what starts the behavior; show what its positions come from."""
+        given = self._book.get(number)
+        assert given is not None  # noqa: S101  it is removed only after its task was cancelled
+        console, order = self._console, given.order
+        types, hardware, there = await asyncio.gather(
+            self._ask(COMPONENT_DATABASE, ListTypes(), Types),
+            self._ask(DEPENDENCY_DATABASE, AskResources(), Resources),
+            self._ask(NAMESERVER, ListComponents(), Components),
+        )
+        kind = kind_for(order, [one.component_type for one in types.types], hardware.resources)
+        localizer = localizer_of(there.components) if order.kind in NEEDS_PLACES else None
+        if localizer is not None:
+            self._do(self._book.based_on(number, localizer.words))
+        wished = console.parameters
+        return start_of(
+            order,
+            number,
+            kind,
+            localizer,
+            console=console.address,
+            priority=wished.priority,
+            runtime_s=wished.minimum_runtime_s,
+        )
+
+    async def _wait_queued(self, number: int) -> None:
+        """Return when the behavior waits for its robot at the RC manager, or has it."""
+        behavior, is_queued = self._address(number), asyncio.Event()
+
+        def look(schedule: Schedule) -> None:
+            if any(one.owner == behavior and one.state is not RequestState.IDLE for one in schedule.requests):
+                is_queued.set()
+
+        bus = self._console.bus
+        hearing = bus.subscribe(
+            RC_MANAGER, Conversation.SCHEDULE, Schedule, lambda envelope: look(envelope.body), latest=True
+        )
+        try:
+            look(await self._ask(RC_MANAGER, AskSchedule(), Schedule))
+            await is_queued.wait()
+        except (LinkError, Refusal) as error:
+            log.info("the schedule is not known: %s", error)
+            await is_queued.wait()
+        finally:
+            hearing.close()
+        self._do(self._book.queued(number))
+
+    async def _rest(self, number: int) -> None:
+        """Ask the behavior to bring its robot to rest, until it answers or is gone."""
+        console = self._console
+        while self._book.get(number) is not None:
+            try:
+                await console.bus.ask(self._address(number), BreakOff(), BrokenOff, within_s=REPLY_TIME_S)
+            except (LinkError, Refusal) as error:
+                log.info("order %d is not at rest: %s", number, error)
+            else:
+                return
+            await console.clock.sleep_s(AGAIN_AFTER_S * console.clock.rate)
+
+    async def _remove(self, number: int) -> None:
+        await end_tasks(*(task for task in [self._carrying.pop(number, None)] if task is not None))
+        await self._end(number)
+        self._book.removed(number)
+        self._removals.pop(number, None)
+
+    async def _end(self, number: int) -> None:
+        """Return when the placer has ended the behavior, or does not have it."""
+        console, name = self._console, behavior_of(self._console.name, number)
+        while True:
+            try:
+                stop = StopComponent(name, f"{console.user} ends the order")
+                await console.bus.ask(PLACER, stop, Ended, within_s=END_WITHIN_S)
+            except (LinkError, CreatorSilent) as error:
+                log.info("order %d is not ended yet: %s", number, error)
+            except Refusal as refusal:
+                log.info("order %d: %s", number, refusal)
+                return
+            else:
+                return
+            await console.clock.sleep_s(AGAIN_AFTER_S * console.clock.rate)
+
+    async def _ask(self, of: str, question: Message, reply: type[Reply]) -> Reply:
+        bus, clock = self._console.bus, self._console.clock
+        return await ask_until_answered(bus, clock, of, question, reply, each_s=REPLY_TIME_S, within_s=FACTS_WITHIN_S)
+
+
+def _told(payload: Mapping[str, object]) -> str:
+    """Return for people why a behavior finished, as its payload tells."""
+    return str(payload.get("detail") or payload.get("why") or "")
