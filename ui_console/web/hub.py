@@ -7,7 +7,7 @@ import itertools
 import logging
 import os
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 
 import msgspec
 import numpy as np
@@ -24,6 +24,7 @@ from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent, Heard
+from ui_console.model.orders import Order
 from ui_console.model.team import TeamModel
 from ui_console.model.views import AlarmKind
 from ui_console.session.consent_answers import ConsentAnswers
@@ -152,8 +153,8 @@ class WebHub:
             await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
 
     # ------------------------------------------------------------------ services for operators; see OperatorServices
-    async def new_console(self, operator: Operator, robot: str) -> Teleoperation:
-        """Return a console of this operator that claims the robot as soon as it runs."""
+    async def new_console(self, operator: Operator, robot: str, orders: Sequence[Order] = ()) -> Teleoperation:
+        """Return a console of this operator that claims the robot, or gives the orders, as soon as it runs."""
         number, welcome = next(self._consoles), operator.welcome
         wished = {
             "robot": robot,
@@ -173,6 +174,8 @@ class WebHub:
             bus,
             self.clock,
             show=operator.show,
+            takes=not orders,
+            orders=orders,
             watches=False,
             keeps_arc=True,
             signs_in=False,

@@ -235,6 +235,22 @@ export interface NodeView {
   because: string;
 }
 
+export type OrderKind =
+  | "follow"
+  | "go_to"
+  | "return_home"
+  | "watch_for_motion";
+
+export interface OrderView {
+  robot: string;
+  kind: OrderKind;
+  x_m: number;
+  y_m: number;
+  line: string;
+  is_over: boolean;
+  has_stick: boolean;
+}
+
 export interface OwnView {
   console: string;
   user: string;
@@ -429,6 +445,7 @@ export interface View {
   log: LoggedEvent[];
   floor: FloorView | null;
   bodies: BodyView[];
+  orders: OrderView[];
   now_s: number;
   beat: number;
 }
@@ -469,6 +486,11 @@ export interface Drawn {
   number: number;
 }
 
+export interface EndOrders {
+  do: "end_orders";
+  robots: string[];
+}
+
 export interface GiveRequest {
   do: "give";
   moment: number;
@@ -507,9 +529,30 @@ export interface MoreLog {
   first: number;
 }
 
+export interface OrderRequest {
+  do: "order";
+  moment: number;
+  kind: OrderKind;
+  robots: string[];
+  x_m?: number;
+  y_m?: number;
+  target?: string;
+}
+
 export interface ParametersRequest {
   do: "parameters";
   name: string;
+}
+
+export interface PictureOrder {
+  do: "order_in_picture";
+  moment: number;
+  robot: string;
+  robots: string[];
+  column_px: number;
+  row_px: number;
+  width_px: number;
+  height_px: number;
 }
 
 export interface ReleaseRequest {
@@ -586,6 +629,9 @@ export type Said =
   | Steer
   | StopWheels
   | GiveRequest
+  | OrderRequest
+  | PictureOrder
+  | EndOrders
   | TakeOver
   | ReleaseRequest
   | MayI

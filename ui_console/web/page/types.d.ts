@@ -15,6 +15,11 @@ export interface More {
   value?: unknown;
   values?: Record<string, string | number | boolean>;
   role?: string;
+  robots?: string[];
+  x_m?: number;
+  y_m?: number;
+  target?: string;
+  tap?: Tap;
 }
 
 /** A picture as it came. */
