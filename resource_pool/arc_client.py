@@ -25,7 +25,7 @@ from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
 from resource_pool.arc_request import ROBOT, claim_parameters
 from resource_pool.commands import Command, Drive, Halt, Jump, Move, WrongCommand
-from resource_pool.localization import AskPose, Pose
+from resource_pool.localization import AskFloorPlan, AskPose, FloorPlan, FloorShape, Pose, PoseSource, ShapeKind
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
     Accepted,
@@ -63,9 +63,12 @@ __all__ = [
     "ArcNotice",
     "ArcState",
     "AskBeat",
+    "AskFloorPlan",
     "AskPose",
     "Command",
     "EmergencyStopped",
+    "FloorPlan",
+    "FloorShape",
     "Frame",
     "GivenBeforeStop",
     "NoSuchAction",
@@ -74,8 +77,10 @@ __all__ = [
     "OtherStop",
     "PathNode",
     "Pose",
+    "PoseSource",
     "Readings",
     "Resumed",
+    "ShapeKind",
     "SliceEnds",
     "StopState",
     "Stopper",

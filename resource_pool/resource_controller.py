@@ -19,7 +19,7 @@ import msgspec
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.abilities import Abilities, command_form, field_forms
+from backbone.component.abilities import Abilities, CameraForm, command_form, field_forms
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
@@ -95,6 +95,8 @@ class ResourceController(Component[R], Generic[R]):
     """Struct of its reports; None: it reports nothing but its state."""
     body_class: ClassVar[str] = ""
     """Class path of a robot's body in simulated worlds, see ``scout_model.robot``; empty: mission files name one."""
+    camera: ClassVar[CameraForm | None] = None
+    """A robot's camera, which lets consoles tell places in its picture; None: they cannot."""
     driver_kind: ClassVar[str] = ""
     """Kind of its driver; empty: it has no driver."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
@@ -134,6 +136,7 @@ class ResourceController(Component[R], Generic[R]):
                 if issubclass(kind, Command)
             ],
             reports=field_forms(cls.reports) if cls.reports is not None else [],
+            camera=cls.camera,
         )
 
     @classmethod

@@ -30,6 +30,8 @@ from ui_console.design.views import (
 )
 from ui_console.model import views
 from ui_console.model.arc_abilities import ArcAbilities
+from ui_console.model.map import BodyView, FloorView
+from ui_console.model.order_views import OrderView
 from ui_console.model.timeline import TimelineView
 from ui_console.web.login import BeatRequest, Hello
 from ui_console.web.protocol import Intent
@@ -88,6 +90,9 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parameters: list[views.ParameterView]
     components: list[ComponentState]
     log: list[LoggedEvent]
+    floor: FloorView | None
+    bodies: list[BodyView]
+    orders: list[OrderView]
     now_s: float
     beat: int
 
@@ -200,12 +205,14 @@ DESIGNER = Page(
 
 def declarations(page: Page) -> str:
     """Return the whole file of a page."""
+    heard = _declared([page.view, *page.answers], is_sent_whole=True)
+    said = _declared(page.said, is_sent_whole=False)
     news = f"{{ view: Partial<{page.view.__name__}>; answer?: undefined }}"
     return "\n".join(
         [
             HEAD,
-            *_interfaces([page.view, *page.answers], is_sent_whole=True),
-            *_interfaces(page.said, is_sent_whole=False),
+            *heard.values(),
+            *(text for name, text in said.items() if heard.get(name) != text),
             _union("Answer", page.answers),
             f"export type Heard = {news} | {{ answer: Answer; view?: undefined }};\n",
             _union("Said", page.said),
@@ -218,8 +225,8 @@ def _union(name: str, kinds: Iterable[type[msgspec.Struct]]) -> str:
     return f"export type {name} =\n{words};\n"
 
 
-def _interfaces(kinds: Iterable[type[msgspec.Struct]], *, is_sent_whole: bool) -> list[str]:
-    """Return one declaration for each struct and enum that these need, by name.
+def _declared(kinds: Iterable[type[msgspec.Struct]], *, is_sent_whole: bool) -> dict[str, str]:
+    """Return the name and declaration of each struct and enum that these need, by name.
 
     Args:
         kinds: The structs.
@@ -228,7 +235,7 @@ def _interfaces(kinds: Iterable[type[msgspec.Struct]], *, is_sent_whole: bool) -
     declared: dict[str, str] = {}
     for kind in kinds:
         _type(inspect.type_info(kind), declared, is_sent_whole)
-    return [text for _, text in sorted(declared.items())]
+    return dict(sorted(declared.items()))
 
 
 def _type(kind: inspect.Type, declared: dict[str, str], is_sent_whole: bool) -> str:

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import msgspec
 
 from backbone.component.field_docs import field_docs, first_sentence
-from backbone.ranges import FEW, Line, Measure, Mention
+from backbone.ranges import FEW, Line, Measure, Mention, Meters, Radians
 from backbone.wire import Message
 
 UNITS = {
@@ -89,6 +89,22 @@ class CommandForm(Message, frozen=True):
     doc: Line = ""
 
 
+class CameraForm(Message, frozen=True):
+    """The camera of a robot: where it sits, and how much of the room is in its picture.
+
+    Attributes:
+        forward_m: Before the point that the robot's pose is of.
+        height_m: Above the floor.
+        tilt_rad: How far it looks upwards, as the robot stands.
+        across_rad: Angle between the left edge of the picture and the right edge; the picture's pixels are square.
+    """
+
+    forward_m: Meters
+    height_m: Meters
+    tilt_rad: Radians
+    across_rad: Radians
+
+
 class Abilities(Message, frozen=True):
     """Abilities of the components of a class.
 
@@ -99,6 +115,7 @@ class Abilities(Message, frozen=True):
         body_class: Class path of the body of a robot's RC in a simulated world; empty: the mission file names one.
         commands: What an RC obeys, or an ARC passes on.
         reports: Fields of its reports.
+        camera: The camera of a robot, which lets consoles tell places in its picture; None: none is declared.
     """
 
     is_robot: bool = False
@@ -107,6 +124,7 @@ class Abilities(Message, frozen=True):
     body_class: Line = ""
     commands: Annotated[list[CommandForm], FEW] = []
     reports: Annotated[list[FieldForm], FEW] = []
+    camera: CameraForm | None = None
 
 
 NO_ABILITIES = Abilities()

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import msgspec
 
 from backbone.component.messages import ComponentState, MissionTime, Parameters, SetParameter, Statistics, StoryEvent
+from backbone.component_database.messages import Types
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log.log import Log, PeopleKnown
@@ -22,7 +23,7 @@ from backbone.picture.words import why_lost
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
-from resource_pool.arc_client import Readings, StopState, Suspended
+from resource_pool.arc_client import FloorPlan, Pose, Readings, StopState, Suspended
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import Settled, Sought, Topic
 from ui_console.model.orders import GivenOrder
@@ -251,6 +252,9 @@ Said = (
     | MissionHealth
     | Parameters
     | SetParameter
+    | Pose
+    | FloorPlan
+    | Types
     | Suspended
     | Why
 )
@@ -336,6 +340,7 @@ _WORDS: dict[type[object], str] = {
     Statistics: "radio",
     MissionHealth: "health",
     SetParameter: "set",
+    FloorPlan: "floor",
 }
 
 

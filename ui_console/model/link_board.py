@@ -80,6 +80,14 @@ class LinkBoard:
         self._alarms.hold(self.down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
 
     # ------------------------------------------------------------------ views out
+    def radio_line(self, arc: str) -> str:
+        """Return for people how the packets of an ARC go over its radio; empty: no radio reported on it."""
+        counts = [(radio, int(count)) for (radio, of), count in sorted(self._overruns.items()) if of == arc]
+        return ", ".join(
+            f"{radio} is missing" if self.is_missing(radio) else f"{radio}: {counted(late, 'packet')} late or lost"
+            for radio, late in counts
+        )
+
     def down_s(self, now_s: float) -> float:
         """Return since when the mission's hub is silent; negative: the link is up."""
         link = self._link

@@ -24,6 +24,7 @@ from backbone.component.messages import (
     Statistics,
     StoryEvent,
 )
+from backbone.component_database.messages import Types
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.mission_log.log import AskLog, Log, PeopleKnown
 from backbone.mission_log.operators import OperatorActed
@@ -37,11 +38,12 @@ from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule, Why
 from backbone.spoken import value_text
-from resource_pool.arc_client import Readings, StopState, Suspended
+from resource_pool.arc_client import FloorPlan, Pose, Readings, StopState, Suspended
 from ui_console.model.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.model.events import LinkHeard, Said, TeamEvent
 from ui_console.model.health_board import HealthBoard
 from ui_console.model.link_board import LinkBoard
+from ui_console.model.map import MapBoard
 from ui_console.model.needs import Needs
 from ui_console.model.robot_board import RobotBoard
 from ui_console.model.timeline import Timeline, TimelineView
@@ -70,6 +72,8 @@ class TeamModel:
         """Links and machines."""
         self.robots = RobotBoard(self.picture, self.alarms, self.links, lift_remedy)
         """The holder of each robot, and its stop in force."""
+        self.map = MapBoard(self.picture, self.links)
+        """The plan of the floor, and the places of robots and other bodies."""
         self._health = HealthBoard(self.alarms)
         self._timeline = Timeline(self.person)
         self._lost: dict[str, tuple[float, ComponentState]] = {}
@@ -130,6 +134,12 @@ class TeamModel:
                 self._take_parameters(said, source, at_s)
             case SetParameter():
                 self._take_change(said, source, at_s)
+            case Pose():
+                self.map.take_pose(said)
+            case FloorPlan():
+                self.map.take_plan(said)
+            case Types():
+                self.map.take_types(said)
             case Why() | Suspended():
                 """A question for one console, which keeps it."""
             case _:

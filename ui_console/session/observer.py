@@ -23,6 +23,7 @@ from ui_console.model.lifting import AskLift
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.feed import ConsoleFeed, FeedEvent
 from ui_console.session.lift_talk import LiftTalk
+from ui_console.session.map_feed import MapFeed
 
 P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
 
@@ -42,6 +43,7 @@ class Observer(Component[P_co], Generic[P_co]):
         user: The person at it, for the record; empty: the console's name.
         answers: The questions to its operator; None: new ones.
         answers_of: Returns the questions to this person, None for a person who left; None: one person sits here.
+        has_map: Also show where bodies are, and the plan of the floor, while ``map.watch`` says that somebody looks.
     """
 
     accepts: ClassVar[Accepts | None] = AskLift
@@ -58,6 +60,7 @@ class Observer(Component[P_co], Generic[P_co]):
         user: str = "",
         answers: ConsentAnswers | None = None,
         answers_of: Callable[[str], ConsentAnswers | None] | None = None,
+        has_map: bool = False,
     ) -> None:
         super().__init__(launch, bus, clock)
         self.show: Callable[[ConsoleEvent], None] = lambda event: show(printable_all(event))
@@ -66,6 +69,8 @@ class Observer(Component[P_co], Generic[P_co]):
         self.user = user or launch.name
         self.feed = ConsoleFeed(bus, clock, self._heard)
         """Its subscriptions, and the verbs that need no grant."""
+        self.map = MapFeed(bus, clock, self.show) if has_map else None
+        """Its subscription to places; None: it shows no map."""
         self.answers = answers or ConsentAnswers(self.user, clock, self.show, self.acted)
         """The questions to its operator."""
         self._answers_of = answers_of or (lambda user: self.answers if user in (self.user, self.address) else None)
@@ -145,6 +150,8 @@ class Observer(Component[P_co], Generic[P_co]):
         """Subscribe to the mission's messages."""
         if self._watches:
             self.feed.listen()
+        if self.map is not None:
+            self.map.listen()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Ask the author of a stop whether it may be lifted."""
@@ -175,6 +182,8 @@ class Observer(Component[P_co], Generic[P_co]):
 
     async def watch(self) -> None:
         """Receive the mission's state, and then its changes; until cancelled."""
+        if self.map is not None:
+            self.start_task(self.map.run(), "map")
         if self._watches:
             await self.feed.run()
 
@@ -186,6 +195,8 @@ class Observer(Component[P_co], Generic[P_co]):
 
     def _heard(self, event: FeedEvent) -> None:
         self.show(event)
+        if self.map is not None and isinstance(event, Heard):
+            self.map.heard(event.body)
         match event:
             case Heard(body=Schedule()):
                 self.schedule_heard()

@@ -52,6 +52,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         see: Called with the newest picture; pictures of earlier grants never arrive.
         work: Run once the console is ready, instead of a wait for a request to end; its end ends the console.
         takes: Claim at once.
+        orders: Orders to give at once.
         watches: Also show events of other components.
         keeps_arc: Keep the ARC when the robot is given back, so that the next take needs no start of an ARC.
         signs_in: Publish that its operator came and left; False if another component does.
@@ -72,6 +73,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         see: Callable[[Frame], None] | None = None,
         work: Callable[[Teleoperation], Awaitable[None]] | None = None,
         takes: bool = True,
+        orders: Sequence[Order] = (),
         watches: bool = True,
         keeps_arc: bool = False,
         signs_in: bool = True,
@@ -80,6 +82,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     ) -> None:
         super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
         self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
+        self._first_orders = orders
         self._arc: ArcClient | None = None
         self._claimed: tuple[str, dict[str, object]] | None = None
         self._rests = False
@@ -379,6 +382,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self.sign_in(f"to drive {self.parameters.robot or ANY_ROBOT}, with priority {self.parameters.priority}")
         if self._takes:
             self.take()
+        if self._first_orders:
+            self.order_group(self._first_orders)
         self.start_task(self._controls.run(), "keys")
         if self.parameters.away_after_s > 0:
             self.start_task(self._presence.run(self.parameters.away_after_s, self._go_away), "presence")

@@ -7,7 +7,7 @@ import itertools
 import logging
 import os
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 
 import msgspec
 import numpy as np
@@ -24,11 +24,13 @@ from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent, Heard
+from ui_console.model.orders import Order
 from ui_console.model.team import TeamModel
 from ui_console.model.views import AlarmKind
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.observer import AnyObserver, Observer
 from ui_console.session.teleoperation import Teleoperation
+from ui_console.web.floor import FloorSection
 from ui_console.web.login import ProtocolViolation, ViolationKind, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
@@ -64,12 +66,20 @@ class WebHub:
         self.clock = clock
         self.team = TeamModel(launch.mission, LIFT_REMEDY)
         self.observer: AnyObserver = Observer(
-            launch, bus, clock, show=self._heard, signs_in=False, user=launch.name, answers_of=self._answers_of
+            launch,
+            bus,
+            clock,
+            show=self._heard,
+            signs_in=False,
+            user=launch.name,
+            answers_of=self._answers_of,
+            has_map=True,
         )
         self.clients: dict[Operator, None] = {}
         self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False, alarms=self.team.alarms)
         self._launch, self._bus, self._join = launch, bus, join
         self._kind, self._away_after_s = kind, away_after_s
+        self._floor = FloorSection()
         self._arcs: dict[str, str] = {}
         self._streams: dict[str, tuple[str, Subscription]] = {}
         self._numbers: dict[str, int] = {}
@@ -87,8 +97,10 @@ class WebHub:
         welcomed = {"user": welcome.user, "priority": welcome.priority, "mission": self._launch.mission}
         operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))
         self._send_tables([operator.outbox])
+        self._send_map([operator.outbox])
         operator.refresh(self.clock.now_s())
         self._say(OperatorAction.ATTACH, welcome.user, f"with priority {welcome.priority}")
+        self._watch_map()
         self._has_operators.set()
         self.attention_changed()
         return operator
@@ -96,6 +108,7 @@ class WebHub:
     async def leave(self, client: Operator, reason: str) -> None:
         """Remove an operator: the wheels stop, the robot is given back."""
         self.clients.pop(client, None)
+        self._watch_map()
         if not self.clients:
             self._has_operators.clear()
         await client.leave(reason)
@@ -133,13 +146,15 @@ class WebHub:
             now_s = self.clock.now_s()
             if turn % TEAM_EVERY == 0:
                 self._send_tables([operator.outbox for operator in self.clients])
+            await self._floor.follow(self.team.map.floor)
+            self._send_map([operator.outbox for operator in self.clients])
             for operator in self.clients:
                 operator.refresh(now_s)
             await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
 
     # ------------------------------------------------------------------ services for operators; see OperatorServices
-    async def new_console(self, operator: Operator, robot: str) -> Teleoperation:
-        """Return a console of this operator that claims the robot as soon as it runs."""
+    async def new_console(self, operator: Operator, robot: str, orders: Sequence[Order] = ()) -> Teleoperation:
+        """Return a console of this operator that claims the robot, or gives the orders, as soon as it runs."""
         number, welcome = next(self._consoles), operator.welcome
         wished = {
             "robot": robot,
@@ -159,6 +174,8 @@ class WebHub:
             bus,
             self.clock,
             show=operator.show,
+            takes=not orders,
+            orders=orders,
             watches=False,
             keeps_arc=True,
             signs_in=False,
@@ -232,6 +249,16 @@ class WebHub:
             body = msgspec.json.encode(table)
             for outbox in outboxes:
                 outbox.put_section(name, body)
+
+    def _watch_map(self) -> None:
+        if self.observer.map is not None:
+            self.observer.map.watch(bool(self.clients))
+
+    def _send_map(self, outboxes: list[Outbox]) -> None:
+        bodies = msgspec.json.encode(self.team.map.views(self.clock.now_s()))
+        for outbox in outboxes:
+            outbox.put_section("floor", self._floor.body)
+            outbox.put_section("bodies", bodies)
 
     def _say(self, action: OperatorAction, user: str, detail: str) -> None:
         if self.observer.state is LifeState.READY:

@@ -16,7 +16,8 @@ from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import STICK_LASTS_S, GiveWish, HaltWish, move_by_stick
-from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, PictureSeen, failed
+from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, OrderChanged, PictureSeen, failed
+from ui_console.model.orders import Order
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
 from ui_console.session.consent_answers import ConsentAnswers
@@ -25,6 +26,7 @@ from ui_console.session.teleoperation import Teleoperation
 from ui_console.web import protocol
 from ui_console.web.found_log import FoundLog
 from ui_console.web.login import Welcome
+from ui_console.web.ordering import Ordering
 from ui_console.web.outbox import Outbox
 
 log = logging.getLogger(__name__)
@@ -40,6 +42,9 @@ AtWork = (
     | protocol.StopRequest
     | protocol.StopAllRequest
     | protocol.LiftRequest
+    | protocol.OrderRequest
+    | protocol.PictureOrder
+    | protocol.EndOrders
     | protocol.TakeOver
     | protocol.ReleaseRequest
 )
@@ -52,8 +57,8 @@ class OperatorServices(Protocol):
     team: TeamModel
     clock: Clock
 
-    async def new_console(self, operator: Operator, robot: str) -> Teleoperation:
-        """Return a console of this operator that claims the robot as soon as it runs."""
+    async def new_console(self, operator: Operator, robot: str, orders: Sequence[Order] = ()) -> Teleoperation:
+        """Return a console of this operator that claims the robot, or gives the orders, as soon as it runs."""
 
     def watching_changed(self) -> None:
         """Note that an operator wants other pictures."""
@@ -84,6 +89,7 @@ class Operator:
         self._life: asyncio.Task[None] | None = None
         self._claiming = asyncio.Lock()
         self._found: FoundLog | None = None
+        self._ordering = Ordering(services.team)
         self._latency_s: dict[str, float] = {}
         self._work: dict[bytes, asyncio.Task[None]] = {}
 
@@ -100,6 +106,8 @@ class Operator:
                 self.stop()
             case protocol.GiveRequest(moment, word, values, role):
                 self._give(moment, GiveWish(word, values, role))
+            case protocol.OrderRequest(moment=moment) | protocol.PictureOrder(moment=moment):
+                self._begin_order(moment, intent)
             case protocol.Drawn(robot, number):
                 self._drawn(robot, number)
             case protocol.Watch(robots):
@@ -121,6 +129,7 @@ class Operator:
             case (
                 protocol.TakeOver()
                 | protocol.ReleaseRequest()
+                | protocol.EndOrders()
                 | protocol.StopRequest()
                 | protocol.StopAllRequest()
                 | protocol.LiftRequest()
@@ -160,7 +169,10 @@ class Operator:
             self.is_there = event.is_there
             self._services.attention_changed()
             return
-        self.model.apply(printable_all(event))
+        event = printable_all(event)
+        self.model.apply(event)
+        if isinstance(event, OrderChanged):
+            self._ordering.given.take(event)
         if not isinstance(event, PictureSeen | CommandApplied):
             self.refresh(self._services.clock.now_s())
 
@@ -180,6 +192,7 @@ class Operator:
         put("abilities", view_json(model.abilities))
         put("robots", _encode(model.robots(now_s)))
         put("links", _encode(model.links(now_s)))
+        put("orders", _encode(self._ordering.given.views(now_s, self._stick)))
         put("alarms", _encode(model.alarm_views()))
         put("drawn", msgspec.json.encode({robot: round(at, 3) for robot, at in sorted(self._latency_s.items())}))
         self.news.set()
@@ -205,10 +218,23 @@ class Operator:
         else:
             self._answer({"refused": f"{wish.word} was not given: the robot's state has changed; press again"})
 
+    def _begin_order(self, moment: int, intent: protocol.OrderRequest | protocol.PictureOrder) -> None:
+        """Give orders, unless a robot was stopped, freed, granted or lost since the page showed it."""
+        if moment == self.model.moment:
+            self._begin(intent)
+        else:
+            self._answer({"refused": "no order was given: the robot's state has changed; tap again"})
+
+    @property
+    def _stick(self) -> str:
+        """The robot that the stick is at; empty: none."""
+        return self._console.parameters.robot or self.model.robot if self._console is not None else ""
+
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)
         self.news.set()
         if captured_s is not None:
+            self._ordering.drawn(robot, captured_s)
             took_s = max(0.0, self._services.clock.now_s() - captured_s)
             before_s = self._latency_s.get(robot, took_s)
             self._latency_s[robot] = before_s + LATENCY_STEP * (took_s - before_s)
@@ -245,6 +271,11 @@ class Operator:
             case protocol.TakeOver(robot):
                 async with self._claiming:
                     await self._take(robot)
+            case protocol.OrderRequest() | protocol.PictureOrder():
+                async with self._claiming:
+                    await self._order(intent)
+            case protocol.EndOrders(robots):
+                await self._end_orders(robots)
             case protocol.ReleaseRequest():
                 async with self._claiming:
                     if self._console is not None and self._console.is_ready:
@@ -298,13 +329,41 @@ class Operator:
         if robots:
             self._answer({"refused": f"not certain to have stopped: {', '.join(robots)}"})
 
-    async def _take(self, robot: str) -> None:
-        if self._console is not None and self._life is not None and not self._life.done():
-            if self._console.is_ready:
-                await self._console.switch(robot)
-            return
+    async def _order(self, intent: protocol.OrderRequest | protocol.PictureOrder) -> None:
         try:
-            self._console = await self._services.new_console(self, robot)
+            orders = self._ordering.orders_for(intent)
+        except Refusal as refusal:
+            self._answer({"refused": f"{refusal.detail}. {refusal.remedy}"})
+            return
+        if not self._has_console:
+            await self._open(orders[0].robot if len(orders) == 1 else "", orders)
+        elif self._console is not None and self._console.is_ready:
+            self._console.order_group(orders)
+        else:
+            self._answer({"refused": "no order was given: your console is not ready; tap again"})
+
+    async def _end_orders(self, robots: list[str]) -> None:
+        console = self._console
+        if console is None or not console.is_ready:
+            return
+        if self._stick in robots:
+            console.interrupt()
+        others = [robot for robot in robots if robot != self._stick]
+        await asyncio.gather(*map(console.end_order, others))
+
+    @property
+    def _has_console(self) -> bool:
+        return self._console is not None and self._life is not None and not self._life.done()
+
+    async def _take(self, robot: str) -> None:
+        if not self._has_console:
+            await self._open(robot)
+        elif self._console is not None and self._console.is_ready:
+            await self._console.switch(robot)
+
+    async def _open(self, robot: str, orders: Sequence[Order] = ()) -> None:
+        try:
+            self._console = await self._services.new_console(self, robot, orders)
             self.model.name = self._console.name  # others of this person are other screens
         except LinkError as error:
             self.show(failed(self._services.clock.now_s(), error))

@@ -10,17 +10,21 @@ from typing import Annotated, Any
 import msgspec
 
 from backbone.mission_log.question import LogQuestion
-from backbone.ranges import EXACT, LONGEST_LINE
+from backbone.ranges import EXACT, LONGEST_LINE, Meters, PixelCount
 from ui_console.model.consent import MAX_WHY
+from ui_console.model.orders import OrderKind
 from ui_console.web.login import BeatRequest, Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
 
 ShortLine = Annotated[str, msgspec.Meta(max_length=LONGEST_LINE)]
+MOST_ORDERED = 32  # chosen: more robots than one person can have in view
 MOST_FIELDS = 64  # chosen: more than a person fills in
 
 GivenValue = Annotated[int, msgspec.Meta(ge=-EXACT, le=EXACT)] | float | bool | ShortLine
 Numbered = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
+Robots = Annotated[list[ShortText], msgspec.Meta(min_length=1, max_length=MOST_ORDERED)]
+PixelPoint = Annotated[float, msgspec.Meta(ge=-0.5, le=8_192.0)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
 
@@ -58,6 +62,54 @@ class GiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
     word: ShortText
     values: Annotated[dict[ShortText, GivenValue], msgspec.Meta(max_length=MOST_FIELDS)]
     role: ShortText
+
+
+class OrderRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="order"):
+    """Tell robots to do something by themselves.
+
+    Attributes:
+        moment: As in ``Steer``.
+        kind: What they are to do.
+        robots: Their names; places to go to lie side by side.
+        x_m: Of the place to go to.
+        y_m: Same.
+        target: The body to follow.
+    """
+
+    moment: Numbered
+    kind: OrderKind
+    robots: Robots
+    x_m: Meters = 0.0
+    y_m: Meters = 0.0
+    target: ShortText = ""
+
+
+class PictureOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="order_in_picture"):
+    """Tell robots to go to the place on the floor that a point of a robot's picture shows.
+
+    Attributes:
+        moment: As in ``Steer``.
+        robot: The picture is its camera's.
+        robots: Who is to go there.
+        column_px: 0: the middle of the leftmost pixel.
+        row_px: 0: the middle of the uppermost pixel.
+        width_px: Of the picture.
+        height_px: Same.
+    """
+
+    moment: Numbered
+    robot: ShortText
+    robots: Robots
+    column_px: PixelPoint
+    row_px: PixelPoint
+    width_px: PixelCount
+    height_px: PixelCount
+
+
+class EndOrders(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="end_orders"):
+    """End the orders of these robots: the robot at the stick stays in hand, the others go back to the mission."""
+
+    robots: Robots
 
 
 class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="take"):
@@ -174,6 +226,9 @@ Intent = (
     Steer
     | StopWheels
     | GiveRequest
+    | OrderRequest
+    | PictureOrder
+    | EndOrders
     | TakeOver
     | ReleaseRequest
     | MayI

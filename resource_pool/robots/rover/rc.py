@@ -9,15 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from backbone.component.abilities import CameraForm
 from backbone.ranges import Share
 from resource_pool.commands import Command, Halt, Move, SwitchTransmitter, clipped
 from resource_pool.drivers.interface import MalformedReply
 from resource_pool.drivers.simulated import SimulatedRobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.rcs.robot import RobotParameters, RobotRc
-from resource_pool.robots.rover.body import TOP_M_S, TOP_RAD_S
+from resource_pool.robots.rover.body import TOP_M_S, TOP_RAD_S, WHEEL_RADIUS_M
 from resource_pool.robots.rover.link import GripPacket, MovePacket, StopPacket, encode
 from resource_pool.robots.rover.report import RoverReport, report_of
+from scout_model.dimensions import CAMERA_TILT_RAD, HORIZONTAL_VIEW_RAD
 from scout_model.errors import MalformedPacket
 
 
@@ -59,6 +61,9 @@ class RoverRc(RobotRc[RobotParameters]):
 
     commands = Move | Halt | Grip | SwitchTransmitter
     reports = RoverReport
+    camera = CameraForm(
+        forward_m=0.165, height_m=WHEEL_RADIUS_M + 0.1275, tilt_rad=CAMERA_TILT_RAD, across_rad=HORIZONTAL_VIEW_RAD
+    )
     body_class = "resource_pool.robots.rover.body:Rover"
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {
         "forward_m_s": (-TOP_M_S, TOP_M_S),

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.abilities import CameraForm
 from backbone.component.launch import Launch
 from backbone.errors import LinkError, Refusal
 from resource_pool.commands import Command, Halt, Move, SwitchTransmitter
@@ -33,12 +34,14 @@ from resource_pool.robots.walker.link import Angles, JointTargets, encode_joint_
 from resource_pool.robots.walker.motion import STEP_S, MotionControl, StateOfMotion
 from resource_pool.robots.walker.pace import Pace
 from resource_pool.robots.walker.report import WalkerReport, report_of
+from scout_model.dimensions import CAMERA_TILT_RAD, HORIZONTAL_VIEW_RAD
 from scout_model.errors import MalformedPacket
 
 GAITS = {"trot": TROT, "walk": WALK}
 ARRIVE_S = DEFAULT_DRIVE_USAGE.period_s  # joints arrive when the next packet comes
 LASTS_S = 0.2  # chosen: without newer targets for four packets the legs go down, before the walker's own watchdog
 STILL = TrunkSpeed()
+CAMERA_HEIGHT_M = 0.19  # measured: as it stands
 
 
 class WalkerParameters(RobotParameters, frozen=True, kw_only=True):
@@ -90,6 +93,9 @@ class WalkerRc(RobotRc[WalkerParameters]):
     body_class = "resource_pool.robots.walker.body:Walker"
     commands = Move | Halt | SwitchTransmitter
     reports = WalkerReport
+    camera = CameraForm(
+        forward_m=0.167, height_m=CAMERA_HEIGHT_M, tilt_rad=CAMERA_TILT_RAD, across_rad=HORIZONTAL_VIEW_RAD
+    )
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {
         "forward_m_s": (-MAX_FORWARD_M_S, MAX_FORWARD_M_S),
         "turn_rad_s": (-MAX_TURN_RAD_S, MAX_TURN_RAD_S),

@@ -2,11 +2,12 @@
 
 import { make } from "./dom.js";
 import { actWhenHeld } from "./holding.js";
+import { notice } from "./notices.js";
 import { Screen } from "./pictures.js";
 import { lasting, set } from "./text.js";
 
 /** @import { OwnView, RobotView, StopView } from "./messages.d.ts" */
-/** @import { Act, Picture, Say } from "./types.d.ts" */
+/** @import { Act, Picture, Say, Tap } from "./types.d.ts" */
 
 const LOOK_EVERY_MS = 250;
 const HOLD = "hold to lift"; // the model's line for a stop that this operator alone may lift; the button shows it
@@ -130,7 +131,7 @@ class Card {
     this.root = make("article", "robot");
     this.root.dataset.robot = name;
     this.root.setAttribute("aria-label", `robot ${name}`);
-    this.screen = new Screen({ name, drawn });
+    this.screen = new Screen({ name, drawn, tapped: (tap) => this.tapped(tap) });
     // Over the picture of a stopped robot: the authors of the stop, and the lift button far from every Stop.
     this.standing = make("div", "standing");
     this.standing.hidden = true;
@@ -151,6 +152,12 @@ class Card {
     this.gauges = make("p", "gauges");
     this.take = this.button("Take over", "take");
     this.root.append(this.screen.root, top, this.holder, this.gauges, this.makeButtons());
+  }
+
+  /** @param {Tap | null} tap */
+  tapped(tap) {
+    if (tap === null) notice(`The picture of ${this.name} is old: tap the place on the map.`);
+    else this.act("order_in_picture", this.name, { tap });
   }
 
   makeEnlarge() {

@@ -1,11 +1,12 @@
 // This operator's own part: the robot held, the robot lost, the questions of others.
 
 import { find } from "./dom.js";
+import { atStick } from "./orders.js";
 import { lasting, set } from "./text.js";
 
 /** @import { Commands } from "./commands.js" */
 /** @import { Driving } from "./driving.js" */
-/** @import { ArcAbilities, OwnView } from "./messages.d.ts" */
+/** @import { ArcAbilities, OrderView, OwnView } from "./messages.d.ts" */
 /** @import { Act } from "./types.d.ts" */
 
 const MEMORY = "held";
@@ -22,6 +23,7 @@ export class Hand {
     /** @type {ArcAbilities | null} */
     this.abilities = null;
     this.now_s = 0;
+    this.ordered = ""; // the robot whose order the stick takes back
     this.memory = new Memory();
     find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
     find("release").addEventListener("click", () => act("release"));
@@ -48,6 +50,11 @@ export class Hand {
     return this.own?.is_held ? this.own.robot : "";
   }
 
+  /** The robot that the stick moves: it is held, or carries out an order that a touch of the stick ends. */
+  get stick() {
+    return this.held || this.ordered;
+  }
+
   /** The newest moment that is shown: a press from an earlier one moves nothing. */
   get moment() {
     return this.own?.moment ?? 0;
@@ -70,7 +77,18 @@ export class Hand {
     this.abilities = abilities;
     this.commands.know(abilities);
     this.showSpeed();
-    if (this.own !== null) this.driving.turn(this.own.is_held && this.canMove);
+    if (this.own !== null) this.driving.turn(this.stick !== "" && this.canMove);
+  }
+
+  /**
+   * Take in the orders of this operator's robots.
+   *
+   * @param {OrderView[]} orders
+   */
+  heed(orders) {
+    this.ordered = atStick(orders);
+    document.body.dataset.ordered = this.ordered;
+    if (this.own !== null) this.showHold(this.own);
   }
 
   get canMove() {
@@ -93,6 +111,7 @@ export class Hand {
     if (this.held) this.memory.keep(this.held, why, Date.now() - ageMs);
     set(find("own"), this.held ? `You held ${this.held} when the connection ended.` : "Not connected.");
     this.own = null;
+    this.ordered = "";
     this.driving.turn(false);
     this.commands.turn(false);
     document.body.dataset.held = "";
@@ -110,7 +129,6 @@ export class Hand {
     if (isOther(before, own))
       this.driving.letGo(own.is_held); // a held control was meant for an earlier moment
     else if (own.moment !== before?.moment) this.driving.letGo();
-    this.driving.turn(own.is_held && this.canMove);
     if (own.is_asked) this.memory.forget();
     set(find("own"), own.status);
     set(find("taken"), own.taken_because ? `Taken from you: ${own.taken_because}` : "");
@@ -119,14 +137,25 @@ export class Hand {
     this.showLost();
     this.showConsent();
     find("may-i", HTMLButtonElement).disabled = !own.is_asked || own.is_held;
-    find("release", HTMLButtonElement).disabled = !own.is_asked;
     find("take", HTMLButtonElement).disabled = own.is_asked;
-    find("halt", HTMLButtonElement).disabled = !own.is_held;
     this.commands.turn(own.is_held);
-    find("stop-mine").hidden = !own.is_held;
-    set(find("stop-mine"), `Stop ${own.robot}`);
+    this.showHold(own);
     document.body.dataset.held = this.held;
     document.body.classList.toggle("is-asking", own.is_asked);
+  }
+
+  /**
+   * Show what can be done with the robot at the stick.
+   *
+   * @param {OwnView} own
+   */
+  showHold(own) {
+    const stick = this.stick;
+    this.driving.turn(stick !== "" && this.canMove);
+    find("release", HTMLButtonElement).disabled = !own.is_asked && stick === "";
+    find("halt", HTMLButtonElement).disabled = stick === "";
+    find("stop-mine").hidden = stick === "";
+    set(find("stop-mine"), `Stop ${stick}`);
   }
 
   /** Show the lost robot with time and reason, and offer it again: by the server's report, else by this page's own. */

@@ -10,14 +10,16 @@ import { Keys } from "./keys.js";
 import { Link } from "./link.js";
 import { Log } from "./log.js";
 import { Login } from "./login.js";
+import { RobotMap } from "./map.js";
 import { notice, read, showAlarm, showHealth } from "./notices.js";
+import { Orders } from "./orders.js";
 import { Stopping } from "./stopping.js";
 import { Tables } from "./tables.js";
 import { seconds, set } from "./text.js";
 import { followTheme } from "./theme.js";
 
-/** @import { Answer, Heard, Said, View } from "./messages.d.ts" */
-/** @import { Act, LinkChange, More, Say } from "./types.d.ts" */
+/** @import { Answer, Heard, OrderKind, Said, View } from "./messages.d.ts" */
+/** @import { Act, LinkChange, More, Say, Tap } from "./types.d.ts" */
 
 const TOUCHED_EVERY_MS = 5000; // chosen: far below the two minutes after which the operator counts as away
 /** @type {Partial<View>} */
@@ -52,16 +54,18 @@ const commands = new Commands({
   give: (word, values, role) => act("give", word, { values, role }),
 });
 const hand = new Hand({ act, driving, commands });
+const map = new RobotMap({ act, inHand: () => hand.stick });
+const orders = new Orders({ list: find("orders"), act });
 const blindness = new Blindness({
   link,
   root: find("blind"),
   title: find("blind-title"),
   why: find("blind-why"),
-  areas: [find("alarm-bar"), find("stage"), find("side")],
+  areas: [find("alarm-bar"), find("stage"), find("side"), find("map")],
   stops: () => queryAll(document, "button.emergency", HTMLButtonElement),
 });
 new Keys({
-  isHeld: () => hand.held !== "",
+  isHeld: () => hand.stick !== "",
   does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")),
 });
 followTheme(find("theme", HTMLSelectElement));
@@ -110,6 +114,11 @@ function heard(message) {
     const down_s = changes.own.link_down_s;
     blindness.hub(down_s < 0 ? -1 : 1000 * Math.max(0, (view.now_s ?? down_s) - down_s));
   }
+  if (changes.orders) {
+    orders.show(changes.orders);
+    hand.heed(changes.orders);
+  }
+  if (changes.floor !== undefined || changes.bodies || changes.orders || changes.own) map.show(view, changes);
   if (changes.robots) stopping.heard(changes.robots);
   if (changes.robots || changes.own) {
     cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});
@@ -139,18 +148,32 @@ const words = {
   consent: (answer) => ({ do: "decide", is_given: answer === "yes" }),
   dismiss: () => ({ do: "dismiss_lost" }),
   give: (word, { values = {}, role = "" }) => ({ do: "give", moment: hand.moment, word, values, role }),
+  order: (kind, { robots = [], x_m = 0, y_m = 0, target = "" }) => ({
+    do: "order",
+    moment: hand.moment,
+    kind: /** @type {OrderKind} */ (kind),
+    robots,
+    x_m,
+    y_m,
+    target,
+  }),
+  end_orders: (_name, { robots = [] }) => ({ do: "end_orders", robots }),
   why: (name) => ({ do: "why", name }),
   acknowledge: (key) => ({ do: "acknowledge", key }),
   parameters: (name) => ({ do: "parameters", name }),
   set: (name, { parameter = "", value }) => ({ do: "set", name, parameter, value }),
 };
-const LET_GO = ["take", "release", "lift", "consent"]; // a held control was not meant for the outcome of these
+const LET_GO = ["take", "release", "lift", "consent", "order"]; // a held control was not meant for the outcome of these
 
 /** @type {Act} */
 function act(what, name = "", more = {}) {
   switch (what) {
     case "halt":
       driving.letGo(true);
+      if (!hand.held && hand.ordered) act("end_orders", "", { robots: [hand.ordered] });
+      return;
+    case "order_in_picture":
+      if (more.tap) goInPicture(name, more.tap);
       return;
     case "stop_robot":
       driving.letGo();
@@ -180,7 +203,22 @@ function act(what, name = "", more = {}) {
 
 /** The robot that a stop of one is for. */
 function meant() {
-  return hand.held || cards.meant;
+  return hand.stick || cards.meant;
+}
+
+/**
+ * Send the robots that are meant to the place on the floor that a point of a robot's picture shows.
+ *
+ * @param {string} robot
+ * @param {Tap} tap
+ */
+function goInPicture(robot, tap) {
+  const robots = map.meant;
+  driving.letGo();
+  if (robots.length === 0) notice(`To send a robot there, take ${robot} over or select robots on the map.`);
+  else if (!say({ do: "order_in_picture", moment: hand.moment, robot, robots, ...tap })) {
+    notice("NOT CONNECTED: the order was not sent.");
+  }
 }
 
 /** A dialog covers every red button but its own. */

@@ -53,6 +53,21 @@ export interface ArcAbilities {
   gives_pictures: boolean;
 }
 
+export interface BodyView {
+  name: string;
+  is_robot: boolean;
+  x_m: number;
+  y_m: number;
+  heading_rad: number;
+  spread_m: number;
+  source: string;
+  is_stale: boolean;
+  age_s: number;
+  trail: number[];
+  sees_rad: number;
+  link: string;
+}
+
 export type Certainty =
   | "next"
   | "now"
@@ -101,6 +116,23 @@ export interface FieldForm {
   is_required: boolean;
   choices: string[];
   doc: string;
+}
+
+export interface FloorShape {
+  name: string;
+  kind: ShapeKind;
+  x_m: number;
+  y_m: number;
+  width_m: number;
+  depth_m: number;
+  heading_rad: number;
+}
+
+export interface FloorView {
+  width_m: number;
+  depth_m: number;
+  shapes: FloorShape[];
+  image: string;
 }
 
 export interface FoundEvent {
@@ -201,6 +233,22 @@ export interface NodeView {
   feedback: string;
   arc: string;
   because: string;
+}
+
+export type OrderKind =
+  | "follow"
+  | "go_to"
+  | "return_home"
+  | "watch_for_motion";
+
+export interface OrderView {
+  robot: string;
+  kind: OrderKind;
+  x_m: number;
+  y_m: number;
+  line: string;
+  is_over: boolean;
+  has_stick: boolean;
 }
 
 export interface OwnView {
@@ -315,6 +363,13 @@ export type Severity =
   | "notice"
   | "warning";
 
+export type ShapeKind =
+  | "dark"
+  | "furniture"
+  | "landmark"
+  | "ramp"
+  | "wall";
+
 export interface SliceView {
   who: string;
   arc: string;
@@ -388,6 +443,9 @@ export interface View {
   parameters: ParameterView[];
   components: ComponentState[];
   log: LoggedEvent[];
+  floor: FloorView | null;
+  bodies: BodyView[];
+  orders: OrderView[];
   now_s: number;
   beat: number;
 }
@@ -428,6 +486,11 @@ export interface Drawn {
   number: number;
 }
 
+export interface EndOrders {
+  do: "end_orders";
+  robots: string[];
+}
+
 export interface GiveRequest {
   do: "give";
   moment: number;
@@ -466,9 +529,30 @@ export interface MoreLog {
   first: number;
 }
 
+export interface OrderRequest {
+  do: "order";
+  moment: number;
+  kind: OrderKind;
+  robots: string[];
+  x_m?: number;
+  y_m?: number;
+  target?: string;
+}
+
 export interface ParametersRequest {
   do: "parameters";
   name: string;
+}
+
+export interface PictureOrder {
+  do: "order_in_picture";
+  moment: number;
+  robot: string;
+  robots: string[];
+  column_px: number;
+  row_px: number;
+  width_px: number;
+  height_px: number;
 }
 
 export interface ReleaseRequest {
@@ -545,6 +629,9 @@ export type Said =
   | Steer
   | StopWheels
   | GiveRequest
+  | OrderRequest
+  | PictureOrder
+  | EndOrders
   | TakeOver
   | ReleaseRequest
   | MayI

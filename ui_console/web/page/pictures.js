@@ -1,16 +1,20 @@
 // The screen of one robot: its newest picture, and the picture's age.
 
 import { make } from "./dom.js";
+import { pixelAt } from "./map_plan.js";
 
-/** @import { Picture } from "./types.d.ts" */
+/** @import { Picture, Tap } from "./types.d.ts" */
 
 const STALE_MS = 1000; // as in the console model: do not drive by it
 const RATE_OVER_MS = 2000; // chosen: a rate a person can read
 
-/** Draws the newest picture only; `drawn` is called with the number of each picture that is on the screen. */
+/**
+ * Draws the newest picture only; `drawn` is called with the number of each picture that is on the screen, `tapped` with
+ * the point of a fresh picture that was tapped, null for an old one.
+ */
 export class Screen {
-  /** @param {{ name: string, drawn: (number: number) => void }} given */
-  constructor({ name, drawn }) {
+  /** @param {{ name: string, drawn: (number: number) => void, tapped: (tap: Tap | null) => void }} given */
+  constructor({ name, drawn, tapped }) {
     this.drawn = drawn;
     this.root = make("div", "screen");
     this.canvas = make("canvas");
@@ -18,9 +22,11 @@ export class Screen {
     this.canvas.height = 240;
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `picture of ${name}`);
+    this.canvas.addEventListener("click", (event) => this.tap(event, tapped));
     this.age = make("span", "age");
     this.root.append(this.canvas, this.age);
     this.drawnAt = 0;
+    this.isStale = true;
     this.latencyMs = 0;
     /** @type {Picture | null} */
     this.pending = null;
@@ -69,6 +75,18 @@ export class Screen {
   }
 
   /**
+   * @param {MouseEvent} event
+   * @param {(tap: Tap | null) => void} tapped
+   */
+  tap(event, tapped) {
+    const { width, height, clientWidth, clientHeight } = this.canvas;
+    const pixel = pixelAt([event.offsetX, event.offsetY], [clientWidth, clientHeight], [width, height]);
+    if (this.drawnAt === 0 || pixel === null) return;
+    const [column_px, row_px] = pixel;
+    tapped(this.isStale ? null : { column_px, row_px, width_px: width, height_px: height });
+  }
+
+  /**
    * Show the picture's age, from the lens on; returns whether it is too old to drive by.
    *
    * @param {number} now
@@ -82,6 +100,7 @@ export class Screen {
     }
     const oldMs = now - this.drawnAt + this.latencyMs;
     const isStale = this.drawnAt === 0 || oldMs > STALE_MS;
+    this.isStale = isStale;
     const latency = this.latencyMs ? ` · ${Math.round(this.latencyMs)} ms` : "";
     const fresh = `${this.rate.toFixed(0)}/s${latency}`;
     const text = this.drawnAt === 0 ? "no picture" : isStale ? `${(oldMs / 1000).toFixed(0)} s old` : fresh;

@@ -15,6 +15,11 @@ export interface More {
   value?: unknown;
   values?: Record<string, string | number | boolean>;
   role?: string;
+  robots?: string[];
+  x_m?: number;
+  y_m?: number;
+  target?: string;
+  tap?: Tap;
 }
 
 /** A picture as it came. */
@@ -43,3 +48,14 @@ export interface Connection {
 
 /** Forward and right, each from −1 to 1. */
 export type Stick = [number, number];
+
+/** Two coordinates: meters on the floor, or pixels from the left and from the top. */
+export type Point = [number, number];
+
+/** A point of a robot's picture, and the picture's size. */
+export interface Tap {
+  column_px: number;
+  row_px: number;
+  width_px: number;
+  height_px: number;
+}

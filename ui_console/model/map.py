@@ -1,0 +1,234 @@
+"""The map: the plan of the floor, where each body is believed to be and was, and what each robot sees.
+
+Rules of this file: no bus, no clock, no screen; messages go in, views come out; times are mission seconds, and *now* is
+an argument. Positions are in meters in the room's frame, see ``resource_pool.localization``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import msgspec
+
+from backbone.component.abilities import CameraForm
+from backbone.component_database.messages import ComponentType, Types
+from backbone.naming import Subsystem, address
+from backbone.picture.mission import MissionPicture
+from backbone.scheduling.views import RcView
+from resource_pool.arc_client import FloorPlan, FloorShape, Pose, PoseSource
+from ui_console.model.floor_pick import NoFloorThere, Stand, floor_place
+from ui_console.model.link_board import LinkBoard
+
+STALE_S = 3.0  # chosen: at a Scout's 0.35 m/s it may be a meter away; localizers that are silent are asked every second
+TRAIL_STEP_M = 0.05  # chosen: half a Scout; a body that stands leaves no trail
+TRAIL_POINTS = 100  # chosen: five meters of way; ten robots cost a page 20 kB, and only while they move
+RECENT = 90  # chosen: three seconds at a camera's rate; the oldest picture to drive by is a second old
+LEAST_ROOM_M = 2.0  # chosen: a floor of which nothing is known is shown at least so large
+
+SOURCES = {
+    PoseSource.SIMULATOR: "from the simulator",
+    PoseSource.TRACKING: "from a camera above the room",
+    PoseSource.DEAD_RECKONING: "reckoned from its commands",
+    PoseSource.LANDMARK: "from a landmark it sees",
+}
+"""For people."""
+
+
+class FloorView(msgspec.Struct, frozen=True):
+    """The plan of the floor, as a page draws it.
+
+    Attributes:
+        width_m: Along x.
+        depth_m: Along y.
+        shapes: What stands on it.
+        image: A JPEG that covers the whole floor, in base64; empty: none.
+    """
+
+    width_m: float
+    depth_m: float
+    shapes: list[FloorShape]
+    image: str = ""
+
+
+class BodyView(msgspec.Struct, frozen=True):
+    """A body on the map.
+
+    Attributes:
+        name: Its name.
+        is_robot: True for a robot of the mission; False for another body that a localizer knows.
+        x_m: Its believed place.
+        y_m: Same.
+        heading_rad: Counterclockwise from x.
+        spread_m: Standard deviation of the place; 0: exact.
+        source: What the place rests on, for people.
+        is_stale: True: the place is old, and the body may be elsewhere.
+        age_s: Age of the place in whole seconds while it is stale; 0 while it is fresh.
+        trail: Where it was, oldest first: x and y in turn.
+        sees_rad: Angle of view of its camera while its holder gets pictures; 0: nobody sees through it.
+        link: How its commands go over the radio, for people; empty: not known.
+    """
+
+    name: str
+    is_robot: bool
+    x_m: float
+    y_m: float
+    heading_rad: float
+    spread_m: float
+    source: str
+    is_stale: bool
+    age_s: float
+    trail: list[float]
+    sees_rad: float
+    link: str
+
+
+@dataclass(slots=True)
+class _Track:
+    """What is known of the way of one body."""
+
+    now: Pose
+    recent: deque[Pose] = field(default_factory=lambda: deque(maxlen=RECENT))
+    trail: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=TRAIL_POINTS))
+
+    def take(self, pose: Pose) -> None:
+        self.now = pose
+        self.recent.append(pose)
+        here_m = pose.x_m, pose.y_m
+        if not self.trail or math.dist(self.trail[-1], here_m) >= TRAIL_STEP_M:
+            self.trail.append(here_m)
+
+
+class MapBoard:
+    """The map of a mission.
+
+    Args:
+        picture: Of the mission.
+        links: Its radios.
+    """
+
+    def __init__(self, picture: MissionPicture, links: LinkBoard) -> None:
+        self._picture, self._links = picture, links
+        self._told: FloorPlan | None = None
+        self._grown: FloorPlan | None = None
+        self._tracks: dict[str, _Track] = {}
+        self._types: dict[str, ComponentType] = {}
+
+    # ------------------------------------------------------------------ messages in
+    def take_plan(self, plan: FloorPlan) -> None:
+        """Take in the plan of the floor; the newest counts."""
+        self._told = plan
+
+    def take_pose(self, pose: Pose) -> None:
+        """Take in where a body is believed to be; a message older than the last one changes nothing."""
+        track = self._tracks.get(pose.body)
+        if track is not None and pose.at_s < track.now.at_s:
+            return
+        if track is None:
+            track = self._tracks[pose.body] = _Track(pose)
+        track.take(pose)
+        self._grow(pose)
+
+    def take_types(self, types: Types) -> None:
+        """Take in the component types of the mission, which declare the robots' cameras."""
+        self._types = {one.component_type.name: one.component_type for one in types.types}
+
+    # ------------------------------------------------------------------ views out
+    @property
+    def floor(self) -> FloorPlan | None:
+        """The plan of the floor; while no localizer told one, an empty floor around the bodies; None: no body either.
+
+        It is the same object until it changes.
+        """
+        return self._told or self._grown
+
+    @property
+    def names(self) -> list[str]:
+        """Every body that has a place, sorted."""
+        return sorted(self._tracks)
+
+    def views(self, now_s: float) -> list[BodyView]:
+        """Return the bodies, sorted by name."""
+        robots = {rc.rc: rc for rc in (self._picture.schedule.rcs if self._picture.schedule else []) if rc.is_robot}
+        return [self._body(track, robots.get(name), now_s) for name, track in sorted(self._tracks.items())]
+
+    def where(self, body: str, at_s: float) -> Stand | None:
+        """Return where a body was at a time not long ago, by the pose nearest in time; None: it has no place."""
+        track = self._tracks.get(body)
+        if track is None:
+            return None
+        pose = min(track.recent, key=lambda pose: abs(pose.at_s - at_s))
+        return Stand(pose.x_m, pose.y_m, pose.heading_rad)
+
+    def pick(
+        self, robot: str, column_px: float, row_px: float, size_px: tuple[int, int], at_s: float
+    ) -> tuple[float, float]:
+        """Return the place on the floor that a point of a robot's picture shows: x and y in meters.
+
+        Args:
+            robot: The robot.
+            column_px: As for ``floor_place``.
+            row_px: Same.
+            size_px: Width and height of the picture.
+            at_s: Mission time of the picture.
+
+        Raises:
+            NoFloorThere: The point shows no place on the floor of this room that can be told.
+        """
+        robots = self._picture.schedule.rcs if self._picture.schedule is not None else []
+        camera = next((self._camera_of(rc) for rc in robots if rc.rc == robot), None)
+        stand = self.where(robot, at_s)
+        if camera is None:
+            raise NoFloorThere(f"the kind of {robot} declares no camera", remedy="Tap the place on the map.")
+        if stand is None:
+            raise NoFloorThere(f"no localizer knows where {robot} is", remedy="Drive it by hand.")
+        x_m, y_m = floor_place(column_px, row_px, size_px, camera, stand)
+        plan = self._told
+        if plan is not None and not (0.0 <= x_m <= plan.width_m and 0.0 <= y_m <= plan.depth_m):
+            raise NoFloorThere(f"the floor there, {x_m:.1f} {y_m:.1f} m, would be outside of the room")
+        return x_m, y_m
+
+    # ------------------------------------------------------------------ within
+    def _grow(self, pose: Pose) -> None:
+        """Let the floor, of which no localizer told a plan, hold this place, in whole meters."""
+        known = self._grown or FloorPlan(LEAST_ROOM_M, LEAST_ROOM_M)
+        width_m, depth_m = max(known.width_m, math.ceil(pose.x_m)), max(known.depth_m, math.ceil(pose.y_m))
+        if self._grown is None or (width_m, depth_m) != (known.width_m, known.depth_m):
+            self._grown = FloorPlan(float(width_m), float(depth_m))
+
+    def _body(self, track: _Track, robot: RcView | None, now_s: float) -> BodyView:
+        pose = track.now
+        age_s = max(0.0, now_s - pose.at_s)
+        is_stale = age_s > STALE_S
+        return BodyView(
+            name=pose.body,
+            is_robot=robot is not None,
+            x_m=round(pose.x_m, 3),
+            y_m=round(pose.y_m, 3),
+            heading_rad=round(math.remainder(pose.heading_rad, math.tau), 3),
+            spread_m=round(pose.spread_m, 3),
+            source=SOURCES[pose.source],
+            is_stale=is_stale,
+            age_s=float(round(age_s)) if is_stale else 0.0,
+            trail=[round(one, 2) for point in track.trail for one in point],
+            sees_rad=self._sees_rad(robot) if robot is not None else 0.0,
+            link=self._link(robot) if robot is not None else "",
+        )
+
+    def _sees_rad(self, robot: RcView) -> float:
+        camera = self._camera_of(robot)
+        return camera.across_rad if camera is not None and self._gives_pictures(robot) else 0.0
+
+    def _camera_of(self, robot: RcView) -> CameraForm | None:
+        kind = self._types.get(robot.kind)
+        return kind.abilities.camera if kind is not None else None
+
+    def _gives_pictures(self, robot: RcView) -> bool:
+        """Return whether the ARC that holds the robot is of a kind whose owner gets pictures."""
+        at = [address(Subsystem.RESOURCE_POOL, holder.arc) for holder in robot.holders]
+        arcs = [self._picture.components[arc] for arc in at if arc in self._picture.components]
+        return any(arc.type in self._types and self._types[arc.type].abilities.gives_pictures for arc in arcs)
+
+    def _link(self, robot: RcView) -> str:
+        return self._links.radio_line(robot.holders[0].arc) if robot.holders else ""

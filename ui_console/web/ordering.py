@@ -1,0 +1,42 @@
+"""Ordering: from what a person taps on a page to orders for robots, and the orders as that page shows them."""
+
+from __future__ import annotations
+
+from ui_console.model.order_views import OrderList, inside
+from ui_console.model.orders import Order, OrderKind, group
+from ui_console.model.team import TeamModel
+from ui_console.web.protocol import OrderRequest, PictureOrder
+
+
+class Ordering:
+    """The orders of one person.
+
+    Args:
+        team: Model of the mission.
+    """
+
+    def __init__(self, team: TeamModel) -> None:
+        self.given = OrderList()
+        """The orders, as the page shows them."""
+        self._team = team
+        self._captured_s: dict[str, float] = {}
+
+    def drawn(self, robot: str, captured_s: float) -> None:
+        """Note that the page shows the picture of this time: a tap in it means the robot's place then."""
+        self._captured_s[robot] = captured_s
+
+    def orders_for(self, intent: OrderRequest | PictureOrder) -> list[Order]:
+        """Return one order for each robot; places to go to lie side by side, on the floor.
+
+        Raises:
+            NoFloorThere: The point of the picture shows no place on the floor that can be told.
+        """
+        match intent:
+            case OrderRequest(kind=kind, robots=robots, x_m=x_m, y_m=y_m, target=target):
+                order = Order(kind, "", x_m, y_m, target)
+            case PictureOrder(robot=robot, robots=robots, column_px=column_px, row_px=row_px):
+                seen_s = self._captured_s.get(robot, 0.0)
+                size_px = intent.width_px, intent.height_px
+                x_m, y_m = self._team.map.pick(robot, column_px, row_px, size_px, seen_s)
+                order = Order(OrderKind.GO_TO, "", round(x_m, 2), round(y_m, 2))
+        return inside(group(order, robots), self._team.map.floor)

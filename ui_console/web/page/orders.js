@@ -1,0 +1,47 @@
+// The orders of this operator's robots, in words, each with the button that takes it back.
+
+import { keepingFocus, make, makeButton } from "./dom.js";
+
+/** @import { OrderView } from "./messages.d.ts" */
+/** @import { Act } from "./types.d.ts" */
+
+/** A list that changes only when an order does, so that no button moves under a finger. */
+export class Orders {
+  /** @param {{ list: HTMLElement, act: Act }} given */
+  constructor({ list, act }) {
+    this.list = list;
+    this.act = act;
+    this.shown = "";
+  }
+
+  /** @param {OrderView[]} orders */
+  show(orders) {
+    const shown = JSON.stringify(orders);
+    if (shown === this.shown) return;
+    this.shown = shown;
+    this.list.hidden = orders.length === 0;
+    keepingFocus(this.list, () => this.list.replaceChildren(...orders.map((order) => this.row(order))));
+  }
+
+  /** @param {OrderView} order */
+  row(order) {
+    const row = make("li", order.is_over ? "is-over" : "");
+    row.dataset.order = order.robot;
+    row.append(make("span", "", order.line));
+    if (order.is_over) return row;
+    const end = makeButton("Stop order", () => this.act("end_orders", "", { robots: [order.robot] }));
+    end.dataset.key = `end:${order.robot}`;
+    end.setAttribute("aria-label", `Stop the order of ${order.robot}`);
+    row.append(end);
+    return row;
+  }
+}
+
+/**
+ * The robot whose order the stick takes back; empty: none.
+ *
+ * @param {OrderView[]} orders
+ */
+export function atStick(orders) {
+  return orders.find((order) => order.has_stick)?.robot ?? "";
+}
