@@ -105,9 +105,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[Accepts | None] = (
-        ArcNotice | ChildReport | AskBehavior | TakeBranch | BreakOff | ListViews | Look
-    )
+    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior | TakeBranch | BreakOff | ListViews | Look
     children_together: ClassVar[bool] = True
     children_allowed: ClassVar[tuple[int, int] | None] = None
     may_claim: ClassVar[bool] = True

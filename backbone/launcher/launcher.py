@@ -47,7 +47,7 @@ from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
-from backbone.waiting import first_of
+from backbone.waiting import end_tasks, first_of
 from backbone.wire import Accepts, Envelope, Message
 
 log = logging.getLogger(__name__)

@@ -1,4 +1,4 @@
-"""Messages of the launcher: about the behavior tree of a running mission, which it owns, and about the mission's end."""
+"""Messages of the launcher: about the tree of a running mission, which it owns, and about the mission's end."""
 
 from __future__ import annotations
 
