@@ -25,7 +25,7 @@ from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
 from resource_pool.arc_request import ROBOT, claim_parameters
 from resource_pool.commands import Command, Drive, Halt, Jump, Move, WrongCommand
-from resource_pool.localization import AskPose, Pose
+from resource_pool.localization import AskHome, AskPose, LandmarkSighting, Pose
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
     Accepted,
@@ -63,11 +63,13 @@ __all__ = [
     "ArcNotice",
     "ArcState",
     "AskBeat",
+    "AskHome",
     "AskPose",
     "Command",
     "EmergencyStopped",
     "Frame",
     "GivenBeforeStop",
+    "LandmarkSighting",
     "NoSuchAction",
     "NotMyArc",
     "Noted",
