@@ -21,7 +21,7 @@ from resource_pool.localization import PoseSource
 from resource_pool.messages import COMMAND_TIMEOUT_S
 
 WAY_SHARE = 0.03  # chosen: twice the way that a Scout in the simulated room was found to lack at start and end
-TURN_SHARE = 0.08  # chosen: a Scout in the simulated room was measured to lack 3 to 6 % of a turn
+TURN_SHARE = 0.05  # chosen: a Scout in the simulated room was measured to lack 3 to 6 % of a turn
 HEADING_RAD_PER_M = 0.02  # chosen: a wheel that is 1 mm larger than the other turns a Scout about that much
 JUMP_M = 0.5  # chosen: longer than a Scout's jump over 30 cm carries it
 JUMP_RAD = math.pi / 2  # chosen: it lands on its wheels, but turned
