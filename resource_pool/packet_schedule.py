@@ -160,6 +160,7 @@ class Sending:
 
     Attributes:
         air_time_s: Its admitted time on the air.
+        kind: Kind of its stream, as the ARC's request names it.
         number: Number of its stream; -1: no stream, because it is a safe packet.
         release_s: Mission time of its release.
     """
@@ -168,6 +169,7 @@ class Sending:
     air_time_s: float
     number: int = -1
     release_s: float = math.inf
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,7 +292,7 @@ class PacketSchedule:
             repeated = replace(packet, payload=packet.afterwards, afterwards=b"", kind=MAIN_KIND, ticket=0)
             sender.main.packets[packet.network_id] = repeated
             sender.main.begin(now_s)
-        return Sending(packet, stream.usage.packet_time_s, number, release_s)
+        return Sending(packet, stream.usage.packet_time_s, number, release_s, stream.usage.kind)
 
     def sent(self, sending: Sending, begun_s: float, took_s: float) -> list[str]:
         """Record the packet's measured time on the air.

@@ -12,7 +12,7 @@ from collections import Counter
 
 from backbone.dependency_database.messages import Resource
 from backbone.ranges import LONGEST_LEASE_S
-from backbone.rc_manager.messages import RcState, most_epoch
+from backbone.rc_manager.messages import LONGEST_PACKET_S, RcState, most_epoch
 
 SKEW = 2  # chosen: clocks of two hosts may differ, so an RC may be as far ahead as two RCs together
 
@@ -31,7 +31,7 @@ def contradiction(state: RcState, resource: Resource, now_s: float, given: int |
         return f"it says that it can give {state.capacity} of its time"
     if not 0 <= state.last_epoch <= SKEW * most_epoch(now_s):
         return f"it says that it saw epoch {state.last_epoch}, above any epoch given until now"
-    return _contradiction_of_holders(state, resource, now_s, given)
+    return _contradiction_of_holders(state, resource, now_s, given) or _contradiction_of_packets(state, resource)
 
 
 def _contradiction_of_holders(state: RcState, resource: Resource, now_s: float, given: int | None) -> str:
@@ -47,4 +47,19 @@ def _contradiction_of_holders(state: RcState, resource: Resource, now_s: float, 
             return f"it says that {holder.arc} holds it under epoch {holder.epoch}, which was never granted"
         if not holder.lease_until_s <= now_s + SKEW * LONGEST_LEASE_S:
             return f"it says that {holder.arc} holds it until {holder.lease_until_s:g} s"
+    return ""
+
+
+def _contradiction_of_packets(state: RcState, resource: Resource) -> str:
+    if state.measured and not resource.sharable:
+        return "it says how long packets take, and is not sharable"
+    holders = {holder.arc for holder in state.holders}
+    for (arc, kind), times in Counter((one.arc, one.kind) for one in state.measured).items():
+        if arc not in holders:
+            return f"it says how long packets of {arc} take, which does not hold it"
+        if times > 1:
+            return f"it says {times} times how long the {kind} packets of {arc} take"
+    for one in state.measured:
+        if not 0 < one.packet_time_s <= LONGEST_PACKET_S:
+            return f"it says that a packet of {one.arc} takes {one.packet_time_s:g} s"
     return ""

@@ -23,6 +23,7 @@ from backbone.ranges import (
     Instant,
     LeaseSeconds,
     Mention,
+    Period,
     Priority,
     Rank,
     RunTime,
@@ -38,6 +39,7 @@ EPOCHS_PER_S = 1000  # chosen: a restarted RC begins above all its earlier epoch
 EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s
 BEAT_EVERY_S = 0.3  # chosen: ARC to RC manager; a hung ARC is noticed within BEAT_MISSED_S
 BEAT_MISSED_S = 1.0  # chosen: three beats
+LONGEST_PACKET_S = 10.0  # chosen: a radio gives a packet up after a second; a longer time is a fault of its driver
 
 
 # ---------------------------------------------------------------------- requests of ARCs
@@ -209,6 +211,19 @@ class AskRc(Message, frozen=True):
     """Ask an RC for its state."""
 
 
+class MeasuredPackets(Message, frozen=True):
+    """Packets that take longer on the air than their ARC declared.
+
+    Attributes:
+        kind: Of their stream, as the request names it.
+        packet_time_s: The longest time of one of them until now, above 0, at most ``LONGEST_PACKET_S``.
+    """
+
+    arc: Mention
+    kind: Mention
+    packet_time_s: Period
+
+
 class RcState(Message, frozen=True):
     """Answer to ``AskRc``: the state of this RC, which is the truth.
 
@@ -220,6 +235,8 @@ class RcState(Message, frozen=True):
         applied: Commands applied since its start.
         refused_stale: Commands of an older epoch or another ARC it refused.
         feedback: One line for people.
+        measured: What it measured of its present holders' packets, where that is longer than they declared; each kind
+            of packets of an ARC once.
     """
 
     name: Mention
@@ -231,6 +248,7 @@ class RcState(Message, frozen=True):
     applied: Count
     refused_stale: Count
     feedback: Text = ""
+    measured: Annotated[list[MeasuredPackets], MANY] = []
 
 
 class Leases(Message, frozen=True):

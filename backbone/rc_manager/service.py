@@ -69,6 +69,7 @@ from backbone.scheduling.events import (
     NodeMoved,
     Opened,
     OpenFailed,
+    PacketsMeasured,
     PriorityChanged,
     RcCameBack,
     RcWentDown,
@@ -358,6 +359,8 @@ class RcManager(Component[RcManagerParameters]):
         for arc, current in found.arcs.items():
             if current.rcs and self._resources.keys() >= {*current.rcs} and not found.holds_rightly(arc):
                 self._admit(current.request, tuple(current.rcs))
+        for state in found.rcs.values():
+            self._heard_of_packets(state)
 
     def _heard_from_nameserver(self, envelope: Envelope[Message]) -> None:
         match envelope.body:
@@ -379,6 +382,7 @@ class RcManager(Component[RcManagerParameters]):
         if not self._rcs.believes(state):
             return
         self.happened(CapacityChanged(rc, state.capacity))
+        self._heard_of_packets(state)
         holds = {(holder.arc, holder.epoch) for holder in state.holders}
         if any(
             lease.rc == rc and lease.epoch <= state.last_epoch and (lease.arc, lease.epoch) not in holds
@@ -387,6 +391,12 @@ class RcManager(Component[RcManagerParameters]):
         ):
             self.story.note(rc, "does not have all holds any more that it was given")
             self.happened(RcCameBack(rc, state.last_epoch))
+
+    def _heard_of_packets(self, state: RcState) -> None:
+        """Pass on which packets take longer than declared."""
+        if state.measured:
+            times = {(one.arc, one.kind): one.packet_time_s for one in state.measured}
+            self.happened(PacketsMeasured(state.name, times))
 
     def _leases(self) -> list[Lease]:
         """Return what is to be renewed: all that is held, but for what is just being given back."""

@@ -84,7 +84,8 @@ class RadioDriver(Protocol):
         """Return when the packet is on the air. Not: queue it. The arguments after ``payload`` are for audits only.
 
         Returns:
-            Its time on the air from the call on, mission seconds; None: the duration of this call.
+            Its time on the air from the call on, mission seconds, by which the RC manager plans if it is longer than
+            declared; None: about the duration of this call, which raises an alarm only.
 
         Raises:
             HardwareFault: The packet was not sent.

@@ -3,7 +3,9 @@
 Rules of this file:
 
 * One packet at a time is on the air, and each keeps it for its packet time, or longer if it takes longer.
-* All packets but safe packets are sent in admitted turns. If an ARC declared too little time, the radio logs it.
+* All packets but safe packets are sent in admitted turns. If an ARC declared too little time, the radio logs it, and
+  tells the RC manager the longest time, if the driver reports times on the air. The duration of a call of the driver
+  is no such time: it has the pauses of this process in it.
 * The last packet to each robot of an ARC is its safe packet. The radio repeats a failed safe packet until it is sent.
 * A reply is published as it came; three lost in a row are one warning, the next reply one notice.
 * If the radio fails while it serves its streams, this RC ends; its creator restarts it and it opens the device again.
@@ -21,13 +23,15 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 
+import msgspec
+
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address, component_of
-from backbone.rc_manager.messages import StaleEpoch
+from backbone.rc_manager.messages import RcState, StaleEpoch
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import AnsweringRadio, HardwareFault, RadioDriver
@@ -44,6 +48,7 @@ from resource_pool.messages import (
 )
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
 from resource_pool.resource_controller import RcParameters, ResourceController
+from resource_pool.slow_packets import EVERY_S, SlowPackets
 from resource_pool.stop_messages import GivenBeforeStop
 
 log = logging.getLogger(__name__)
@@ -71,6 +76,7 @@ class CommandRadio(ResourceController[RcParameters]):
         super().__init__(launch, bus, clock)
         self._driver: RadioDriver = self.make_driver()
         self._schedule = PacketSchedule()
+        self._slow = SlowPackets(EVERY_S * max(1.0, clock.rate))
         self._owed: deque[Sending] = deque()
         self._air = asyncio.Lock()
         self._air_free_s = 0.0
@@ -102,6 +108,7 @@ class CommandRadio(ResourceController[RcParameters]):
             self._schedule.connect(hold.arc, hold.use.streams or [DEFAULT_DRIVE_USAGE], hold.rank)
         except ValueError as error:
             raise ImpossibleUse(f"{self.name}: {error}") from None
+        self._slow.forget(hold.arc)  # of an earlier connection, whose last packet was under way at its end
 
     async def make_safe(self, hold: Hold) -> None:
         """Drop the ARC's packets, and send its robots their safe packets last."""
@@ -112,6 +119,7 @@ class CommandRadio(ResourceController[RcParameters]):
             )
             self._overruns += count.overruns
         self._owed += self._schedule.disconnect(hold.arc)
+        self._slow.forget(hold.arc)
         for waiting in [one for one in self._waiting.values() if one.arc == hold.arc]:
             self._settle(waiting, StaleEpoch(f"{hold.arc} lost {self.name} before its packet's turn", epoch=hold.epoch))
         async with self._air:
@@ -155,6 +163,11 @@ class CommandRadio(ResourceController[RcParameters]):
             and source == address(Subsystem.RESOURCE_POOL, robot)
             and hold.companions.get(robot) == order.robot_epoch
         )
+
+    def rc_state(self) -> RcState:
+        """Return also the packets that take longer than declared."""
+        measured = self._slow.told([hold.arc for hold in self.holds.holds()])
+        return msgspec.structs.replace(super().rc_state(), measured=measured)
 
     def statistics(self) -> dict[str, float]:
         """Count packets, overruns and replies, in all and of the ARCs now connected, and measure times on the air."""
@@ -282,9 +295,16 @@ class CommandRadio(ResourceController[RcParameters]):
         self._sent += 1
         self._on_air_s += took_s
         self._worst_packet_s = max(self._worst_packet_s, took_s)
+        if sending.number >= 0 and reported_s is not None:
+            self._measured(sending, reported_s)
         for news in self._schedule.sent(sending, begun_s, took_s):
             log.warning("%s: %s", packet.arc, news)
             self.publish_event(packet.arc, f"on {self.name}: {news}")
+
+    def _measured(self, sending: Sending, took_s: float) -> None:
+        """Publish the longest time of these packets if it is longer than declared, and news."""
+        if self._slow.took(sending.packet.arc, sending.kind, sending.air_time_s, took_s, self.clock.now_s()):
+            self.changed()
 
 
 def _packet(order: LoadPacket, now_s: float) -> Packet:

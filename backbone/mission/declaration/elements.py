@@ -201,7 +201,11 @@ class ArcAttributes(Declared):
         default=0.05, description="Interval between its radio packets, seconds, above 0, at most a day."
     )
     packet_time_s: Duration = Field(
-        default=0.002, description="Time one of its radio packets is on the air, seconds, above 0, at most a day."
+        default=0.002,
+        description=(
+            "Time one of its radio packets is on the air, seconds, above 0, at most a day; a longer one that the radio "
+            "measures counts instead."
+        ),
     )
 
 

@@ -16,7 +16,7 @@ from backbone.bus.clock import run_virtual
 from backbone.dependency_database.messages import Resource
 from backbone.keys import Conversation
 from backbone.rc_manager.credibility import contradiction
-from backbone.rc_manager.messages import AskWhy, RcState, most_epoch
+from backbone.rc_manager.messages import LONGEST_PACKET_S, AskWhy, MeasuredPackets, RcState, most_epoch
 from backbone.scheduling.requests import Holder, RequestState, Scheduled
 from backbone.scheduling.views import Why
 from backbone.wire import MalformedMessage
@@ -25,6 +25,7 @@ VIDEO = Resource("video", "video_frequency")
 RADIO = Resource("radio", "command_radio", sharable=True)
 NOW_S = 100.0
 HOLDER = Holder("one", 7, 90.0, 102.0)
+SLOW = MeasuredPackets("one", "drive", 0.0043)
 FREE = RcState("video", "video_frequency", False, 1.0, [], 7, 0, 0)
 NONSENSE = {
     "another name": replace(FREE, name="radio"),
@@ -39,12 +40,32 @@ NONSENSE = {
     "a holder never granted": replace(FREE, last_epoch=9, holders=[replace(HOLDER, epoch=8)]),
     "a lease of 1e9 s": replace(FREE, holders=[replace(HOLDER, lease_until_s=1e9)]),
     "a lease of nan": replace(FREE, holders=[replace(HOLDER, lease_until_s=math.nan)]),
+    "packets, and not sharable": replace(FREE, holders=[HOLDER], measured=[SLOW]),
+}
+SENDS = replace(FREE, name="radio", holders=[HOLDER], measured=[SLOW])
+NONSENSE_OF_PACKETS = {
+    "packets of a stranger": replace(SENDS, measured=[replace(SLOW, arc="two")]),
+    "one kind of packets twice": replace(SENDS, measured=[SLOW, replace(SLOW, packet_time_s=0.005)]),
+    **{
+        f"packets of {takes_s} s": replace(SENDS, measured=[replace(SLOW, packet_time_s=takes_s)])
+        for takes_s in (0.0, -0.001, LONGEST_PACKET_S * 1.001, math.nan, math.inf)
+    },
 }
 
 
 @pytest.mark.parametrize("state", NONSENSE.values(), ids=NONSENSE)
 def test_what_cannot_be_is_named(state: RcState) -> None:
     assert contradiction(state, VIDEO, NOW_S, given=7)
+
+
+@pytest.mark.parametrize("state", NONSENSE_OF_PACKETS.values(), ids=NONSENSE_OF_PACKETS)
+def test_packets_that_cannot_be_are_named(state: RcState) -> None:
+    assert "packet" in contradiction(state, RADIO, NOW_S, given=7)
+
+
+def test_packets_that_can_be_are_believed() -> None:
+    other = replace(SLOW, kind="transmitter", packet_time_s=LONGEST_PACKET_S)
+    assert contradiction(replace(SENDS, measured=[SLOW, other]), RADIO, NOW_S, given=7) == ""
 
 
 def test_what_can_be_is_believed() -> None:
