@@ -30,6 +30,7 @@ from ui_console.design.views import (
 )
 from ui_console.model import views
 from ui_console.model.arc_abilities import ArcAbilities
+from ui_console.model.debug_views import SeenViews
 from ui_console.model.timeline import TimelineView
 from ui_console.web.login import BeatRequest, Hello
 from ui_console.web.protocol import Intent
@@ -89,6 +90,7 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     components: list[ComponentState]
     log: list[LoggedEvent]
     now_s: float
+    seen: SeenViews
     beat: int
 
 

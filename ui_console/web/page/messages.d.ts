@@ -304,6 +304,12 @@ export interface RoleCommand {
   labels: string[];
 }
 
+export interface SeenViews {
+  behavior: string;
+  views: ViewRow[];
+  trouble: string;
+}
+
 export interface SetAnswer {
   set: string;
   parameter: string;
@@ -389,7 +395,14 @@ export interface View {
   components: ComponentState[];
   log: LoggedEvent[];
   now_s: number;
+  seen: SeenViews;
   beat: number;
+}
+
+export interface ViewRow {
+  view: string;
+  is_picture: boolean;
+  text: string;
 }
 
 export interface Welcomed {
@@ -453,6 +466,12 @@ export interface LiftRequest {
   do: "lift";
   robot: string;
   number: number;
+}
+
+export interface LookInto {
+  do: "look";
+  behavior?: string;
+  view?: string;
 }
 
 export interface MayI {
@@ -555,6 +574,7 @@ export type Said =
   | LiftRequest
   | Watch
   | Drawn
+  | LookInto
   | WhyRequest
   | SearchLog
   | MoreLog
