@@ -30,6 +30,7 @@ from ui_console.design.views import (
 )
 from ui_console.model import views
 from ui_console.model.arc_abilities import ArcAbilities
+from ui_console.model.debug_views import SeenViews
 from ui_console.model.map import BodyView, FloorView
 from ui_console.model.order_views import OrderView
 from ui_console.model.timeline import TimelineView
@@ -94,6 +95,7 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bodies: list[BodyView]
     orders: list[OrderView]
     now_s: float
+    seen: SeenViews
     beat: int
 
 

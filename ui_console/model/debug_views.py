@@ -23,6 +23,20 @@ class ViewRow(msgspec.Struct, frozen=True):
     text: str = ""
 
 
+class SeenViews(msgspec.Struct, frozen=True):
+    """The views of the behavior that a page looks into.
+
+    Attributes:
+        behavior: Its name; empty: none is looked into.
+        views: Those it has shown so far, with their newest values.
+        trouble: Why there are none; empty: there is no trouble.
+    """
+
+    behavior: str = ""
+    views: list[ViewRow] = []
+    trouble: str = ""
+
+
 def view_rows(entries: Sequence[ViewEntry]) -> list[ViewRow]:
     """Return a row for each view, in the same order."""
     return [_picture_row(entry) if entry.kind is ViewKind.PICTURE else _value_row(entry) for entry in entries]

@@ -23,6 +23,7 @@ from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
+from ui_console.model.debug_views import SeenViews
 from ui_console.model.events import ConsoleEvent, Heard
 from ui_console.model.orders import Order
 from ui_console.model.team import TeamModel
@@ -36,6 +37,7 @@ from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
 from ui_console.web.pictures import jpeg, packet
 from ui_console.web.protocol import Intent
+from ui_console.web.sights import Sights
 
 log = logging.getLogger(__name__)
 
@@ -83,6 +85,8 @@ class WebHub:
         self._arcs: dict[str, str] = {}
         self._streams: dict[str, tuple[str, Subscription]] = {}
         self._numbers: dict[str, int] = {}
+        self.sights = Sights(bus, clock, lambda: self.clients, self.observer.start_task)
+        """The debug views that its operators look at."""
         self._consoles = itertools.count(1)
         self._has_operators = asyncio.Event()
         self._told_s: dict[ViolationKind, float] = {}
@@ -98,6 +102,7 @@ class WebHub:
         operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))
         self._send_tables([operator.outbox])
         self._send_map([operator.outbox])
+        operator.show_views(SeenViews())
         operator.refresh(self.clock.now_s())
         self._say(OperatorAction.ATTACH, welcome.user, f"with priority {welcome.priority}")
         self._watch_map()
@@ -193,6 +198,10 @@ class WebHub:
                 del self._streams[robot]
         for robot in wanted.keys() - self._streams.keys():
             self._streams[robot] = (wanted[robot], self._listen(robot, wanted[robot]))
+
+    def sights_changed(self) -> None:
+        """Look at the debug views that an operator looks at, and at no others."""
+        self.sights.changed()
 
     def attention_changed(self) -> None:
         """Note whether any operator looks after the mission."""

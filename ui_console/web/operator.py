@@ -15,6 +15,7 @@ from backbone.errors import LinkError, Refusal, code_of
 from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
+from ui_console.model.debug_views import SeenViews
 from ui_console.model.driving import STICK_LASTS_S, GiveWish, HaltWish, move_by_stick
 from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, OrderChanged, PictureSeen, failed
 from ui_console.model.orders import Order
@@ -28,6 +29,7 @@ from ui_console.web.found_log import FoundLog
 from ui_console.web.login import Welcome
 from ui_console.web.ordering import Ordering
 from ui_console.web.outbox import Outbox
+from ui_console.web.sights import Sight
 
 log = logging.getLogger(__name__)
 
@@ -66,6 +68,9 @@ class OperatorServices(Protocol):
     def attention_changed(self) -> None:
         """Note that an operator came or went."""
 
+    def sights_changed(self) -> None:
+        """Note that an operator looks at other debug views."""
+
 
 class Operator:
     """A person at a browser, from the right token to the end of the connection.
@@ -81,6 +86,8 @@ class Operator:
         self.news = asyncio.Event()
         """Set when there is something to send."""
         self.is_there = True
+        self.sight = Sight()
+        """The debug views that this page shows."""
         self.model = ConsoleModel(welcome.user, welcome.user, services.team)
         self.answers = ConsentAnswers(welcome.user, services.clock, self.show, services.observer.acted)
         """The questions of others to this person."""
@@ -113,6 +120,8 @@ class Operator:
             case protocol.Watch(robots):
                 self.outbox.watch(frozenset(robots))  # also unknown ones: a page may be older than the server
                 self._services.watching_changed()
+            case protocol.LookInto(behavior, view):
+                self._look(Sight(behavior, view))
             case protocol.Acknowledge(key):
                 self._acknowledge(key)
             case protocol.MoreLog(number, first):
@@ -160,6 +169,7 @@ class Operator:
             console.end(reason)
             await asyncio.wait({life})
         self._services.watching_changed()
+        self._services.sights_changed()
         self._services.attention_changed()
 
     # ------------------------------------------------------------------ messages to the browser
@@ -182,6 +192,16 @@ class Operator:
             self.model.apply(PictureSeen(self._services.clock.now_s(), captured_s, robot))
             self.outbox.put_picture(robot, number, captured_s, packet)
             self.news.set()
+
+    def show_views(self, seen: SeenViews) -> None:
+        """Send the list of a behavior's debug views."""
+        self.outbox.put_section("seen", msgspec.json.encode(seen))
+        self.news.set()
+
+    def saw_view(self, stream: str, number: int, at_s: float, packed: bytes) -> None:
+        """Send a picture of a debug view."""
+        self.outbox.put_picture(stream, number, at_s, packed)
+        self.news.set()
 
     def refresh(self, now_s: float) -> None:
         """Send the changes of this operator's own part of the view, and of the alarms."""
@@ -235,9 +255,17 @@ class Operator:
         self.news.set()
         if captured_s is not None:
             self._ordering.drawn(robot, captured_s)
+        if captured_s is not None and robot != self.sight.stream:
             took_s = max(0.0, self._services.clock.now_s() - captured_s)
             before_s = self._latency_s.get(robot, took_s)
             self._latency_s[robot] = before_s + LATENCY_STEP * (took_s - before_s)
+
+    def _look(self, sight: Sight) -> None:
+        if sight.behavior != self.sight.behavior:
+            self.show_views(SeenViews(sight.behavior))
+        self.sight = sight
+        self.outbox.look(sight.stream)
+        self._services.sights_changed()
 
     def _acknowledge(self, key: str) -> None:
         seen = self.model.acknowledge(key)

@@ -35,6 +35,8 @@ class Outbox:
         self._unsent: dict[str, None] = {}
         self._answers: deque[bytes] = deque(maxlen=ANSWERS_KEPT)
         self._streams: dict[str, _PictureStream] = {}
+        self._robots = frozenset[str]()
+        self._view = ""
         self._turns = 0
         self.skipped = 0
         """Pictures that a newer one replaced before they were sent."""
@@ -60,13 +62,23 @@ class Outbox:
         self._answers.append(body)
 
     def watch(self, robots: frozenset[str]) -> None:
-        """Show these robots' pictures and no others."""
-        self._streams = {robot: self._streams.get(robot) or _PictureStream() for robot in sorted(robots)}
+        """Show these robots' pictures, and those of the view that is looked at, and no others."""
+        self._robots = robots
+        self._keep_streams()
+
+    def look(self, view: str) -> None:
+        """Show the pictures of this debug view beside those of robots; empty: of none."""
+        self._view = view
+        self._keep_streams()
+
+    def _keep_streams(self) -> None:
+        names = sorted(self._robots | ({self._view} if self._view else set()))
+        self._streams = {name: self._streams.get(name) or _PictureStream() for name in names}
 
     @property
     def watched(self) -> frozenset[str]:
         """Robots whose pictures are shown."""
-        return frozenset(self._streams)
+        return self._robots
 
     def put_picture(self, robot: str, number: int, captured_s: float, packet: bytes) -> None:
         """Queue a picture in place of an older one of that robot; do nothing if the browser does not watch it."""

@@ -168,6 +168,18 @@ class Drawn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     number: Annotated[int, msgspec.Meta(ge=0, le=2**32 - 1)]
 
 
+class LookInto(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="look"):
+    """Show the debug views of a behavior, and the pictures of one of them.
+
+    Attributes:
+        behavior: Name; empty: look into none.
+        view: Name of the picture; empty: none.
+    """
+
+    behavior: ShortText = ""
+    view: ShortText = ""
+
+
 class WhyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="why"):
     """Explain the state of a component or request."""
 
@@ -239,6 +251,7 @@ Intent = (
     | LiftRequest
     | Watch
     | Drawn
+    | LookInto
     | WhyRequest
     | SearchLog
     | MoreLog

@@ -118,7 +118,7 @@ def test_a_picture_arrives_as_it_was_but_for_little() -> None:
     assert np.abs(shown.astype(int) - picture).mean() < 2.0
 
 
-@pytest.mark.parametrize("picture", [np.zeros((0, 3), np.uint8), np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2))])
+@pytest.mark.parametrize("picture", [np.zeros((0, 3), np.uint8), np.zeros((2, 2, 4), np.uint8), np.zeros((2, 2))])
 def test_what_is_no_picture_is_refused(picture: object) -> None:
     with pytest.raises(ValueError, match="grey levels"):
         jpeg(picture)  # type: ignore[arg-type]

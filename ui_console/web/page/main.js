@@ -13,23 +13,33 @@ import { Login } from "./login.js";
 import { RobotMap } from "./map.js";
 import { notice, read, showAlarm, showHealth } from "./notices.js";
 import { Orders } from "./orders.js";
+import { Seen } from "./seen.js";
 import { Stopping } from "./stopping.js";
 import { Tables } from "./tables.js";
 import { seconds, set } from "./text.js";
 import { followTheme } from "./theme.js";
 
 /** @import { Answer, Heard, OrderKind, Said, View } from "./messages.d.ts" */
-/** @import { Act, LinkChange, More, Say, Tap } from "./types.d.ts" */
+/** @import { Act, LinkChange, More, Picture, Say, Tap } from "./types.d.ts" */
 
 const TOUCHED_EVERY_MS = 5000; // chosen: far below the two minutes after which the operator counts as away
 /** @type {Partial<View>} */
 const view = {};
 
 /** @type {Link<Heard, Said>} */
-const link = new Link({ heard, saw: (picture) => cards.saw(picture), changed });
+const link = new Link({ heard, saw, changed });
 /** @type {Say} */
 const say = (message) => link.say(message);
 const cards = new Cards({ stage: find("stage"), thumbs: find("thumbs"), say, act });
+const seen = new Seen({
+  panel: find("seen-panel", HTMLDetailsElement),
+  behavior: find("seen-behavior", HTMLSelectElement),
+  view: find("seen-view", HTMLSelectElement),
+  told: find("seen-told"),
+  values: find("seen-values"),
+  place: find("seen-place"),
+  say,
+});
 const log = new Log({
   form: find("log-search", HTMLFormElement),
   status: find("log-status"),
@@ -85,7 +95,10 @@ function changed({ is, why, ageMs }) {
     cards.cut();
     log.cut();
   }
-  if (is === "fresh") cards.watch();
+  if (is === "fresh") {
+    cards.watch();
+    seen.again();
+  }
   if (is === "refused") {
     find("console").hidden = true;
     login.ask(why);
@@ -94,6 +107,12 @@ function changed({ is, why, ageMs }) {
 }
 
 // ---------------------------------------------------------------- messages of the server
+/** @param {Picture} picture Of a robot, or of a view, whose names have a slash. */
+function saw(picture) {
+  if (picture.robot.includes("/")) seen.saw(picture);
+  else cards.saw(picture);
+}
+
 /** @param {Heard} message */
 function heard(message) {
   if (message.answer) {
@@ -125,6 +144,8 @@ function heard(message) {
     nameStop();
   }
   if (changes.health !== undefined) showHealth(changes.health);
+  if (changes.components) seen.know(changes.components);
+  if (changes.seen) seen.heard(changes.seen);
   if (changes.alarms) showAlarm(changes.alarms, act);
   if (changes.welcome || changes.robots || changes.log) log.know(view);
   tables.show(view, changes);

@@ -352,6 +352,12 @@ export interface RoleCommand {
   labels: string[];
 }
 
+export interface SeenViews {
+  behavior: string;
+  views: ViewRow[];
+  trouble: string;
+}
+
 export interface SetAnswer {
   set: string;
   parameter: string;
@@ -447,7 +453,14 @@ export interface View {
   bodies: BodyView[];
   orders: OrderView[];
   now_s: number;
+  seen: SeenViews;
   beat: number;
+}
+
+export interface ViewRow {
+  view: string;
+  is_picture: boolean;
+  text: string;
 }
 
 export interface Welcomed {
@@ -516,6 +529,12 @@ export interface LiftRequest {
   do: "lift";
   robot: string;
   number: number;
+}
+
+export interface LookInto {
+  do: "look";
+  behavior?: string;
+  view?: string;
 }
 
 export interface MayI {
@@ -642,6 +661,7 @@ export type Said =
   | LiftRequest
   | Watch
   | Drawn
+  | LookInto
   | WhyRequest
   | SearchLog
   | MoreLog

@@ -1,0 +1,122 @@
+"""Debug views that browsers look at: each is looked at once, however many look, and packed once."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+from collections.abc import Callable, Coroutine, Iterable
+from typing import NamedTuple, Protocol
+
+from backbone.bus.interface import Bus, Clock
+from backbone.debug_views import ViewPicture, ViewValue
+from backbone.errors import LinkError, Refusal
+from backbone.naming import Subsystem, address
+from backbone.printable import printable_all
+from ui_console.model.debug_views import SeenViews, view_rows
+from ui_console.session.looking import keep_looking, pixels_of, views_of
+from ui_console.web.pictures import jpeg, packet
+
+log = logging.getLogger(__name__)
+
+LIST_EVERY_S = 1.0  # chosen: values are read, not followed; seconds of the machine
+
+
+class Sight(NamedTuple):
+    """What a page looks at.
+
+    Attributes:
+        behavior: Name; empty: nothing.
+        view: Name of the picture; empty: only the list.
+    """
+
+    behavior: str = ""
+    view: str = ""
+
+    @property
+    def stream(self) -> str:
+        """Name of its pictures beside those of robots, whose names have no slash; empty: it has none."""
+        return f"{self.behavior}/{self.view}" if self.behavior and self.view else ""
+
+
+class Looker(Protocol):
+    """A browser that looks at debug views."""
+
+    sight: Sight
+
+    def show_views(self, seen: SeenViews) -> None:
+        """Show the list of a behavior."""
+
+    def saw_view(self, stream: str, number: int, at_s: float, packed: bytes) -> None:
+        """Show a picture of a view."""
+
+
+class Sights:
+    """Looks at what its clients look at, and at nothing else.
+
+    Args:
+        bus: Of the server.
+        clock: The mission's.
+        clients: Returns the browsers that are there.
+        start_task: Runs a coroutine until the server ends; its bug is the server's.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        clients: Callable[[], Iterable[Looker]],
+        start_task: Callable[[Coroutine[object, None, None], str], asyncio.Task[None]],
+    ) -> None:
+        self._bus, self._clock, self._clients, self._start_task = bus, clock, clients, start_task
+        self._looks: dict[Sight, asyncio.Task[None]] = {}
+        self._numbers = itertools.count(1)
+
+    @property
+    def looked_at(self) -> frozenset[Sight]:
+        """Every list and picture that somebody looks at."""
+        return frozenset(self._looks)
+
+    def changed(self) -> None:
+        """Begin and end looks, because a client came, went, or looks at something else."""
+        sights = [client.sight for client in self._clients() if client.sight.behavior]
+        wanted = {Sight(one.behavior) for one in sights} | {one for one in sights if one.view}
+        for sight in self._looks.keys() - wanted:
+            self._looks.pop(sight).cancel()
+        for sight in wanted - self._looks.keys():
+            work = self._look(sight) if sight.view else self._list(sight.behavior)
+            self._looks[sight] = self._start_task(work, f"look at {sight.behavior} {sight.view}")
+
+    async def _list(self, behavior: str) -> None:
+        while True:
+            try:
+                entries = (await views_of(self._bus, address(Subsystem.MISSION_CONTROL, behavior))).views
+                seen = SeenViews(behavior, view_rows(entries))
+            except Refusal as refusal:
+                seen = SeenViews(behavior, [], refusal.detail)
+            except LinkError as error:
+                seen = SeenViews(behavior, [], f"no answer: {error}")
+            for client in self._clients():
+                if client.sight.behavior == behavior:
+                    client.show_views(printable_all(seen))
+            await self._clock.sleep_s(LIST_EVERY_S * self._clock.rate)
+
+    async def _look(self, sight: Sight) -> None:
+        def saw(shown: ViewPicture | ViewValue) -> None:
+            if isinstance(shown, ViewPicture) and shown.pixels:
+                self._show(sight, shown)
+
+        while True:
+            try:
+                at = address(Subsystem.MISSION_CONTROL, sight.behavior)
+                await keep_looking(self._bus, self._clock, at, sight.view, saw)
+            except (Refusal, LinkError) as error:  # the page shows the list's trouble and the picture's age
+                log.info("%s is not seen: %s", sight.stream, error)
+            await self._clock.sleep_s(LIST_EVERY_S * self._clock.rate)
+
+    def _show(self, sight: Sight, shown: ViewPicture) -> None:
+        number = next(self._numbers)
+        packed = packet(sight.stream, number, shown.at_s, jpeg(pixels_of(shown)))
+        for client in self._clients():
+            if client.sight == sight:
+                client.saw_view(sight.stream, number, shown.at_s, packed)
