@@ -10,10 +10,10 @@ const RATE_OVER_MS = 2000; // chosen: a rate a person can read
 
 /**
  * Draws the newest picture only; `drawn` is called with the number of each picture that is on the screen, `tapped` with
- * the point of a fresh picture that was tapped, null for an old one.
+ * the point of a fresh picture that was tapped, null for an old one; without it the picture takes no taps.
  */
 export class Screen {
-  /** @param {{ name: string, drawn: (number: number) => void, tapped: (tap: Tap | null) => void }} given */
+  /** @param {{ name: string, drawn: (number: number) => void, tapped?: (tap: Tap | null) => void }} given */
   constructor({ name, drawn, tapped }) {
     this.drawn = drawn;
     this.root = make("div", "screen");
@@ -22,7 +22,7 @@ export class Screen {
     this.canvas.height = 240;
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `picture of ${name}`);
-    this.canvas.addEventListener("click", (event) => this.tap(event, tapped));
+    if (tapped) this.canvas.addEventListener("click", (event) => this.tap(event, tapped));
     this.age = make("span", "age");
     this.root.append(this.canvas, this.age);
     this.drawnAt = 0;
