@@ -39,7 +39,6 @@ LONGEST_SOURCE = LONGEST_MENTION - 18  # leaves room for ``#<sequence>``
 LONGEST_LINE = 4_096  # chosen: far more than a person reads in one line
 LONGEST_TEXT = 262_144  # chosen: the names of 10 000 ARCs in one sentence
 LONGEST_DOCUMENT = 524_288  # chosen: the XML of a room with a thousand objects
-LONGEST_MISSION = 1_048_576  # as the mission's reader admits
 
 Name = Annotated[str, Meta(max_length=MAX_NAME_LENGTH, pattern=r"^[a-z][a-z0-9_-]*\Z")]
 """A legal name, see ``naming``."""
@@ -57,8 +56,6 @@ Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 """Text of several lines from a component."""
 Document = Annotated[str, Meta(max_length=LONGEST_DOCUMENT)]
 """A whole file."""
-MissionText = Annotated[str, Meta(max_length=LONGEST_MISSION)]
-"""A whole mission file."""
 
 # ---------------------------------------------------------------------- bytes
 Payload = Annotated[bytes, Meta(max_length=4_096)]  # chosen: forty times the radio's longest packet

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from backbone.errors import Refusal
-from backbone.ranges import MANY, Count, Document, Duration, Line, Mention, MissionText, Text, Values
+from backbone.ranges import MANY, Count, Document, Duration, Line, Mention, Text, Values
 from backbone.wire import Message
 
 
@@ -22,7 +22,7 @@ class Tree(Message, frozen=True):
     """
 
     version: Count
-    text: MissionText
+    text: Document
 
 
 # ---------------------------------------------------------------------- changes

@@ -98,3 +98,11 @@ def test_whatever_happens_no_child_runs_twice_and_none_after_the_end(
             assert not running
         elif isinstance(then, Decision):
             carry_out(children.decided(name, then, 0.0))
+
+
+def test_a_parent_of_no_rule_goes_on_without_children_until_it_gets_some() -> None:
+    children = Children(["a"])
+    children.begin(0.0)
+    assert children.rearranged([], (), 1.0) == [StopChild("a")]
+    assert not children.has_finished
+    assert children.rearranged(["b"], (), 2.0) == [StartChild("b")]

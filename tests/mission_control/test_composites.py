@@ -320,3 +320,40 @@ def test_a_report_that_repeats_a_suspension_does_not_prolong_the_patience() -> N
     rules.suspended("a", "higher by console-1", 4.0)
     assert rules.wakes_at_s == 6.0
     assert rules.sentence == "waits (a: higher by console-1), 1 of 2"
+
+
+def test_a_child_put_before_the_running_one_comes_after_it() -> None:
+    rules = begun(InSequence(["a", "b"]))
+    assert rules.rearranged(["new", "a", "b"], (), 1.0) == []
+    assert end(rules, "a", SUCCESS) == [StopChild("a"), StartChild("new")]
+    assert rules.sentence == "runs new, 1 of 3, after a succeeded"
+    assert end(rules, "new", SUCCESS) == [StopChild("new"), StartChild("b")]
+
+
+def test_a_composite_whose_last_child_is_removed_finishes_as_if_it_were_skipped() -> None:
+    rules = begun(InSequence(["a", "b"]))
+    end(rules, "a", SUCCESS)
+    assert rules.rearranged(["a"], (), 1.0) == [StopChild("b"), FinishParent(SUCCESS)]
+    assert rules.rearranged(["a", "c"], (), 2.0) == []
+
+
+def test_a_replaced_child_of_a_retry_has_all_attempts() -> None:
+    retry = begun(WithRetries(["a"], most=2, pause_s=5.0))
+    end(retry, "a", FAILURE, 1.0)
+    assert retry.rearranged(["a"], {"a"}, 2.0) == [StartChild("a")]
+    assert end(retry, "a", FAILURE, 3.0) == [StopChild("a")]
+    assert retry.wakes_at_s == 8.0
+
+
+def test_the_clock_of_a_timeout_goes_on_when_its_suspended_child_is_replaced() -> None:
+    rules = begun(WithTimeout(["a"], seconds=10.0))
+    rules.suspended("a", "slice", 4.0)
+    assert rules.wakes_at_s == float("inf")
+    assert rules.rearranged(["b"], (), 20.0) == [StopChild("a"), StartChild("b")]
+    assert rules.wakes_at_s == 26.0
+
+
+def test_before_its_begin_a_parent_only_notes_its_children() -> None:
+    rules = InSequence(["a"])
+    assert rules.rearranged(["b", "a"], (), 0.0) == []
+    assert rules.begin(0.0) == [StartChild("b")]

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from backbone.command_line.cli import app
 from backbone.command_line.completion import names_of, people_of, resources_of
 from backbone.command_line.options import hub_endpoint
+from backbone.command_line.tree_commands import tree
 from backbone.component.messages import ComponentState, LifeState
 from backbone.errors import HubUnreachable
 from backbone.launcher.endings import ExitCode, complaint_of
@@ -65,6 +66,15 @@ def test_a_moment_that_is_none_is_wrong_usage() -> None:
     line, code = complaint_of(NoMoment("'soon' is no moment"))
     assert code == ExitCode.USAGE
     assert "14:05" in line
+
+
+def test_the_commands_of_the_tree_are_told_whole_and_a_file_that_cannot_be_read_is_wrong_usage(tmp_path: Path) -> None:
+    told = " ".join(CliRunner().invoke(app, ["tree", "--help"]).output.split())
+    for command in tree.registered_commands:
+        assert " ".join((command.callback.__doc__ or "").split()) in told
+    done = CliRunner().invoke(app, ["tree", "add", str(tmp_path / "none.xml")])
+    assert (done.exit_code, "cannot be read" in done.stderr) == (2, True)
+    assert CliRunner().invoke(app, ["tree", "save", str(tmp_path / "x.xml")]).exit_code == 4
 
 
 # ---------------------------------------------------------------------- completion
