@@ -46,12 +46,14 @@ from backbone.rc_manager.messages import (
     TakePath,
     Withdraw,
 )
+from backbone.scheduling.requests import Usage
 from backbone.wire import Accepts, Envelope, Message, kinds_of
 from resource_pool.arc_request import ROBOT, ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
 from resource_pool.commands import OF_THE_BASE, Command, command_of
 from resource_pool.gate import Gate
 from resource_pool.messages import (
+    DEFAULT_DRIVE_USAGE,
     Accepted,
     Applied,
     ArcQuestion,
@@ -99,6 +101,8 @@ class AggregateResourceController(Component[ArcParameters]):
     """Commands of its owner, each with the role of the RC that obeys it; several roles: the command names one."""
     body: ClassVar[str] = ""
     """Role of the RC that has a body, which operators can stop; empty: none."""
+    usage: ClassVar[Usage] = DEFAULT_DRIVE_USAGE
+    """Its packets on the radio for an owner that does not say more, as a console."""
     gives_pictures: ClassVar[bool] = False
     """True if pictures of its robot are published under its address."""
 
@@ -190,7 +194,7 @@ class AggregateResourceController(Component[ArcParameters]):
         found = await ask_until_answered(
             self.bus, self.clock, DEPENDENCY_DATABASE, question, RcSets, each_s=2.0, within_s=10.0
         )
-        request = request_of(self.name, self.parameters, found.sets, frozenset(found.sharable))
+        request = request_of(self.name, self.parameters, found.sets, frozenset(found.sharable), self.usage)
         self._placed.make(request, found.sets)
         self.bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases)
 

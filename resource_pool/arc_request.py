@@ -27,8 +27,8 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         maximum_runtime_s: End of extensions; 0: the minimum.
         wish: Role → name of the RC.
         features: Role → features.
-        usage: Period, packet time, deadline, jitter (seconds) and kind of the packets on the radio.
-        further_usages: The same for each further kind of packet.
+        usages: Period, packet time, deadline, jitter (seconds) and kind of the packets on the radio, for each kind of
+            packet; none: the usage of the ARC's class.
         idle: True: the owner wants no time yet.
         stops_at_once: True: the owner needs no time to stop at the end of a slice.
         may_say_not_now: True: ask the owner shortly before the end of a slice that can be extended.
@@ -41,8 +41,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     console: bool = False
     wish: dict[str, str] = {}
     features: dict[str, list[str]] = {}
-    usage: tuple[float, float, float, float, str] = (0.05, 0.002, 0.0, 0.0, "drive")
-    further_usages: list[tuple[float, float, float, float, str]] = []
+    usages: list[tuple[float, float, float, float, str]] = []
     idle: bool = False
     stops_at_once: bool = False
     may_say_not_now: bool = False
@@ -56,7 +55,7 @@ def claim_parameters(
     maximum_runtime_s: float = 0.0,
     wish: dict[str, str] | None = None,
     features: dict[str, list[str]] | None = None,
-    usage: Usage | Sequence[Usage] = DEFAULT_DRIVE_USAGE,
+    usage: Usage | Sequence[Usage] = (),
     console: bool = False,
     idle: bool = False,
     stops_at_once: bool = False,
@@ -72,7 +71,8 @@ def claim_parameters(
         wish: Role → name of the RC (``{"scout": "scout2"}``, ``{ROBOT: "scout2"}``); roles left out: any.
         features: Role → features the RC must have (``{"scout": ["camera"]}``).
         usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
-            kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period.
+            kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period. None: what its
+            kind of ARC needs for a hand on a stick.
         console: True for consoles.
         idle: True: no time is wanted yet.
         stops_at_once: True: the owner needs no time to stop at the end of a slice. Then ``arc_suspending`` is not
@@ -80,13 +80,11 @@ def claim_parameters(
         may_say_not_now: True: the owner is asked shortly before the end of each slice that can be extended.
 
     Raises:
-        ValueError: No usage is given, or two usages have the same kind.
+        ValueError: Two usages have the same kind.
     """
     usages = [usage] if isinstance(usage, Usage) else list(usage)
-    kinds = {one.kind for one in usages}
-    if not usages or len(kinds) < len(usages):
+    if len({one.kind for one in usages}) < len(usages):
         raise ValueError(f"{owner} claims with usages of the kinds {[one.kind for one in usages]}")
-    first, *further = ([one.period_s, one.packet_time_s, one.deadline_s, one.jitter_s, one.kind] for one in usages)
     return {
         "owner": owner,
         "path": [[node.name, node.priority] for node in path],
@@ -95,8 +93,7 @@ def claim_parameters(
         "maximum_runtime_s": maximum_runtime_s,
         "wish": wish or {},
         "features": features or {},
-        "usage": first,
-        "further_usages": further,
+        "usages": [[one.period_s, one.packet_time_s, one.deadline_s, one.jitter_s, one.kind] for one in usages],
         "idle": idle,
         "stops_at_once": stops_at_once,
         "may_say_not_now": may_say_not_now,
@@ -104,7 +101,11 @@ def claim_parameters(
 
 
 def request_of(
-    arc: str, given: ArcParameters, sets: Sequence[Mapping[str, str]], sharable: AbstractSet[str]
+    arc: str,
+    given: ArcParameters,
+    sets: Sequence[Mapping[str, str]],
+    sharable: AbstractSet[str],
+    usage: Usage = DEFAULT_DRIVE_USAGE,
 ) -> SchedulingRequest:
     """Return the request of the ARC with these parameters.
 
@@ -113,13 +114,14 @@ def request_of(
         given: Its parameters.
         sets: Sets of RCs that match, each role → name.
         sharable: Names of the RCs that it uses by streams.
+        usage: What it uses if its parameters do not say.
     """
     return scheduling_request(
         arc,
         sets,
         owner=given.owner,
         path=given.path,
-        streams=[Usage(*usage) for usage in (given.usage, *given.further_usages)],
+        streams=[Usage(*one) for one in given.usages] or [usage],
         sharable=sharable,
         minimum_runtime_s=given.minimum_runtime_s,
         maximum_runtime_s=given.maximum_runtime_s,

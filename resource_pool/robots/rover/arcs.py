@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import msgspec
+
 from resource_pool.arcs.capture import CaptureArc
 from resource_pool.arcs.drive import DriveArc
 from resource_pool.commands import Command, Halt, Move
+from resource_pool.messages import DEFAULT_DRIVE_USAGE
 from resource_pool.robots.rover.rc import Grip
+
+PACKET_TIME_S = 0.005  # measured: 4.34 ms at 115.2 kbit/s, its reply included
 
 
 class RoverDriveArc(DriveArc):
@@ -17,6 +22,7 @@ class RoverDriveArc(DriveArc):
     roles: ClassVar[Sequence[str]] = ("rover", "command_radio")
     commands: ClassVar[Mapping[type[Command], str]] = dict.fromkeys((Move, Halt, Grip), "rover")
     body = "rover"
+    usage = msgspec.structs.replace(DEFAULT_DRIVE_USAGE, packet_time_s=PACKET_TIME_S)
 
 
 class RoverCaptureArc(CaptureArc):
@@ -25,3 +31,4 @@ class RoverCaptureArc(CaptureArc):
     roles: ClassVar[Sequence[str]] = (*RoverDriveArc.roles, "video_frequency", "framegrabber")
     commands = RoverDriveArc.commands
     body = "rover"
+    usage = RoverDriveArc.usage

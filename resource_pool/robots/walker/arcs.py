@@ -1,6 +1,6 @@
 """ARC kinds of a walker: drive it, or drive it and capture its video.
 
-Its packets are longer than a Scout's, so a claim declares a packet time of 3 ms, and a period of 50 ms: at 100 ms the
+Its packets are longer than a Scout's, so a claim declares a packet time of 6 ms, and a period of 50 ms: at 100 ms the
 trot keeps two thirds of its speed.
 """
 
@@ -9,9 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import msgspec
+
 from resource_pool.arcs.capture import CaptureArc
 from resource_pool.arcs.drive import DriveArc
 from resource_pool.commands import Command, Halt, Move
+from resource_pool.messages import DEFAULT_DRIVE_USAGE
+
+PACKET_TIME_S = 0.006  # measured: 5.64 ms at 115.2 kbit/s, its reply included
 
 
 class WalkerDriveArc(DriveArc):
@@ -20,6 +25,7 @@ class WalkerDriveArc(DriveArc):
     roles: ClassVar[Sequence[str]] = ("walker", "command_radio")
     commands: ClassVar[Mapping[type[Command], str]] = dict.fromkeys((Move, Halt), "walker")
     body = "walker"
+    usage = msgspec.structs.replace(DEFAULT_DRIVE_USAGE, packet_time_s=PACKET_TIME_S)
 
 
 class WalkerCaptureArc(CaptureArc):
@@ -28,3 +34,4 @@ class WalkerCaptureArc(CaptureArc):
     roles: ClassVar[Sequence[str]] = (*WalkerDriveArc.roles, "video_frequency", "framegrabber")
     commands = WalkerDriveArc.commands
     body = "walker"
+    usage = WalkerDriveArc.usage

@@ -7,11 +7,15 @@ import sys
 from pathlib import Path
 
 import pytest
-from behaviors_at_work import EXAMPLES, at_work, hear, pose, wait_until
+from behaviors_at_work import EXAMPLES, Person, at_work, driving, hear, pose, wait_until
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.mission.reader import read_mission
+from backbone.rc_manager.messages import AskAttributes, AskRc, RcState
+from backbone.scheduling.views import Attributes
 from mission_control.messages import WaypointReached
+from ui_console.session.teleoperation import Teleoperation
 
 MIXED = EXAMPLES / "mixed.xml"
 
@@ -30,6 +34,30 @@ def test_one_behavior_patrols_with_a_rover_and_with_a_scout_on_one_radio() -> No
             assert world["packets_for_no_robot"] == world["stale_packets"] == 0
 
     run_virtual(main())
+
+
+def test_a_person_who_drives_the_rover_declares_packets_as_long_as_they_are() -> None:
+    """The radio measures 4.34 ms with a reply; consoles declared 2 ms for every robot."""
+    person = Person()
+
+    async def main() -> None:
+        async with at_work(read_mission(MIXED), person) as running:
+
+            async def course(console: Teleoperation) -> None:
+                await driving(2.0, 2.0, lasts_s=3.0)(console)
+                radio = await running.bus.ask("resource_pool/radio", AskRc(), RcState, within_s=1.0)
+                assert radio.holders
+                assert radio.measured == []
+                question = AskAttributes(console.name)
+                [asked] = (await running.bus.ask(RC_MANAGER, question, Attributes, within_s=1.0)).requests
+                assert asked.uses["radio"].streams[0].packet_time_s == 0.005
+                seen.append(asked.arc)
+
+            await person.take_over("rover1", course, kind="rover_drive")
+
+    seen: list[str] = []
+    run_virtual(main())
+    assert seen
 
 
 @pytest.mark.processes
