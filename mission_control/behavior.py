@@ -28,7 +28,7 @@ from backbone.naming import Subsystem, address, component_of
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw
-from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_task, why
+from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_by_placer, end_task, why
 from mission_control.children import Children, Decision
 from mission_control.children_loop import ChildrenLoop
 from mission_control.keeper_reports import KeeperReports
@@ -131,7 +131,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             arranged=self._children_arranged,
         )
         self._suspended_because = self._reported_because = ""
-        self._is_wound_up = False
+        self._is_wound_up = self._has_begun = False
         self._parent: ParentReports | KeeperReports | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._acting: asyncio.Task[None] | None = None
@@ -169,6 +169,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Why it is not at work, see ``BehaviorState``."""
         if self.status.is_final:
             return ""
+        if self.parameters.keeper and not self._has_begun:
+            return NO_GRANT_YET
         return self._suspended_because if self.arc is not None else self._children.rules.suspended_because
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
@@ -192,7 +194,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     async def connect(self) -> None:
         """Watch the parent: a behavior, or the console of an order; the first step of a path is no behavior."""
         if self.parameters.keeper:
-            self._parent = KeeperReports(self.bus, self.clock, self.parameters.keeper, self._report, self.end)
+            self._parent = KeeperReports(self.bus, self.clock, self.parameters.keeper, self._report)
         elif len(self.path) > 2:
             parent = address(Subsystem.MISSION_CONTROL, self.path[-2][0])
             self._parent = ParentReports(self.bus, self.clock, parent, self._report, self._begin)
@@ -200,7 +202,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     async def serve(self) -> None:
         """Start, claim the ARC, start the children; then react to events."""
         if isinstance(self._parent, KeeperReports):
-            self._begin(self._parent.run(), "keeper")
+            self._begin(self._end_with_keeper(self._parent), "keeper")
+            await self._parent.wait_noted()
         await self.start()
         need = self.need()
         if need is not None and not self.status.is_final:
@@ -208,6 +211,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             self.arc.frames(self._saw)
             self._suspended_because = NO_GRANT_YET
             self._keeping = self._begin(self._keep(self.arc, need), "arc")
+        self._has_begun = True
         self._reported_because = self.suspended_because
         self._send_report()  # it takes the place of an earlier life's
         self._children.begin()
@@ -392,6 +396,15 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if self._parent is not None:
             self._is_wound_up = True
             await self._parent.conclude()
+
+    async def _end_with_keeper(self, keeper: KeeperReports) -> None:
+        """Give the robot back when the console that ordered this is over, then ask the placer to end this behavior."""
+        why_over = await keeper.run()
+        self.status = BehaviorStatus.FAILURE
+        self.publish_event(self.name, f"ends with its order: {why_over}", LogLevel.NOTICE)
+        await self._stop_acting()
+        await self._release()
+        await end_by_placer(self.bus, self.clock, self.name, f"its order is over: {why_over}")
 
     async def _keep_for_operator(self, keeper: KeeperReports) -> None:
         """Bring the robot to rest, and keep it until the console has it and ends this behavior."""

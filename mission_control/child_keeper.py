@@ -151,19 +151,7 @@ class ChildKeeper:
         """Return when the placer has ended the child, or does not have it."""
         await end_task(self._kept.pop(name, None))
         self._wishes.pop(name, None)
-        while True:
-            try:
-                await self._bus.ask(
-                    PLACER, StopComponent(name, f"{component_of(self._owner)} ends it"), Ended, within_s=START_TIME_S
-                )
-            except (LinkError, CreatorSilent) as error:
-                log.info("child %s is not stopped yet: %s", name, error)
-            except Refusal as refusal:
-                log.info("child %s: %s", name, refusal)
-                return
-            else:
-                return
-            await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+        await end_by_placer(self._bus, self._clock, name, f"{component_of(self._owner)} ends it")
 
     def _hear_creator(self, host: str) -> None:
         if host not in self._heard_creators:
@@ -177,6 +165,21 @@ class ChildKeeper:
         if fell.name in self._nodes and fell.failing:
             fell_too_often = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
             self._reported(fell.name, BehaviorStatus.FAILURE, fell_too_often, "")
+
+
+async def end_by_placer(bus: Bus, clock: Clock, name: str, reason: str) -> None:
+    """Return when the placer has ended the component of this name, or does not have it."""
+    while True:
+        try:
+            await bus.ask(PLACER, StopComponent(name, reason), Ended, within_s=START_TIME_S)
+        except (LinkError, CreatorSilent) as error:
+            log.info("%s is not stopped yet: %s", name, error)
+        except Refusal as refusal:
+            log.info("%s: %s", name, refusal)
+            return
+        else:
+            return
+        await clock.sleep_s(AGAIN_AFTER_S * clock.rate)
 
 
 async def end_task(task: asyncio.Task[None] | None) -> None:

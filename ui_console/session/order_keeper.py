@@ -32,7 +32,7 @@ from backbone.wire import Message
 from ui_console.model.events import OrderChanged
 from ui_console.model.order_book import Begin, Changed, Instruction, OrderBook, Remove, Rest, Take, Yield
 from ui_console.model.order_facts import NEEDS_PLACES, behavior_of, kind_for, localizer_of, start_of
-from ui_console.model.orders import GivenOrder, Order
+from ui_console.model.orders import GivenOrder, Order, OrderState
 from ui_console.session.claim import TeleoperationParameters
 from ui_console.session.observer import Observer
 
@@ -75,6 +75,7 @@ class OrderKeeper:
         self._book = OrderBook()
         self._carrying: dict[int, asyncio.Task[None]] = {}
         self._removals: dict[int, asyncio.Task[None]] = {}
+        self._changed = asyncio.Event()
 
     # ------------------------------------------------------------------ the operator
     @property
@@ -101,6 +102,11 @@ class OrderKeeper:
     def taken(self, robot: str) -> None:
         """Note that the stick has the robot."""
         self._do(self._book.taken(robot))
+
+    async def wait_begun(self, robot: str) -> None:
+        """Return when no order of this robot is starting: its behavior waits for the robot, or it came to nothing."""
+        while (given := self._book.orders.get(robot)) is not None and given.state is OrderState.STARTING:
+            await self._changed.wait()
 
     async def give_back(self, robot: str, why: str) -> bool:
         """End the order of this robot; return, once its behavior has let the robot go, whether it had one."""
@@ -168,6 +174,8 @@ class OrderKeeper:
                     assert_never(step)
 
     def _show(self, given: GivenOrder) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()
         self._console.show(OrderChanged(self._console.clock.now_s(), given))
         if given.state.is_final:
             why = f"{given.state}: {given.why}" if given.why else str(given.state)

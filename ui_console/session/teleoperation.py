@@ -199,11 +199,13 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def switch(self, robot: str) -> None:
         """Claim another robot in place of the present one, which is stopped and given back first.
 
-        An order of the present robot goes on, and so does one of the other robot: then the stick only turns to it.
+        An order of the present robot goes on, and so does one of the other robot: then the stick only turns to it. The
+        present robot stays with the stick until the behavior of its order can have it.
         After several calls in a row the console claims the last robot.
         """
         self._next_robot = robot
         async with self._switching:
+            await self._orders.wait_begun(self._robot)
             if robot != self._next_robot:
                 return
             if robot != self.parameters.robot:
@@ -316,7 +318,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     @property
     def _robot(self) -> str:
         """The robot that the stick is at; empty: any, or none."""
-        return self._holding or self.parameters.robot
+        return self.parameters.robot or self._holding
 
     async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool, wanted: bool) -> None:
         keeping, self._keeping = self._keeping, None

@@ -1,0 +1,378 @@
+"""Orders on a whole mission in one process: all of the backbone is real, robots of the mission's own are taken over."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from backbone.bus.clock import run_virtual
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.component_database.messages import ComponentType
+from backbone.keys import Conversation
+from backbone.mission.model import MissionDescription
+from backbone.mission.reader import read_mission
+from backbone.mission_log.operators import OperatorActed, OperatorAction
+from backbone.naming import Subsystem
+from backbone.placer.messages import Start
+from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
+from resource_pool.arc_client import lift_stop, stop_robot
+from ui_console.model.driving import MoveWish
+from ui_console.model.events import CommandApplied, ConsoleEvent, GivenBack, OrderChanged, TurnedTo
+from ui_console.model.orders import Order, OrderKind, OrderState, group
+from ui_console.session.teleoperation import Teleoperation
+
+EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
+CONSOLE = "console-7"
+FORWARD = MoveWish(0.1, 0.0)
+STARTING, RUNNING, WAITING = OrderState.STARTING, OrderState.RUNNING, OrderState.WAITING
+DONE, FAILED, ENDED = OrderState.DONE, OrderState.FAILED, OrderState.ENDED
+
+
+def patrols() -> MissionDescription:
+    """Return a mission with a patrol of scout1, and a behavior to order under the name of go_to."""
+    mission = read_mission(EXAMPLES / "behaviors.xml")
+    ahead = ComponentType("go_to", "ordered_behaviors:Ahead", Subsystem.MISSION_CONTROL)
+    types = (*(one for one in mission.types if one.name != "go_to"), ahead)
+    behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
+    return mission.model_copy(update={"behaviors": behaviors, "types": types})
+
+
+class Operator:
+    """A person at a console that keeps its ARC, and what the screens show."""
+
+    def __init__(self, running: RunningMission, made: list[Teleoperation], shown: list[ConsoleEvent]) -> None:
+        self.running, self._made, self.shown = running, made, shown
+        self.acts: list[OperatorActed] = []
+        running.bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, lambda heard: self.acts.append(heard.body))
+
+    @property
+    def console(self) -> Teleoperation:
+        return self._made[0]
+
+    @property
+    def now_s(self) -> float:
+        return self.running.clock.now_s()
+
+    async def until(self, condition: Callable[[], Any], within_s: float = 20.0) -> None:
+        until_s = self.now_s + within_s
+        while not condition():
+            assert self.now_s < until_s, (f"not within {within_s} s", self.told())
+            await self.running.clock.sleep_s(0.02)
+
+    async def holds(self, robot: str = "scout1") -> None:
+        await self.until(lambda: self.console.is_held and self.grantee(robot).startswith(CONSOLE))
+        await self.running.clock.sleep_s(1.0)
+
+    async def ordered(self, x_s: float = 0.0, robot: str = "scout1", y_m: float = 0.0, **options: Any) -> None:
+        """Order to drive ahead for so long, and return when the robot does."""
+        self.console.order(Order(OrderKind.GO_TO, robot, x_s, y_m, **options))
+        await self.until(lambda: self.state(robot) is RUNNING)
+
+    async def state_becomes(self, state: OrderState, robot: str = "scout1") -> None:
+        await self.until(lambda: self.states(robot)[-1] is state)
+
+    def state(self, robot: str = "scout1") -> OrderState | None:
+        given = self.console.orders.get(robot)
+        return given.state if given is not None else None
+
+    def states(self, robot: str = "scout1") -> list[OrderState]:
+        """The states shown, without repetitions."""
+        found = [
+            event.given.state
+            for event in self.shown
+            if isinstance(event, OrderChanged) and event.given.order.robot == robot
+        ]
+        return [state for at, state in enumerate(found) if at == 0 or found[at - 1] is not state]
+
+    def told(self) -> list[str]:
+        """What happened, for the message of a failure."""
+        orders = [f"{event.at_s:.2f} {event.given.line}" for event in self.shown if isinstance(event, OrderChanged)]
+        return [*orders, *(str(line) for line in self.running.trace if line["ev"] in ("request", "grant", "release"))]
+
+    def grants(self, robot: str = "scout1", since_s: float = 0.0) -> list[str]:
+        """The ARCs to which the robot was granted, in order."""
+        rows = [line for line in self.running.trace if line["ev"] == "grant" and line["t"] >= since_s]
+        return [str(line["arc"]) for line in rows if robot in str(line)]
+
+    def grantee(self, robot: str = "scout1") -> str:
+        return (self.grants(robot) or [""])[-1]
+
+    def behaviors(self) -> list[str]:
+        return [one for one in (f"{CONSOLE}-order-{number}" for number in range(1, 9)) if self.running.hosts.knows(one)]
+
+
+Scene = Callable[[Operator], Awaitable[None]]
+
+
+def play(scene: Scene, **parameters: Any) -> None:
+    async def main() -> None:
+        made: list[Teleoperation] = []
+        shown: list[ConsoleEvent] = []
+
+        def console(launch: Launch, bus: Bus, clock: Clock) -> Teleoperation:
+            made.append(Teleoperation(launch, bus, clock, show=shown.append, keeps_arc=True, user="anna"))
+            return made[-1]
+
+        async with mission_in_one_process(patrols(), consoles={"console": console}) as running:
+            operator = Operator(running, made, shown)
+            given = {"robot": "scout1", "priority": 100, "minimum_runtime_s": 1.0, **parameters}
+            await running.start(Start("console", CONSOLE, given))
+            await scene(operator)
+
+    run_virtual(main())
+
+
+def test_the_robot_goes_from_stick_to_order_and_back_and_is_never_free_for_the_mission() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        since_s = anna.now_s
+        await anna.ordered(3.0)
+        assert not anna.console.is_held
+        await anna.state_becomes(DONE)
+        await anna.until(lambda: anna.console.is_held)
+        assert anna.grants(since_s=since_s) == [f"{CONSOLE}-order-1-drive", f"{CONSOLE}-capture"]
+        await anna.until(lambda: not anna.behaviors())
+        assert anna.states() == [STARTING, WAITING, RUNNING, DONE]
+        assert anna.console.orders == {}
+        acts = [act.action for act in anna.acts if act.action in (OperatorAction.ORDER, OperatorAction.ORDER_END)]
+        assert acts == [OperatorAction.ORDER, OperatorAction.ORDER_END]
+
+    play(scene)
+
+
+def test_a_press_takes_the_robot_from_its_order_at_once_and_moves_it_only_after_the_next_one() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered()
+        await anna.running.clock.sleep_s(2.0)
+        since_s = anna.now_s
+        anna.console.hold(FORWARD)
+        assert anna.states()[-1] is ENDED
+        await anna.until(lambda: anna.console.is_held, within_s=0.3)
+        assert anna.grants(since_s=since_s) == [f"{CONSOLE}-capture"]
+        applied = [one for one in anna.shown if isinstance(one, CommandApplied) and one.at_s >= since_s]
+        assert {one.command for one in applied} <= {"halt"}
+        await anna.until(lambda: not anna.behaviors())
+        await anna.running.clock.sleep_s(1.0)
+        anna.console.hold(FORWARD)
+        await anna.until(lambda: any(isinstance(one, CommandApplied) and one.at_s >= since_s for one in anna.shown))
+
+    play(scene)
+
+
+def test_a_control_held_since_before_the_order_does_not_end_it() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+
+        async def hand() -> None:
+            while True:
+                anna.console.hold(FORWARD, 0.3)
+                await anna.running.clock.sleep_s(0.05)
+
+        holding = asyncio.create_task(hand())
+        await anna.running.clock.sleep_s(0.5)
+        await anna.ordered()
+        await anna.running.clock.sleep_s(2.0)
+        assert anna.state() is RUNNING
+        holding.cancel()
+        await anna.running.clock.sleep_s(0.5)
+        anna.console.hold(FORWARD, 0.3)
+        assert anna.state() is ENDED
+
+    play(scene)
+
+
+def test_a_failed_order_says_why_and_leaves_the_robot_with_the_stick() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        since_s = anna.now_s
+        await anna.ordered(1.0, y_m=-1.0)
+        await anna.until(lambda: anna.console.is_held)
+        [failed] = [one.given for one in anna.shown if isinstance(one, OrderChanged) and one.given.state is FAILED]
+        assert failed.why == "scout1 sees a wall"
+        assert not [arc for arc in anna.grants(since_s=since_s) if not arc.startswith(CONSOLE)]
+
+    play(scene)
+
+
+def test_an_order_that_says_so_gives_the_robot_back_to_the_mission() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered(1.0, then_release=True)
+        await anna.until(lambda: anna.grantee() == "patrol-scout1-drive")
+        assert anna.states()[-1] is DONE
+        assert not anna.console.is_held
+        assert not anna.behaviors()
+
+    play(scene)
+
+
+def test_giving_the_robot_back_ends_its_order() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered()
+        await anna.console.give_back()
+        assert not anna.behaviors()
+        assert anna.states()[-1] is ENDED
+        assert isinstance(anna.shown[-1], GivenBack)
+        await anna.until(lambda: anna.grantee() == "patrol-scout1-drive", within_s=1.0)
+        await anna.running.clock.sleep_s(3.0)
+        assert anna.grantee() == "patrol-scout1-drive"
+
+    play(scene)
+
+
+def test_a_newer_order_has_the_robot_right_after_the_older() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        since_s = anna.now_s
+        await anna.ordered()
+        anna.console.order(Order(OrderKind.GO_TO, "scout1", 1.0))
+        await anna.until(lambda: anna.grantee() == f"{CONSOLE}-order-2-drive")
+        await anna.until(lambda: anna.behaviors() == [f"{CONSOLE}-order-2"])
+        await anna.until(lambda: anna.console.is_held)
+        arcs = [f"{CONSOLE}-{what}" for what in ("order-1-drive", "order-2-drive", "capture")]
+        assert anna.grants(since_s=since_s) == arcs
+        assert anna.states() == [STARTING, WAITING, RUNNING, ENDED, STARTING, RUNNING, DONE]
+
+    play(scene)
+
+
+def test_one_person_holds_two_robots_and_the_order_of_the_first_goes_on() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        since_s = anna.now_s
+        await anna.ordered(6.0)
+        await anna.console.switch("scout2")
+        await anna.holds("scout2")
+        assert anna.state("scout1") is RUNNING
+        await anna.state_becomes(DONE)
+        await anna.running.clock.sleep_s(3.0)
+        assert anna.grantee("scout1") == f"{CONSOLE}-order-1-drive"
+        assert anna.console.is_held
+        await anna.console.switch("scout1")
+        await anna.until(lambda: anna.console.is_held and not anna.behaviors())
+        assert not [arc for arc in anna.grants(since_s=since_s) if not arc.startswith(CONSOLE)]
+
+    play(scene)
+
+
+def test_a_robot_is_left_right_after_its_order_and_is_never_free_for_the_mission() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        since_s = anna.now_s
+        anna.console.order(Order(OrderKind.GO_TO, "scout1", 2.0))
+        await anna.console.switch("scout2")
+        await anna.holds("scout2")
+        await anna.state_becomes(DONE)
+        assert anna.grants(since_s=since_s) == [f"{CONSOLE}-order-1-drive"]
+
+    play(scene)
+
+
+def test_the_stick_turns_to_a_robot_whose_order_goes_on_and_takes_it_at_a_touch() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered()
+        await anna.console.switch("scout2")
+        await anna.holds("scout2")
+        await anna.console.switch("scout1")
+        assert anna.shown[-1] == TurnedTo(anna.now_s, "scout1") or TurnedTo in map(type, anna.shown)
+        await anna.running.clock.sleep_s(2.0)
+        assert (anna.state(), anna.console.is_held) == (RUNNING, False)
+        anna.console.hold(FORWARD)
+        await anna.until(lambda: anna.console.is_held)
+        assert anna.states()[-1] is ENDED
+
+    play(scene)
+
+
+def test_a_group_of_robots_is_ordered_at_once() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        robots = ["scout1", "scout2", "scout3"]
+        anna.console.order_group(group(Order(OrderKind.GO_TO, "", 4.0), robots))
+        await anna.until(lambda: {anna.state(robot) for robot in robots} == {RUNNING})
+        assert sorted(anna.console.orders) == robots
+        await anna.until(lambda: anna.console.is_held)
+        await anna.until(lambda: [anna.states(robot)[-1] for robot in robots] == [DONE] * 3)
+        assert sorted(anna.console.orders) == robots[1:]
+
+    play(scene)
+
+
+def test_an_order_waits_while_its_robot_is_stopped_and_goes_on_after_the_lift() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered(4.0)
+        stop = await stop_robot(anna.running.bus, "scout1", "", "ben")
+        await anna.running.clock.sleep_s(8.0)
+        assert anna.state() is RUNNING
+        assert anna.behaviors()
+        await lift_stop(anna.running.bus, stop, "ben")
+        await anna.state_becomes(DONE)
+
+    play(scene)
+
+
+def test_the_end_of_a_console_ends_its_orders() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered()
+        await anna.running.stop(CONSOLE)
+        assert not anna.behaviors()
+        await anna.until(lambda: anna.grantee() == "patrol-scout1-drive", within_s=1.0)
+
+    play(scene)
+
+
+def test_a_killed_console_takes_its_orders_with_it_within_a_second() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered()
+        anna.running.hosts.kill(CONSOLE, math.inf)
+        await anna.until(lambda: anna.grantee() == "patrol-scout1-drive", within_s=1.5)
+        await anna.until(lambda: not anna.behaviors(), within_s=1.0)
+
+    play(scene)
+
+
+def test_a_console_that_answers_nothing_loses_its_orders() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered()
+        anna.console.answer = never  # type: ignore[method-assign]
+        await anna.until(lambda: not anna.behaviors(), within_s=3.0)
+        assert anna.grantee() == "patrol-scout1-drive"
+
+    play(scene)
+
+
+async def never(_asked: Any) -> Any:
+    await asyncio.Event().wait()
+
+
+@pytest.mark.parametrize(
+    ("order", "why"),
+    [
+        (Order(OrderKind.GO_TO, "scout9", 1.0), "no robot is named"),
+        (Order(OrderKind.FOLLOW, "scout1", target="anna"), "has no behavior follow"),
+    ],
+)
+def test_an_impossible_order_fails_with_a_remedy_and_the_stick_keeps_its_robot(order: Order, why: str) -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        anna.console.order(order)
+        await anna.state_becomes(FAILED, order.robot)
+        assert why in anna.shown[-1].given.why if isinstance(anna.shown[-1], OrderChanged) else True
+        await anna.running.clock.sleep_s(1.0)
+        assert anna.console.is_held
+        assert anna.console.orders == {}
+
+    play(scene)
