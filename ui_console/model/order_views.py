@@ -76,9 +76,9 @@ class OrderList:
 
 
 def inside(orders: Sequence[Order], floor: FloorPlan | None) -> list[Order]:
-    """Return the orders with their places moved together, as far as needed, so that no place is off the floor.
+    """Return the orders of a group with their places moved together, as far as needed, so that none is off the floor.
 
-    A group that is wider than the floor begins at its edge.
+    A group that is wider than the floor begins at its edge. A robot that goes alone goes to the place as it was tapped.
 
     Example:
         >>> wide = [Order(OrderKind.GO_TO, "scout1", -0.25, 1.0), Order(OrderKind.GO_TO, "scout2", 0.25, 1.0)]
@@ -86,7 +86,7 @@ def inside(orders: Sequence[Order], floor: FloorPlan | None) -> list[Order]:
         [0.3, 0.8]
     """
     places = [order for order in orders if order.kind is OrderKind.GO_TO]
-    if floor is None or not places:
+    if floor is None or len(places) < 2:
         return list(orders)
     right_m = _shift_m([order.x_m for order in places], floor.width_m)
     up_m = _shift_m([order.y_m for order in places], floor.depth_m)
