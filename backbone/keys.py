@@ -23,10 +23,12 @@ class Conversation(StrEnum):
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
-    TELEMETRY = "telemetry"  # applied commands, measures, overruns
+    TELEMETRY = "telemetry"  # states of RCs, hosts and the world
+    MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without one
     REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
     READINGS = "readings"  # what the hardware measures, by name
     POSES = "poses"  # where a localizer believes robots to be
+    SIGHTINGS = "sightings"  # landmarks that behaviors see in robots' pictures
     FRAMES = "frames"  # pictures
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each

@@ -25,7 +25,17 @@ from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
 from resource_pool.arc_request import ROBOT, claim_parameters
 from resource_pool.commands import Command, Drive, Halt, Jump, Move, WrongCommand
-from resource_pool.localization import AskFloorPlan, AskPose, FloorPlan, FloorShape, Pose, PoseSource, ShapeKind
+from resource_pool.localization import (
+    AskFloorPlan,
+    AskHome,
+    AskPose,
+    FloorPlan,
+    FloorShape,
+    LandmarkSighting,
+    Pose,
+    PoseSource,
+    ShapeKind,
+)
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
     Accepted,
@@ -64,6 +74,7 @@ __all__ = [
     "ArcState",
     "AskBeat",
     "AskFloorPlan",
+    "AskHome",
     "AskPose",
     "Command",
     "EmergencyStopped",
@@ -71,6 +82,7 @@ __all__ = [
     "FloorShape",
     "Frame",
     "GivenBeforeStop",
+    "LandmarkSighting",
     "NoSuchAction",
     "NotMyArc",
     "Noted",

@@ -1,8 +1,8 @@
 """Messages of localizers: where robots are believed to be, how surely, from what, and the plan of the floor.
 
-* anybody → localizer: ``AskPose``, ``AskFloorPlan``; localizer → everybody: ``Pose``, published under its address
-  (conversation ``poses``) when a believed position changes.
-* a behavior that sees a landmark → everybody: ``LandmarkSighting``, published as an event.
+* anybody → localizer: ``AskPose``, ``AskHome``, ``AskFloorPlan``; localizer → everybody: ``Pose``, published under its
+  address (conversation ``poses``) when a believed position changes.
+* a behavior that sees a landmark → everybody: ``LandmarkSighting``, published (conversation ``sightings``).
 
 Positions are in meters in the room's frame: origin in a corner of the floor, x along its width, y along its depth,
 headings counterclockwise from x.
@@ -15,11 +15,19 @@ from typing import Annotated
 
 import msgspec
 
+from backbone.errors import Refusal
 from backbone.ranges import MANY, Instant, Mention, Meters, Radians
 from backbone.wire import Message
 
 Extent = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 """Meters, never negative. Chosen: as far as ``Meters``."""
+
+
+class UnknownPlace(Refusal):
+    """The localizer does not know the body."""
+
+    code = "localizer.unknown_body"
+    remedy = "Use the name of a robot whose place at the beginning the mission file says, or of something in the room."
 
 
 class PoseSource(StrEnum):
@@ -37,13 +45,20 @@ class AskPose(Message, frozen=True):
     body: Mention
 
 
+class AskHome(Message, frozen=True):
+    """Ask a localizer for the pose of a robot when the localizer first knew it."""
+
+    body: Mention
+
+
 class Pose(Message, frozen=True, tag="Pose/2"):
-    """Answer to ``AskPose``, and publication: the believed pose of a body.
+    """Answer to ``AskPose`` and ``AskHome``, and publication: the believed pose of a body.
 
     Attributes:
         at_s: Mission time for which it holds.
         source: What it rests on last.
         spread_m: Standard deviation of the position; 0: exact.
+        spread_rad: Standard deviation of the heading; pi: it may look anywhere.
     """
 
     body: Mention
@@ -53,6 +68,7 @@ class Pose(Message, frozen=True, tag="Pose/2"):
     heading_rad: Radians
     source: PoseSource = PoseSource.SIMULATOR
     spread_m: Extent = 0.0
+    spread_rad: Annotated[float, msgspec.Meta(ge=0, le=4)] = 0.0  # chosen: above pi, so that rounding cannot refuse it
 
 
 class LandmarkSighting(Message, frozen=True):
@@ -122,4 +138,4 @@ class FloorPlan(Message, frozen=True):
     width_m: Extent
     depth_m: Extent
     shapes: Annotated[list[FloorShape], MANY] = []
-    image: Annotated[bytes, msgspec.Meta(max_length=4_000_000)] = b""  # chosen: a plan of 4000 x 4000 pixels
+    image: Annotated[bytes, msgspec.Meta(max_length=900_000)] = b""  # chosen: a drawing of 4000 x 4000 pixels

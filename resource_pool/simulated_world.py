@@ -25,7 +25,8 @@ from resource_pool.drivers.world_messages import (
     WorldModel,
     WorldState,
 )
-from resource_pool.localization import AskPose, Pose
+from resource_pool.floor_plans import plan_of
+from resource_pool.localization import AskFloorPlan, AskHome, AskPose, Pose
 from scout_model.air import antenna_m, distance_m
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
@@ -55,7 +56,7 @@ class SimulatedWorld(Component[WorldParameters]):
 
     parameters_type = WorldParameters
     given_elsewhere = frozenset({"world"})
-    accepts = AskWorld | AskPose
+    accepts = AskWorld | AskPose | AskHome | AskFloorPlan
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -100,7 +101,7 @@ class SimulatedWorld(Component[WorldParameters]):
                 self.bus.publish(self.address, Conversation.REPLIES, on_air)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``AskWorld`` and ``AskPose``."""
+        """Answer ``AskWorld``, and what localizers are asked."""
         match asked.body:
             case AskWorld():
                 robots = {scout.name: scout.network_id for scout in self.parameters.world.robots}
@@ -112,6 +113,13 @@ class SimulatedWorld(Component[WorldParameters]):
                 except UnknownBody as error:
                     raise NoSuchBody(str(error)) from error
                 return Pose(body, self.clock.now_s(), x_m, y_m, heading_rad)
+            case AskHome(body=body):
+                for robot in self.parameters.world.robots:
+                    if robot.name == body:
+                        return Pose(body, self.clock.now_s(), robot.x_m, robot.y_m, robot.heading_rad)
+                raise NoSuchBody(f"no robot named {body!r}")
+            case AskFloorPlan():
+                return plan_of(self.parameters.world)
         return await super().answer(asked)
 
     def statistics(self) -> dict[str, float]:

@@ -118,6 +118,17 @@ def wheels_rad_s(forward_m_s: float, turn_rad_s: float) -> tuple[float, float]:
     return (forward_m_s - side_m_s) / WHEEL_RADIUS_M, (forward_m_s + side_m_s) / WHEEL_RADIUS_M
 
 
+def motion_of_wheels(left_rad_s: float, right_rad_s: float) -> tuple[float, float]:
+    """Return the motion that these wheel speeds give: forward in meters, turning in radians a second.
+
+    Example:
+        >>> motion_of_wheels(10.0, 10.0)
+        (0.2, 0.0)
+    """
+    forward_m_s = (left_rad_s + right_rad_s) * WHEEL_RADIUS_M / 2
+    return forward_m_s, (right_rad_s - left_rad_s) * WHEEL_RADIUS_M / TRACK_M
+
+
 class Firmware:
     """One Scout's on-board program; wheels at rest, transmitter off and spring wound at the beginning."""
 

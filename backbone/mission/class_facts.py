@@ -98,6 +98,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
         may_claim: False: a behavior that has no ARC.
         failure: Why the facts are unknown; empty: they are known.
         abilities: What its components can be commanded to do, and what they report.
+        given: Parameters that other elements and attributes of the mission file set.
     """
 
     doc: str = ""
@@ -108,6 +109,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     may_claim: bool = True
     failure: str = ""
     abilities: Abilities = NO_ABILITIES
+    given: tuple[str, ...] = ()
 
     def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
         """Return all that can be given while this driver is used; None if nothing is known of the driver."""

@@ -34,6 +34,7 @@ def facts_of(class_path: str) -> ClassFacts:
         children=getattr(found, "children_allowed", None),
         may_claim=getattr(found, "may_claim", True),
         abilities=found.abilities(),
+        given=tuple(sorted(found.given_elsewhere)),
     )
 
 

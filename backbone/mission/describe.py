@@ -28,7 +28,9 @@ from backbone.mission.model import (
     MissionDescription,
 )
 from backbone.mission.room_files import room_text
-from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, parameter_value
+from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, ROOM, SIMULATED, WORLD, parameter_value
+
+NOTHING_KNOWN = ClassFacts()
 
 
 def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFacts]) -> MissionDescription:
@@ -44,13 +46,14 @@ def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFa
     host_of_process = {one.process: one.host for one in members if one.process and one.host}
     types = () if mission.types is None else tuple(_component_type(one, classes) for one in mission.types.type)
     robots = {one.name for one in types if one.abilities.is_robot}
+    in_rooms = {one.name for one in types if ROOM in classes.get(one.class_path, NOTHING_KNOWN).given}
     return MissionDescription(
         name=mission.name,
         priority=mission.priority,
         hosts=hosts,
         core=_core(mission, [host.name for host in hosts]),
         types=types,
-        resources=tuple(_resource(resource, world, host_of_process, robots) for resource in resources),
+        resources=tuple(_resource(resource, world, host_of_process, robots, in_rooms) for resource in resources),
         components=() if world is None else (_world(world, resources, source, host_of_process, types),),
         behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
         source=source,
@@ -85,18 +88,23 @@ def _component_type(declared: TypeElement, classes: Mapping[str, ClassFacts]) ->
 
 
 def _resource(
-    declared: ResourceElement, world: WorldElement | None, host_of_process: Mapping[str, str], robots: Collection[str]
+    declared: ResourceElement,
+    world: WorldElement | None,
+    host_of_process: Mapping[str, str],
+    robots: Collection[str],
+    in_rooms: Collection[str],
 ) -> Resource:
     links: dict[str, list[str]] = {}
     for used in declared.uses:
         links.setdefault(used.type, []).append(used.name)
     played_by = {WORLD: world.name} if world is not None and declared.driver == SIMULATED else {}
+    room = {ROOM: _room(world)} if world is not None and declared.type in in_rooms else {}
     values = declared.model_dump(exclude={"uses", "parameter", "features", "host"})
     return Resource(
         **values,
         host=declared.host or host_of_process.get(declared.process, ""),
         features=list(declared.features),
-        parameters={**played_by, **_parameters(declared.parameter)},
+        parameters={**played_by, **room, **_parameters(declared.parameter)},
         links=links,
         is_robot=declared.type in robots,
     )
@@ -168,6 +176,19 @@ def _world_content(world: WorldElement, given: Mapping[str, Mapping[str, object]
         "dark_places": list(map(_body, world.dark)),
         "air": (world.air or AirElement()).model_dump(),
         "mjcf": room_text(source, world.room.mjcf) if world.room.mjcf else "",
+    }
+
+
+def _room(world: WorldElement) -> dict[str, object]:
+    """Return what stands in the room at the beginning, robots with it, as plain data of ``WorldDescription``."""
+    return {
+        "width_m": world.room.width_m,
+        "depth_m": world.room.depth_m,
+        "furniture": list(map(_body, world.furniture)),
+        "robots": [{**_body(robot, "class_path"), NETWORK_ID: 0} for robot in world.robot],
+        "ramps": list(map(_body, world.ramp)),
+        "landmarks": list(map(_body, world.landmark)),
+        "dark_places": list(map(_body, world.dark)),
     }
 
 

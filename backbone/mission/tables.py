@@ -18,6 +18,7 @@ CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "depen
 SIMULATED = "simulated"  # the driver whose hardware is played by the mission's world
 SIMULATED_WORLD = "simulated_world"  # the shipped type that plays it
 WORLD = "world"  # the parameter that names it, and the world's own
+ROOM = "room"  # the parameter with the room, for classes that have it
 NETWORK_ID = "network_id"  # the parameter by which the radio distinguishes robots
 
 

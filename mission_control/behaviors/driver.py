@@ -3,22 +3,32 @@
 from __future__ import annotations
 
 import logging
+import math
 from typing import ClassVar, TypeVar
 
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.naming import Subsystem, address
 from mission_control.behavior import Behavior, BehaviorParameters
-from mission_control.behaviors.motion import Motion, Position
+from mission_control.behaviors.motion import FloorPoint, Motion, Position
 from mission_control.messages import BehaviorStatus
-from resource_pool.arc_client import ArcClient, AskPose, EmergencyStopped, NoSuchAction, Pose, SwappedOut
+from resource_pool.arc_client import ArcClient, AskHome, AskPose, EmergencyStopped, NoSuchAction, Pose, SwappedOut
 
 log = logging.getLogger(__name__)
 
 DECIDE_EVERY_S = 0.1  # chosen: commands last half a second, and ten a second of 2 ms are a fiftieth of a radio
 LOCALIZE_WITHIN_S = 0.3  # chosen: an older position is useless for steering; wheels stop by themselves after 0.5 s
+LOST_M = 5.0  # chosen: half a room; nearer, a robot that is off its way is still worth watching
+LOST_RAD = math.radians(100.0)  # chosen: it may go away from where it should; one jump leaves less
 AGAIN_AFTER_S = 1.0  # chosen: hardware that refused needs a moment; mission seconds
 
 D = TypeVar("D", bound=BehaviorParameters)
+
+
+class Lost(Refusal):
+    """The localizer does not know where the robot is, or where it looks, well enough to drive it."""
+
+    code = "behavior.lost"
+    remedy = "Show the robot a landmark, or take it over and look where it is."
 
 
 class NeedsArc(Refusal):
@@ -36,8 +46,10 @@ class Driver(Behavior[D]):
 
     needs_arc: ClassVar[str] = "drive"
     """Kind of ARC that the refusal names if there is none."""
-    never: ClassVar[frozenset[str]] = frozenset({"world.unknown_body", "wire.unknown"})
+    never: ClassVar[frozenset[str]] = frozenset({"world.unknown_body", "localizer.unknown_body", "wire.unknown"})
     """Codes of refusals that every further attempt would get again."""
+    spread_m = 0.0
+    """Standard deviation of the place that the localizer told last."""
 
     async def drive_on(self, robot: str) -> None:
         """Continue the work.
@@ -63,18 +75,31 @@ class Driver(Behavior[D]):
         await self.held.move(motion.forward_m_s, motion.turn_rad_s)
 
     async def locate(self, localizer: str, robot: str) -> Position:
-        """Return the position of the robot, as the localizer tracks it from above the room.
+        """Return the position of the robot, or of another body, as the localizer believes it.
 
         Args:
             localizer: Name or address of the tracking component.
 
         Raises:
+            Lost: The localizer is too unsure of it.
             Refusal: The localizer does not know the robot, or is no localizer.
             LinkError: The localizer did not answer.
         """
-        tracker = localizer if "/" in localizer else address(Subsystem.RESOURCE_POOL, localizer)
-        pose = await self.bus.ask(tracker, AskPose(robot), Pose, within_s=LOCALIZE_WITHIN_S)
+        pose = await self._ask_localizer(localizer, AskPose(robot))
+        self.spread_m = pose.spread_m
+        if pose.spread_m > LOST_M or pose.spread_rad > LOST_RAD:
+            spread = f"{pose.spread_m:.1f} m and {math.degrees(pose.spread_rad):.0f}°"
+            raise Lost(f"{localizer} does not know where {robot} is: the spread is {spread}")
         return Position(pose.x_m, pose.y_m, pose.heading_rad)
+
+    async def locate_home(self, localizer: str, robot: str) -> FloorPoint:
+        """Return where the robot stood when the localizer first knew it; raises as ``locate``."""
+        home = await self._ask_localizer(localizer, AskHome(robot))
+        return FloorPoint(home.x_m, home.y_m)
+
+    async def _ask_localizer(self, localizer: str, question: AskPose | AskHome) -> Pose:
+        tracker = localizer if "/" in localizer else address(Subsystem.RESOURCE_POOL, localizer)
+        return await self.bus.ask(tracker, question, Pose, within_s=LOCALIZE_WITHIN_S)
 
     async def start(self) -> None:
         """Fail at once without an ARC; see ``BehaviorHooks.start``."""

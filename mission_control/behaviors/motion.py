@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 MOST_M_S = 0.30  # chosen: below the 0.35 m/s of the motors, so that a wheel is left to steer with
+NEAREST_M = 0.02  # chosen: tracking from above and a robot of 11 cm allow no less
 MOST_RAD_S = 1.5  # chosen: a quarter turn a second; ten decisions a second turn it 9 degrees at most in between
 TURN_PER_S = 2.5  # chosen: an error of heading shrinks to a tenth in a second, without swinging over at ten decisions
 SLOW_PER_S = 1.5  # chosen: the last 0.2 m before a place are driven ever slower; it comes to rest without overshoot

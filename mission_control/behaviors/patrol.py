@@ -1,8 +1,7 @@
 """Patrol: drive through way points, round after round.
 
-A Scout does not know its position. A localizer must track it: a camera above the room, as in laboratories, or the
-simulated world. Counting the turns of the wheels is not enough, because a person may take the robot over for a minute
-and leave it at another place.
+A Scout does not know its position. A localizer must track it: a camera above the room, as in laboratories, the
+simulated world, or dead reckoning. By dead reckoning its round drifts, until the robot sees a landmark.
 
 In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name; a simulated world is its own localizer.
 """
@@ -16,11 +15,9 @@ from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
-from mission_control.behaviors.motion import MOST_M_S, read_places
+from mission_control.behaviors.motion import MOST_M_S, NEAREST_M, read_places
 from mission_control.behaviors.patrol_route import PatrolRoute, Visit
 from mission_control.messages import BehaviorStatus, WaypointReached
-
-NEAREST_M = 0.02  # chosen: tracking from above and a robot of 11 cm allow no less
 
 
 class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):

@@ -1,7 +1,8 @@
 """Servo to target: find the landmark, follow it in the picture, and stop at a place straight before it.
 
-``mission_control.vision`` decides about pictures and motions; this file carries them out. Between grants the robot may
-be moved or turned: the next pictures acquire the target again, and the approach continues at its stage.
+``mission_control.vision`` decides about pictures and motions; this file carries them out, and publishes where the
+landmark puts the robot, for localizers. Between grants the robot may be moved or turned: the next pictures acquire the
+target again, and the approach continues at its stage.
 
 In mission.xml: an ARC of kind ``capture`` at the camera's full rate, with a period as short as a picture's.
 
@@ -20,15 +21,19 @@ import numpy as np
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
+from backbone.keys import Conversation
 from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import Driver
 from mission_control.messages import BehaviorStatus
 from mission_control.vision.servo_law import STOP_M, Stage
 from mission_control.vision.skeleton_tracking import TrackingPhase
 from mission_control.vision.visual_servo import FARTHEST_STOP_M, LATENCY_S, NEAREST_STOP_M, ServoStep, VisualServo
-from resource_pool.arc_client import Frame
+from resource_pool.arc_client import Frame, LandmarkSighting
 
 PICTURE_PX = (320, 240)  # what ``SCOUT_CAMERA`` was measured for
+SURE_M = 0.3  # chosen: dead reckoning over a few meters knows as much
+LEAST_SPREAD_M = 0.03  # chosen: what servoing was measured to err at its place; a fit alone promises more
+TELL_EVERY_S = 0.2  # chosen: localizers publish as often
 SETTLES_S = 2.0  # chosen: about half the time of settling; requested again if it was too short
 
 
@@ -83,6 +88,7 @@ class Servo(Driver[S]):
         self.step: ServoStep | None = None
         """The decision of the last picture."""
         self._seen_s: float | None = None
+        self._told_s = -math.inf
         self._fresh = asyncio.Event()
         self._unusable: UnusablePicture | None = None
         self._acquisitions = 0
@@ -103,6 +109,7 @@ class Servo(Driver[S]):
         elapsed_s = 0.0 if self._seen_s is None else max(0.0, frame.captured_s - self._seen_s)
         self.step, self._seen_s = self._servo.see(pixels, elapsed_s), frame.captured_s
         self._note_phase(frame.robot, self.step)
+        self._tell_sighting(frame)
 
     def not_now(self) -> float:
         """Return the time that settling before the target needs; see ``Behavior.not_now``."""
@@ -165,6 +172,22 @@ class Servo(Driver[S]):
 
     def _plan(self) -> VisualServo:
         return VisualServo(stop_m=self.parameters.stop_m, latency_s=self.parameters.latency_s)
+
+    def _tell_sighting(self, frame: Frame) -> None:
+        """Publish the pose before the landmark, if it is sure enough to tell localizers; a few times a second."""
+        pose = None if self.step is None else self.step.pose
+        if pose is None or self._servo.spread_m > SURE_M or frame.captured_s < self._told_s + TELL_EVERY_S:
+            return
+        self._told_s = frame.captured_s
+        sighting = LandmarkSighting(
+            frame.captured_s,
+            frame.robot,
+            pose.ahead_m,
+            pose.left_m,
+            pose.heading_rad,
+            max(LEAST_SPREAD_M, self._servo.spread_m),
+        )
+        self.bus.publish(self.address, Conversation.SIGHTINGS, sighting)
 
     def _note_phase(self, robot: str, step: ServoStep) -> None:
         if step.track.phase is self._phase:

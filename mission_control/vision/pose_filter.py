@@ -6,6 +6,8 @@ iterated, with one hypothesis for each side of the zero-angle line (same book, s
 
 from __future__ import annotations
 
+import math
+
 from mission_control.vision.landmark import Sighting
 from mission_control.vision.target_pose import (
     PIXEL_ERROR_PX,
@@ -33,6 +35,17 @@ class PoseFilter:
     def forget(self) -> None:
         """Forget the pose, because the robot may have been moved."""
         self._hypotheses = []
+
+    @property
+    def spread_m(self) -> float:
+        """Standard deviation of the place, or the distance of the place on the other side if that is larger."""
+        if not self._hypotheses:
+            return math.inf
+        (best, _), *others = self._hypotheses
+        of_fit_m = math.sqrt(max(0.0, float(best.covariance[0, 0] + best.covariance[1, 1])))
+        return max(
+            of_fit_m, *(math.hypot(pose.ahead_m - best.ahead_m, pose.left_m - best.left_m) for pose, _ in others), 0.0
+        )
 
     def moved(self, forward_m: float, turn_rad: float) -> None:
         """Add the motion of the robot along an arc, counter-clockwise is positive."""

@@ -72,6 +72,11 @@ class VisualServo:
         return self._approach.approaches
 
     @property
+    def spread_m(self) -> float:
+        """Standard deviation of the place of the last pose; infinite: there is none."""
+        return self._filter.spread_m
+
+    @property
     def searched_rad(self) -> float:
         """The robot's turn since it last saw the target; after a full turn the target is not there."""
         return self._approach.searched_rad

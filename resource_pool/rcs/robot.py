@@ -28,7 +28,7 @@ from backbone.wire import Envelope, Message
 from resource_pool.commands import Command, Halt, SwitchTransmitter
 from resource_pool.drivers.interface import ReplyReader, RobotProtocol
 from resource_pool.holds import Hold
-from resource_pool.messages import COMMAND_TIMEOUT_S, AskReadings, LoadPacket, NotFromYou, PacketLoaded
+from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, AskReadings, LoadPacket, NotFromYou, PacketLoaded
 from resource_pool.resource_controller import RcParameters, ResourceController
 from resource_pool.robot_reports import RobotReports
 from resource_pool.stop_latch import StopLatch
@@ -70,7 +70,8 @@ class RobotRc(ResourceController[P], Generic[P]):
     """Encodes commands as packets of the robot's protocol; the radio sends them at the ARC's rate.
 
     Derive, set ``commands``, and ``reports`` if the protocol is a ``ReplyReader``, and override ``obey``; a command
-    with ``moves`` reaches it only while no stop is in force.
+    with ``moves`` reaches it only while no stop is in force. Each command is published when it is applied, and a halt
+    without a command, too: localizers listen.
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RobotParameters
@@ -120,10 +121,11 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Record the grant under which the robot obeys."""
         self._holder, self._halt_at_s, self._frequency = hold, None, ""
 
-    async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
+    async def make_safe(self, hold: Hold) -> None:
         """Send no further command; the radio sends the safe packet at its own disconnection."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
         self.cease()
+        self._tell_halted(hold)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer operators, too, who need no grant to stop the robot."""
@@ -145,6 +147,14 @@ class RobotRc(ResourceController[P], Generic[P]):
                 return self._latch.state
             case _:
                 return await super().answer(asked)
+
+    async def command(self, asked: Envelope[Message]) -> Message:
+        """Publish what was applied, too, with the motion that it makes."""
+        done = await super().command(asked)
+        if isinstance(done, Applied):
+            told = msgspec.structs.replace(done, values={**done.values, **self.motion_of(done.values)})
+            self.bus.publish(self.address, Conversation.MOTIONS, told)
+        return done
 
     def permit(self, order: Command) -> None:
         """Refuse to move while a stop is in force, or if the sender did not know the last one."""
@@ -171,6 +181,13 @@ class RobotRc(ResourceController[P], Generic[P]):
     async def halt(self, hold: Hold) -> None:
         """Bring the robot to rest. When: at ``Halt``, and in silence. Override if that takes more than a packet."""
         await self._load(hold, self._protocol.halt())
+
+    def motion_of(self, values: Mapping[str, float]) -> Mapping[str, float]:  # noqa: ARG002
+        """Return ``forward_m_s`` and ``turn_rad_s`` of a command with these applied values, unless they stand there.
+
+        When: before a command that was applied is published. Override if the robot has commands in other numbers.
+        """
+        return {}
 
     def cease(self) -> None:
         """Make no further packet by itself. When: at once at an emergency stop, and at the end of a hold."""
@@ -235,6 +252,7 @@ class RobotRc(ResourceController[P], Generic[P]):
                 self._latch.confirm(False)
             else:
                 self._latch.confirm(True)
+                self._tell_halted(holder)
         self._publish_stop()
         if is_new:
             self.publish_event(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
@@ -251,6 +269,11 @@ class RobotRc(ResourceController[P], Generic[P]):
     def _tell_stop(self, state: StopState, what: str) -> None:
         self._publish_stop()
         self.publish_event(self.name, f"{what} (by {state.by})")
+
+    def _tell_halted(self, hold: Hold) -> None:
+        """Publish that the robot was halted without a command."""
+        halted = Applied(self.name, hold.epoch, self.clock.now_s(), Halt.word())
+        self.bus.publish(self.address, Conversation.MOTIONS, halted)
 
     def _publish_stop(self) -> None:
         self.changed()
@@ -333,6 +356,8 @@ class RobotRc(ResourceController[P], Generic[P]):
                 await self.halt(hold)
             except (Refusal, LinkError) as error:  # swapped out, or no radio: the safe packet or the robot itself halts
                 self.story.note(hold.arc, f"halt not sent: {error}")
+            else:
+                self._tell_halted(hold)
 
     def _silent_too_long(self) -> bool:
         """Return whether still no command has come after the sleep."""

@@ -16,7 +16,7 @@ from resource_pool.drivers.interface import ScoutProtocol, ScoutReports
 from resource_pool.holds import Hold
 from resource_pool.rcs.robot import RobotParameters, RobotRc
 from scout_model.dimensions import HORIZONTAL_VIEW_RAD, TRACK_M, WHEEL_RADIUS_M, WHEEL_SPEED_LIMIT_RAD_S
-from scout_model.scout import wheels_rad_s
+from scout_model.scout import motion_of_wheels, wheels_rad_s
 
 MOST_M_S = WHEEL_SPEED_LIMIT_RAD_S * WHEEL_RADIUS_M
 MOST_TURN_RAD_S = 2 * MOST_M_S / TRACK_M
@@ -59,6 +59,13 @@ class Scout(RobotRc[RobotParameters]):
                 return {}
             case _:
                 return await super().obey(hold, order)
+
+    def motion_of(self, values: Mapping[str, float]) -> Mapping[str, float]:
+        """Return the motion that the wheels make; see ``RobotRc``."""
+        if "left_rad_s" not in values:
+            return {}
+        forward_m_s, turn_rad_s = motion_of_wheels(values["left_rad_s"], values["right_rad_s"])
+        return {"forward_m_s": forward_m_s, "turn_rad_s": turn_rad_s}
 
     async def _turn_wheels(self, hold: Hold, order: Command, left: float, right: float) -> Mapping[str, float]:
         if not (math.isfinite(left) and math.isfinite(right)):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from backbone.ranges import Measure, Meters, Share
+from backbone.ranges import Measure, Meters, Radians, Share
 from backbone.wire import Message
+from resource_pool.robots.rover.body import TRACK_M
 from resource_pool.robots.rover.link import decode_reply
 
 _CM = 0.01
@@ -37,6 +38,8 @@ class RoverReport(Message, frozen=True):
         sonar_5_m: The next one to the right.
         sonar_6_m: The next one to the right.
         sonar_7_m: The rightmost.
+        way_m: Way of its middle since it was switched on, by its wheels; backward is negative.
+        turned_rad: Its turn since then, by its wheels; left is positive.
     """
 
     battery_share: Share
@@ -63,6 +66,8 @@ class RoverReport(Message, frozen=True):
     sonar_5_m: Meters
     sonar_6_m: Meters
     sonar_7_m: Meters
+    way_m: Meters
+    turned_rad: Radians
 
 
 def report_of(payload: bytes) -> RoverReport:
@@ -73,6 +78,7 @@ def report_of(payload: bytes) -> RoverReport:
     """
     reply = decode_reply(payload)
     bumpers = reply.bumpers
+    way: tuple[float, ...] = ((reply.left_m + reply.right_m) / 2, (reply.right_m - reply.left_m) / TRACK_M)
     return RoverReport(
         reply.battery,
         reply.closed,
@@ -88,4 +94,5 @@ def report_of(payload: bytes) -> RoverReport:
         *reply.gyroscope_rad_s,
         *reply.acceleration_m_s2,
         *(_CM * range_cm for range_cm in reply.sonars_cm),
+        *way,
     )

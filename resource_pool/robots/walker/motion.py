@@ -32,6 +32,7 @@ class StateOfMotion:
         x_m: Way since the beginning by dead reckoning; x is forward at the beginning.
         y_m: Same, to the left.
         heading_rad: Same, it counts turns.
+        way_m: Length of that way; backward is negative.
         joints_rad: The last targets.
     """
 
@@ -42,6 +43,7 @@ class StateOfMotion:
     x_m: float
     y_m: float
     heading_rad: float
+    way_m: float
     joints_rad: Angles
 
 
@@ -52,7 +54,7 @@ class MotionControl:
         self._gait = Gait(parameters)
         self._kinematics = Kinematics()
         self._stepped_s: float | None = None
-        self._x_m = self._y_m = self._heading_rad = 0.0
+        self._x_m = self._y_m = self._heading_rad = self._way_m = 0.0
         self._joints_rad: Angles = self._kinematics.joints(self._gait.advance(0.0))
 
     def request(self, move: TrunkSpeed) -> None:
@@ -84,6 +86,7 @@ class MotionControl:
         self._x_m += motion.forward_m_s * elapsed_s * math.cos(middle_rad)
         self._y_m += motion.forward_m_s * elapsed_s * math.sin(middle_rad)
         self._heading_rad += motion.turn_rad_s * elapsed_s
+        self._way_m += motion.forward_m_s * elapsed_s
         return self._joints_rad
 
     def state(self) -> StateOfMotion:
@@ -97,5 +100,6 @@ class MotionControl:
             self._x_m,
             self._y_m,
             self._heading_rad,
+            self._way_m,
             self._joints_rad,
         )

@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from backbone.ranges import Radians, Share, Speed, TurnRate
+from backbone.ranges import Meters, Radians, Share, Speed, TurnRate
 from resource_pool.robots.walker.gait import LEGS
 from resource_pool.robots.walker.link import JOINTS, decode_status
 from resource_pool.robots.walker.motion import StateOfMotion
@@ -25,6 +25,8 @@ class WalkerReport(msgspec.Struct, frozen=True):
         commanded_rad_s: Turning speed of the last command, clipped.
         expected_m_s: Forward speed that the feet now make.
         expected_rad_s: Turning speed that the feet now make.
+        way_m: Way that the feet have made since its RC began; backward is negative.
+        turned_rad: Turn that they have made since then; left is positive.
         front_left_foot: Carries weight.
         front_right_foot: Carries weight.
         hind_left_foot: Carries weight.
@@ -52,6 +54,8 @@ class WalkerReport(msgspec.Struct, frozen=True):
     commanded_rad_s: TurnRate
     expected_m_s: Speed
     expected_rad_s: TurnRate
+    way_m: Meters
+    turned_rad: Radians
     front_left_foot: bool
     front_right_foot: bool
     hind_left_foot: bool
@@ -90,5 +94,7 @@ def report_of(payload: bytes, motion: StateOfMotion) -> WalkerReport:
         commanded_rad_s=motion.commanded.turn_rad_s,
         expected_m_s=motion.expected.forward_m_s,
         expected_rad_s=motion.expected.turn_rad_s,
+        way_m=motion.way_m,
+        turned_rad=motion.heading_rad,
         **parts,
     )

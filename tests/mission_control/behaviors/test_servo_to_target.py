@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import msgspec
@@ -13,11 +14,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_order
 from backbone.mission.model import MissionDescription
+from backbone.wire import Envelope
 from mission_control.behaviors.servo_to_target import ServoParameters, ServoToTarget
 from mission_control.messages import BehaviorStatus
-from resource_pool.localization import Pose
+from resource_pool.dead_reckoning import FloorPose
+from resource_pool.floor_plans import before_board
+from resource_pool.localization import LandmarkSighting, Pose
 
 NAME, ROBOT = "servo-scout3", "scout3"
 PLACE = (4.5, 5.8 - 0.45, math.pi / 2)
@@ -133,3 +138,32 @@ def test_a_driving_behavior_without_an_arc_fails_and_says_which_it_needs(local_m
 def test_parameters_that_mean_nothing_are_refused_with_the_remedy(given: dict[str, object], complaint: str) -> None:
     with pytest.raises(msgspec.ValidationError, match=complaint):
         msgspec.convert(given, ServoParameters)
+
+
+def test_what_it_sees_of_the_landmark_tells_localizers_where_the_robot_is() -> None:
+    async def scene() -> None:
+        async with at_work(example(NAME)) as running:
+            told: list[tuple[LandmarkSighting, float]] = []
+            board = FloorPose(4.5, 5.8, -math.pi / 2)
+
+            def heard(envelope: Envelope[LandmarkSighting]) -> None:
+                told.append((envelope.body, running.clock.now_s()))
+
+            running.bus.subscribe(f"mission_control/{NAME}", Conversation.SIGHTINGS, LandmarkSighting, heard)
+            behavior = running.component(NAME)
+            truth: list[tuple[float, Pose]] = []
+            while not behavior.status.is_final:
+                truth.append((running.clock.now_s(), await pose(running, ROBOT)))
+                await running.clock.sleep_s(1 / 30)
+            assert len(told) > 5
+            for sighting, at_s in told:
+                assert sighting.robot == ROBOT
+                assert 0 <= at_s - sighting.at_s < 0.5
+                _, at = min(truth, key=lambda one, then_s=sighting.at_s: abs(one[0] - then_s))
+                seen = before_board(board, sighting)
+                assert math.hypot(seen.x_m - at.x_m, seen.y_m - at.y_m) <= 2 * sighting.spread_m
+                assert abs(math.remainder(seen.heading_rad - at.heading_rad, math.tau)) < math.radians(12.0)
+            pauses = [after.at_s - before.at_s for (before, _), (after, _) in pairwise(told)]
+            assert min(pauses) > 0.19
+
+    run_virtual(scene())

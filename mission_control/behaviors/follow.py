@@ -1,0 +1,89 @@
+"""Follow: keep a robot at a distance from another body that the same localizer knows, facing it.
+
+It goes straight towards the body, backs off if that comes nearer, and ends only by an order, or if the localizer knows
+one of the two no more.
+
+In mission.xml: an ARC of kind ``drive`` (or more), the localizer's name, and the body's.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import msgspec
+
+from backbone.errors import Refusal
+from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
+from mission_control.behaviors.motion import MOST_M_S, FloorPoint
+from mission_control.behaviors.way import keep_distance
+
+TOLERANCE_SHARE = 0.1  # chosen: of the distance; less would have the robot move all the time
+
+
+class FollowsItself(Refusal):
+    """The robot should follow itself."""
+
+    code = "follow.itself"
+    remedy = "Name another body as the target, or hold another robot."
+
+
+class FollowParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``Follow``.
+
+    Attributes:
+        target: Body to follow, as the localizer names it: another robot, in a simulated room a person, too.
+        localizer: Component that tracks both: its name if it is in the resource pool, else its address.
+        distance_m: Distance between the middles of the two that it keeps, 0.2 to 10.
+        speed_m_s: Fastest speed, above 0, at most 0.3.
+    """
+
+    target: str
+    localizer: str
+    distance_m: Annotated[float, msgspec.Meta(ge=0.2, le=10)] = 0.5
+    speed_m_s: float = 0.2
+
+    def __post_init__(self) -> None:
+        if not self.target:
+            raise ValueError("target is empty: name the body to follow")
+        if not self.localizer:
+            raise ValueError("localizer is empty: name the component that tracks robots")
+        if not 0 < self.speed_m_s <= MOST_M_S:
+            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
+
+
+class Follow(Driver[FollowParameters]):
+    """Never ends by itself; fails if the localizer does not know the robot or the target."""
+
+    parameters_type = FollowParameters
+    never = Driver.never | {Lost.code}
+    away_m = math.inf
+    """Distance from the target at the last decision."""
+
+    async def drive_on(self, robot: str) -> None:
+        """Decide ten times a second from both positions; see ``Driver.drive_on``."""
+        given = self.parameters
+        if given.target == robot:
+            self.give_up(FollowsItself(f"{robot} is the target of {self.name}"))
+            return
+        self.report(f"{robot} follows {given.target}")
+        while True:
+            given = self.parameters
+            of_target = await self.locate(given.localizer, given.target)
+            position = await self.locate(given.localizer, robot)
+            target = FloorPoint(of_target.x_m, of_target.y_m)
+            self.away_m = target.distance_m(position)
+            tolerance_m = TOLERANCE_SHARE * given.distance_m
+            await self.move(
+                keep_distance(position, target, given.distance_m, speed_m_s=given.speed_m_s, tolerance_m=tolerance_m)
+            )
+            await self.clock.sleep_s(DECIDE_EVERY_S)
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Keep nothing: what counts is where both are then."""
+        self.report(f"suspended: {suspended_because(reason, by)}")
+
+    def statistics(self) -> dict[str, float]:
+        """Return the base's counters, and the distance; negative: not known yet."""
+        return {**super().statistics(), "away_m": self.away_m if math.isfinite(self.away_m) else -1.0}

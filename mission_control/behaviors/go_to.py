@@ -1,0 +1,144 @@
+"""Go to: drive a robot to a place, straight, as a localizer tells where it is.
+
+There is no way around obstacles; choose places that can be reached straight. Any kind of robot that moves will do. The
+robot gets there as surely as its localizer knows where it is: the success contains the spread.
+
+In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeVar
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.errors import Refusal
+from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
+from mission_control.behaviors.motion import MOST_M_S, NEAREST_M, FloorPoint
+from mission_control.behaviors.way import Way
+from mission_control.messages import BehaviorStatus
+
+FARTHEST_M = 1000.0  # chosen: the largest room
+
+
+class NotThere(Refusal):
+    """The robot does not get to its place."""
+
+    code = "go_to.not_there"
+    remedy = "See that the straight way is free, give it more time, or go there in several legs."
+
+
+class WayParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of behaviors that go to a place.
+
+    Attributes:
+        localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
+        speed_m_s: Speed on the straight way, above 0, at most 0.3.
+        reached_within_m: Distance from the place that counts as reached, at least 0.02.
+        within_s: Time after which it fails, of the time in which the robot is held; 0: never.
+    """
+
+    localizer: str
+    speed_m_s: float = 0.2
+    reached_within_m: float = 0.08
+    within_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.localizer:
+            raise ValueError("localizer is empty: name the component that tracks robots")
+        if not 0 < self.speed_m_s <= MOST_M_S:
+            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
+        if not NEAREST_M <= self.reached_within_m < math.inf:
+            raise ValueError(f"reached_within_m is {self.reached_within_m}: it must be at least {NEAREST_M}")
+        if not 0 <= self.within_s < math.inf:
+            raise ValueError(f"within_s is {self.within_s}: it must be at least 0")
+
+
+class GoToParameters(WayParameters, frozen=True, kw_only=True):
+    """Parameters of ``GoTo``.
+
+    Attributes:
+        x_m: The place, along the room's width.
+        y_m: The place, along the room's depth.
+    """
+
+    x_m: float
+    y_m: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, value in (("x_m", self.x_m), ("y_m", self.y_m)):
+            if not abs(value) <= FARTHEST_M:
+                raise ValueError(f"{name} is {value}: it must be from -{FARTHEST_M:g} to {FARTHEST_M:g}")
+
+
+W = TypeVar("W", bound=WayParameters)
+
+
+class Goer(Driver[W]):
+    """Base class of behaviors that go to a place: derive and override ``place``."""
+
+    never = Driver.never | {Lost.code}
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self.way: Way | None = None
+        """The state of the way; None until the place is known."""
+
+    async def place(self, robot: str) -> FloorPoint:
+        """Return where to go. When: at the first grant, and after a change of parameters; raises as ``locate``."""
+        raise NotImplementedError
+
+    async def drive_on(self, robot: str) -> None:
+        """Decide ten times a second from the robot's position; see ``Driver.drive_on``."""
+        while True:
+            way = self.way or await self._set_out(robot)
+            position = await self.locate(self.parameters.localizer, robot)
+            motion = way.decide(position, self.clock.now_s())
+            if way.is_over:
+                break
+            self.report(f"{robot} goes to {_spoken(way.place)}")
+            await self.move(motion)
+            await self.clock.sleep_s(DECIDE_EVERY_S)
+        await self.held.halt()
+        if way.failure:
+            self.give_up(NotThere(f"{robot} is not at {_spoken(way.place)}: {way.failure}"))
+        else:
+            at = {"x_m": position.x_m, "y_m": position.y_m, "spread_m": self.spread_m}
+            self.finish(BehaviorStatus.SUCCESS, at)
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Keep the place; later continue from the robot's position then."""
+        if self.way is not None:
+            self.way.interrupt()
+            self.report(f"suspended on the way to {_spoken(self.way.place)}: {suspended_because(reason, by)}")
+
+    def parameters_changed(self) -> None:
+        """Begin a new way with the new parameters."""
+        self.way = None
+
+    async def _set_out(self, robot: str) -> Way:
+        given, place = self.parameters, await self.place(robot)
+        self.way = Way(
+            place,
+            speed_m_s=given.speed_m_s,
+            reached_within_m=given.reached_within_m,
+            within_s=given.within_s,
+        )
+        return self.way
+
+
+class GoTo(Goer[GoToParameters]):
+    """Succeeds at its place, from any begin; fails if the robot gets no nearer, or is too slow."""
+
+    parameters_type = GoToParameters
+
+    async def place(self, robot: str) -> FloorPoint:  # noqa: ARG002  the same for all
+        """Return the place of the parameters; see ``Goer``."""
+        return FloorPoint(self.parameters.x_m, self.parameters.y_m)
+
+
+def _spoken(place: FloorPoint) -> str:
+    return f"({place.x_m:.2f}, {place.y_m:.2f}) m"

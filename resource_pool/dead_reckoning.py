@@ -1,0 +1,243 @@
+"""Dead reckoning: where one robot is believed to be, from the motions that it carried out since a known place.
+
+Rules of this file: no bus, no clock. Events and mission time go in, beliefs come out.
+
+* A motion lasts until the next one, at most ``COMMAND_TIMEOUT_S``, as robots end it. Where a robot counts its way by
+  itself, its count replaces the commanded way.
+* The spread grows with way and turns, and never shrinks but by a sighting of a landmark, which replaces the belief.
+* Numbers that no robot can have change nothing; time never runs backwards.
+
+Source: Borenstein, Everett and Feng, "Where am I?", 1996, chapter 1: odometry "is fundamentally the integration of
+incremental motion information over time, which leads inevitably to the accumulation of errors".
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from resource_pool.localization import PoseSource
+from resource_pool.messages import COMMAND_TIMEOUT_S
+
+WAY_SHARE = 0.03  # chosen: twice the way that a Scout in the simulated room was found to lack at start and end
+TURN_SHARE = 0.05  # chosen: a Scout in the simulated room was measured to lack 3 to 6 % of a turn
+HEADING_RAD_PER_M = 0.02  # chosen: a wheel that is 1 mm larger than the other turns a Scout about that much
+JUMP_M = 0.5  # chosen: longer than a Scout's jump over 30 cm carries it
+JUMP_RAD = math.pi / 2  # chosen: it lands on its wheels, but turned
+FASTEST_M_S = 5.0  # chosen: faster than any robot of a room; an odometer that says more has begun anew
+MOST_RAD_S = 50.0  # chosen: faster than any robot of a room turns
+FARTHEST_M = 1e6  # the limit of ``Meters``
+REMEMBERED_S = 1.0  # chosen: a picture is older by a third of a second at most when its landmark is found
+REMEMBERED = 128  # chosen: twice as many motions as arrive in that time
+SIGHT_LASTS_S = 1.0  # chosen: while a robot looks at a landmark, sightings come several times a second
+
+
+@dataclass(frozen=True, slots=True)
+class FloorPose:
+    """A place on the floor with a heading: meters, radians from -pi to pi."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float = 0.0
+
+    def moved(self, way_m: float, turned_rad: float) -> FloorPose:
+        """Return the pose after a way along an arc that turns by this angle, to the left if positive."""
+        half_rad = turned_rad / 2
+        chord_m = way_m * (math.sin(half_rad) / half_rad if abs(half_rad) > 1e-6 else 1.0)
+        along_rad = self.heading_rad + half_rad
+        return FloorPose(
+            _within(self.x_m + chord_m * math.cos(along_rad), FARTHEST_M),
+            _within(self.y_m + chord_m * math.sin(along_rad), FARTHEST_M),
+            _turned(self.heading_rad + turned_rad),
+        )
+
+    def after(self, begin: FloorPose, end: FloorPose) -> FloorPose:
+        """Return the pose that one gets to from here by what led from ``begin`` to ``end``."""
+        angle_rad = self.heading_rad - begin.heading_rad
+        x_m, y_m = end.x_m - begin.x_m, end.y_m - begin.y_m
+        return FloorPose(
+            _within(self.x_m + x_m * math.cos(angle_rad) - y_m * math.sin(angle_rad), FARTHEST_M),
+            _within(self.y_m + x_m * math.sin(angle_rad) + y_m * math.cos(angle_rad), FARTHEST_M),
+            _turned(end.heading_rad + angle_rad),
+        )
+
+    def distance_m(self, other: FloorPose) -> float:
+        """Return the distance between the two places."""
+        return math.hypot(self.x_m - other.x_m, self.y_m - other.y_m)
+
+    @property
+    def is_finite(self) -> bool:
+        """True if it is a place in some room."""
+        return _are_sane(FARTHEST_M, self.x_m, self.y_m, self.heading_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """Where a robot is believed to be.
+
+    Attributes:
+        at_s: Mission time for which it holds.
+        spread_m: Standard deviation of the place.
+        spread_rad: Standard deviation of the heading, at most pi: it may look anywhere.
+        source: What it rests on last.
+    """
+
+    pose: FloorPose
+    at_s: float
+    spread_m: float
+    spread_rad: float
+    source: PoseSource = PoseSource.DEAD_RECKONING
+
+
+class DeadReckoning:
+    """The belief about one robot.
+
+    Args:
+        begin: Where it is believed to be first; finite.
+    """
+
+    def __init__(self, begin: Belief) -> None:
+        self._belief = begin
+        self._moves = (0.0, 0.0)
+        self._until_s = begin.at_s
+        self._count: tuple[float, float, float] | None = None  # its own count of way and turn at the last reading, when
+        self._counted_from = begin
+        self._sighted_s = -math.inf
+        self._past = deque([(begin.at_s, begin.pose)], maxlen=REMEMBERED)
+
+    @property
+    def is_moving(self) -> bool:
+        """True while the last motion has not ended, as of the last event or question."""
+        return any(self._moves) and self._belief.at_s < self._until_s
+
+    def believe(self, now_s: float) -> Belief:
+        """Return the belief for this time; a time before the last one means the last one."""
+        self._advance(now_s)
+        return self._belief
+
+    def moves(self, forward_m_s: float, turn_rad_s: float, at_s: float) -> None:
+        """Note that the robot moves like this from now on, for ``COMMAND_TIMEOUT_S`` at most."""
+        if not (_are_sane(FASTEST_M_S, forward_m_s) and _are_sane(MOST_RAD_S, turn_rad_s)):
+            return
+        self._advance(at_s)
+        self._moves, self._until_s = (forward_m_s, turn_rad_s), self._belief.at_s + COMMAND_TIMEOUT_S
+
+    def jumps(self, at_s: float) -> None:
+        """Note that the robot leaves the floor, and comes down somewhere near."""
+        self.moves(0.0, 0.0, at_s)
+        self._loses(JUMP_M, JUMP_RAD)
+
+    def counts(self, way_m: float, turned_rad: float, at_s: float) -> None:
+        """Take the robot's own count of its way and turn since it was switched on, in place of the commanded ones.
+
+        The first count, the first after a sighting, and one that no robot can have reached, begin a new series.
+        """
+        if not _are_sane(FARTHEST_M, way_m, turned_rad):
+            return
+        self._advance(at_s)
+        now, before, from_there = self._belief, self._count, self._counted_from
+        if before is not None:
+            way_m_since, turned_since, passed_s = way_m - before[0], turned_rad - before[1], now.at_s - before[2]
+            may_s = passed_s + COMMAND_TIMEOUT_S
+            if abs(way_m_since) <= FASTEST_M_S * may_s and abs(turned_since) <= MOST_RAD_S * may_s:
+                grown = _grown(from_there, way_m_since, turned_since, now.at_s)
+                self._belief = Belief(
+                    grown.pose,
+                    now.at_s,
+                    max(grown.spread_m, now.spread_m),
+                    max(grown.spread_rad, now.spread_rad),
+                    now.source,
+                )
+                self._remember()
+        self._count, self._counted_from = (way_m, turned_rad, now.at_s), self._belief
+
+    def sighted(self, pose: FloorPose, spread_m: float, spread_rad: float, at_s: float) -> None:
+        """Take the pose that a landmark showed, and add the motion since ``at_s``.
+
+        What is longer ago than ``REMEMBERED_S`` changes nothing.
+        """
+        now = self._belief
+        fits = pose.is_finite and _are_sane(FARTHEST_M, spread_m, spread_rad) and min(spread_m, spread_rad) >= 0
+        if not fits or not now.at_s - REMEMBERED_S <= at_s < math.inf:
+            return
+        self._advance(at_s)
+        now, then = self._belief, self._at(at_s)
+        seen = pose.after(then, now.pose)
+        self._belief = Belief(seen, now.at_s, spread_m, min(math.pi, spread_rad), PoseSource.LANDMARK)
+        self._count, self._sighted_s = None, now.at_s
+        self._past.clear()
+        self._remember()
+
+    def _loses(self, spread_m: float, spread_rad: float) -> None:
+        now = self._belief
+        self._belief = Belief(
+            now.pose,
+            now.at_s,
+            min(FARTHEST_M, now.spread_m + spread_m),
+            min(math.pi, now.spread_rad + spread_rad),
+            now.source,
+        )
+        if self._count is not None:
+            self._counted_from = self._belief
+
+    def _advance(self, now_s: float) -> None:
+        before = self._belief
+        if not before.at_s < now_s < math.inf:
+            return
+        lasted_s = max(0.0, min(now_s, self._until_s) - before.at_s)
+        forward_m_s, turn_rad_s = self._moves
+        self._belief = _grown(before, forward_m_s * lasted_s, turn_rad_s * lasted_s, now_s)
+        if now_s - self._sighted_s > SIGHT_LASTS_S and any(self._moves) and lasted_s:
+            self._belief = _by_reckoning(self._belief)
+        if now_s >= self._until_s:
+            self._moves = (0.0, 0.0)
+        self._remember()
+
+    def _remember(self) -> None:
+        now = self._belief
+        if self._past and self._past[-1][0] == now.at_s:
+            self._past.pop()  # it was put right
+        self._past.append((now.at_s, now.pose))
+        while len(self._past) > 2 and self._past[1][0] <= now.at_s - REMEMBERED_S:
+            self._past.popleft()
+
+    def _at(self, at_s: float) -> FloorPose:
+        """Return the pose believed for a time in the past, on a straight line between two that are known."""
+        before_s, before = self._past[0]
+        for after_s, after in self._past:
+            if after_s >= at_s:
+                share = (at_s - before_s) / (after_s - before_s) if after_s > before_s else 1.0
+                share = min(1.0, max(0.0, share))
+                return FloorPose(
+                    before.x_m + share * (after.x_m - before.x_m),
+                    before.y_m + share * (after.y_m - before.y_m),
+                    before.heading_rad + share * _turned(after.heading_rad - before.heading_rad),
+                )
+            before_s, before = after_s, after
+        return before
+
+
+def _grown(before: Belief, way_m: float, turned_rad: float, at_s: float) -> Belief:
+    """Return the belief after this way and turn: an error of the heading becomes one of the place on the way."""
+    way, turn = abs(way_m), abs(turned_rad)
+    spread_rad = min(math.pi, before.spread_rad + TURN_SHARE * turn + HEADING_RAD_PER_M * way)
+    spread_m = min(FARTHEST_M, before.spread_m + (WAY_SHARE + min(1.0, spread_rad)) * way)
+    return Belief(before.pose.moved(way_m, turned_rad), at_s, spread_m, spread_rad, before.source)
+
+
+def _by_reckoning(belief: Belief) -> Belief:
+    return Belief(belief.pose, belief.at_s, belief.spread_m, belief.spread_rad)
+
+
+def _are_sane(most: float, *numbers: float) -> bool:
+    """Return whether each of the numbers is one, and not beyond this."""
+    return all(abs(number) <= most for number in numbers)
+
+
+def _within(value: float, most: float) -> float:
+    return max(-most, min(most, value))
+
+
+def _turned(angle_rad: float) -> float:
+    return math.atan2(math.sin(angle_rad), math.cos(angle_rad))

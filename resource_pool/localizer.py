@@ -1,0 +1,301 @@
+"""Localizer: where robots are believed to be, by dead reckoning and landmarks; no camera above the room, no simulator.
+
+It begins with the places at which the mission file says that the robots stand, listens to what their RCs have them do
+and to what they count themselves, and corrects itself when a behavior sees a landmark. The rules are in
+``dead_reckoning``; this file has the loop. It keeps its beliefs in a file: a restarted localizer continues from there,
+less sure by the way that a robot can have gone meanwhile, and without the file it is sure of no robot that was
+commanded before.
+
+In mission.xml: a resource of type ``localizer``, named by behaviors as ``localizer``. Nobody claims it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import msgspec
+
+from backbone.atomic_file import replace_file
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
+from backbone.rc_manager.messages import AskRc, Connect, Disconnect, RcState
+from backbone.wire import Accepts, Envelope, Message
+from resource_pool.begin_places import read_begins
+from resource_pool.commands import Halt, Jump
+from resource_pool.dead_reckoning import Belief, DeadReckoning, FloorPose
+from resource_pool.floor_plans import board, plan_of, sighted_from
+from resource_pool.localization import (
+    AskFloorPlan,
+    AskHome,
+    AskPose,
+    FloorPlan,
+    LandmarkSighting,
+    Pose,
+    UnknownPlace,
+)
+from resource_pool.messages import Applied, Readings
+from resource_pool.rc_readings import watch_readings
+from resource_pool.resource_controller import RcParameters, ResourceController
+from scout_model.description import WorldDescription
+
+log = logging.getLogger(__name__)
+
+EVERY_S = 0.2  # chosen: five poses a second are a smooth track on a map
+KEEP_EVERY_S = 1.0  # chosen: what a robot does in a second is less than what it can do until a restart
+PLACED_M = 0.02  # chosen: a robot is put on its mark by hand
+PLACED_RAD = math.radians(2.0)  # chosen: same
+SIGHTED_RAD = math.radians(3.0)  # chosen: twice what servoing at 1 m was measured to err
+UNSEEN_M_S = 0.5  # chosen: what a small robot can go meanwhile
+UNSEEN_RAD_S = 2.0  # chosen: what it can turn meanwhile
+LOST_M = 100.0  # chosen: larger than a room: it may be anywhere
+LATE_S = 0.5  # chosen: a message that is older says nothing of now
+FIRST_REPLY_S = 0.5  # chosen: an RC that runs answers in milliseconds
+WAY, TURNED = "way_m", "turned_rad"
+"""Fields of a robot's reports with its own count of way and turn since it was switched on."""
+
+Size = Annotated[float, msgspec.Meta(ge=0, le=1000)]
+
+
+class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
+    """Parameters of a localizer.
+
+    Attributes:
+        starts: Where robots stand at the beginning, ``name:x,y,heading`` in meters and degrees, separated by blanks;
+            robots that are not named stand where the world has them.
+        landmarks: Boards besides those of the world, in the same form; each faces along its heading.
+        width_m: Extent of the room along x, meters; 0: that of the world.
+        depth_m: Extent of the room along y, meters; 0: that of the world.
+        room: The world of the mission file.
+    """
+
+    starts: str = ""
+    landmarks: str = ""
+    width_m: Size = 0.0
+    depth_m: Size = 0.0
+    room: WorldDescription | None = None
+
+    def __post_init__(self) -> None:
+        for places in (self.starts, self.landmarks):
+            read_begins(places)
+
+    def begins(self) -> dict[str, FloorPose]:
+        """Return robot → where it begins."""
+        robots = [] if self.room is None else self.room.robots
+        return {one.name: FloorPose(one.x_m, one.y_m, one.heading_rad) for one in robots} | read_begins(self.starts)
+
+    def plan(self) -> FloorPlan:
+        """Return the plan of the floor."""
+        of_world = FloorPlan(0.0, 0.0) if self.room is None else plan_of(self.room)
+        own = [board(name, at) for name, at in read_begins(self.landmarks).items()]
+        return msgspec.structs.replace(
+            of_world,
+            width_m=self.width_m or of_world.width_m,
+            depth_m=self.depth_m or of_world.depth_m,
+            shapes=[*of_world.shapes, *own],
+        )
+
+
+class Memory(msgspec.Struct, frozen=True):
+    """What a localizer keeps for its next life.
+
+    Attributes:
+        at_s: Mission time.
+        beliefs: Robot → belief.
+    """
+
+    at_s: float
+    beliefs: dict[str, Belief]
+
+
+class Localizer(ResourceController[LocalizerParameters]):
+    """Answers ``AskPose``, ``AskHome`` and ``AskFloorPlan``, and publishes each pose that changes."""
+
+    parameters_type = LocalizerParameters
+    given_elsewhere = ResourceController.given_elsewhere | {"room", "world"}
+    accepts: ClassVar[Accepts | None] = Connect | Disconnect | AskRc | AskPose | AskHome | AskFloorPlan
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._plan = self.parameters.plan()
+        self._homes = self.parameters.begins()
+        self._file = Path(launch.run_directory) / "localizers" / self.name if launch.run_directory else None
+        kept = _read(self._file)
+        self._is_first_life = kept is None
+        self._robots = {name: DeadReckoning(self._first(name, kept)) for name in self._homes}
+        self._published: dict[str, Pose] = {}
+        self._news = asyncio.Event()
+        self._kept_s = -math.inf
+        self._is_kept = True
+        self._heard: Counter[str] = Counter()
+        self._sightings = self._poses = 0
+
+    async def connect(self) -> None:
+        """Listen to robots' RCs and to behaviors that see landmarks."""
+        await super().connect()
+        for name in self._homes:
+            self.bus.subscribe(address(Subsystem.RESOURCE_POOL, name), Conversation.MOTIONS, Applied, self._applied)
+        watch_readings(self.bus, self._counted)
+        sights = f"{Subsystem.MISSION_CONTROL}/*"
+        self.bus.subscribe(sights, Conversation.SIGHTINGS, LandmarkSighting, self._sighted)
+
+    async def serve(self) -> None:
+        """Publish each pose that changes, and keep the beliefs."""
+        self.start_task(self._publish_when_changed(), "poses")
+        self._news.set()
+        await super().serve()
+
+    async def answer(self, asked: Envelope[Message]) -> Message:
+        """Answer ``AskPose``, ``AskHome`` and ``AskFloorPlan``, too."""
+        match asked.body:
+            case AskPose(body=body):
+                return self._pose(body)
+            case AskHome(body=body):
+                return self._home(body)
+            case AskFloorPlan():
+                return self._plan
+        return await super().answer(asked)
+
+    def statistics(self) -> dict[str, float]:
+        """Count what was heard and published, too."""
+        own = {"motions_heard": self._heard.total(), "sightings_taken": self._sightings, "poses_published": self._poses}
+        return {**super().statistics(), **own, "robots_known": len(self._robots)}
+
+    # ------------------------------------------------------------------ what it hears
+    def _applied(self, envelope: Envelope[Applied]) -> None:
+        told, robot = envelope.body, self._robots.get(envelope.body.rc)
+        if robot is None or envelope.source != address(Subsystem.RESOURCE_POOL, told.rc):
+            return
+        self._heard[told.rc] += 1
+        at_s = self._plausible_s(told.at_s)
+        if told.command == Halt.word():
+            robot.moves(0.0, 0.0, at_s)
+        elif told.command == Jump.word():
+            robot.jumps(at_s)
+        elif "forward_m_s" in told.values and "turn_rad_s" in told.values:
+            robot.moves(told.values["forward_m_s"], told.values["turn_rad_s"], at_s)
+        self._news.set()
+
+    def _counted(self, told: Readings) -> None:
+        robot = self._robots.get(told.rc)
+        if robot is not None and WAY in told.values and TURNED in told.values:
+            robot.counts(told.values[WAY], told.values[TURNED], self._plausible_s(told.at_s))
+            self._news.set()
+
+    def _sighted(self, envelope: Envelope[LandmarkSighting]) -> None:
+        sighting, robot = envelope.body, self._robots.get(envelope.body.robot)
+        if robot is None:
+            return
+        pose = sighted_from(self._plan, sighting, robot.believe(self.clock.now_s()))
+        if pose is not None:
+            robot.sighted(pose, sighting.spread_m, SIGHTED_RAD, min(sighting.at_s, self.clock.now_s()))
+            self._sightings += 1
+            self._news.set()
+
+    def _plausible_s(self, at_s: float) -> float:
+        """Return the time that a message states, unless it is one at which it cannot have been sent."""
+        now_s = self.clock.now_s()
+        return at_s if now_s - LATE_S * max(1.0, self.clock.rate) <= at_s <= now_s else now_s
+
+    # ------------------------------------------------------------------ what it says
+    def _pose(self, body: str) -> Pose:
+        robot = self._robots.get(body)
+        if robot is not None:
+            return _pose_of(body, robot.believe(self.clock.now_s()))
+        for shape in self._plan.shapes:
+            if shape.name == body:
+                at = FloorPose(shape.x_m, shape.y_m, shape.heading_rad)
+                return _pose_of(body, Belief(at, self.clock.now_s(), 0.0, 0.0))
+        raise self._unknown(body)
+
+    def _home(self, robot: str) -> Pose:
+        if robot not in self._homes:
+            raise self._unknown(robot)
+        return _pose_of(robot, Belief(self._homes[robot], self.clock.now_s(), PLACED_M, PLACED_RAD))
+
+    def _unknown(self, body: str) -> UnknownPlace:
+        known = ", ".join(sorted(self._homes)) or "none"
+        return UnknownPlace(f"{self.name} knows no place of {body!r}; the robots that it knows: {known}")
+
+    async def _publish_when_changed(self) -> None:
+        await self._doubt_what_was_missed()
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            self._publish()
+            await self.clock.sleep_s(EVERY_S * max(1.0, self.clock.rate))
+            if not self._is_kept or any(robot.is_moving for robot in self._robots.values()):
+                self._news.set()
+
+    def _publish(self) -> None:
+        now_s = self.clock.now_s()
+        for name, robot in self._robots.items():
+            pose, before = _pose_of(name, robot.believe(now_s)), self._published.get(name)
+            if before is None or msgspec.structs.replace(before, at_s=pose.at_s) != pose:
+                self._published[name] = pose
+                self.bus.publish(self.address, Conversation.POSES, pose)
+                self._poses += 1
+                self._is_kept = False
+        if not self._is_kept and now_s - self._kept_s >= KEEP_EVERY_S * max(1.0, self.clock.rate):
+            self._keep(now_s)
+
+    # ------------------------------------------------------------------ from life to life
+    def _first(self, name: str, kept: Memory | None) -> Belief:
+        """Return the first belief about a robot: where it is put, or what an earlier life kept, less sure by now."""
+        now_s = self.clock.now_s()
+        if kept is None:
+            return Belief(self._homes[name], now_s, PLACED_M, PLACED_RAD)
+        if name not in kept.beliefs:
+            return Belief(self._homes[name], now_s, LOST_M, math.pi)
+        was, passed_s = kept.beliefs[name], max(0.0, now_s - kept.at_s)
+        spread_m, spread_rad = was.spread_m + UNSEEN_M_S * passed_s, was.spread_rad + UNSEEN_RAD_S * passed_s
+        return Belief(was.pose, now_s, min(LOST_M, spread_m), min(math.pi, spread_rad))
+
+    async def _doubt_what_was_missed(self) -> None:
+        """Without a memory, be sure of no robot whose RC has applied commands before."""
+        if not self._is_first_life:
+            return
+        for name in self._homes:
+            try:
+                rc = address(Subsystem.RESOURCE_POOL, name)
+                state = await self.bus.ask(rc, AskRc(), RcState, within_s=FIRST_REPLY_S)
+            except (LinkError, Refusal):  # it does not run yet, so it has applied nothing
+                continue
+            if state.applied > self._heard[name]:
+                lost = Belief(self._homes[name], self.clock.now_s(), LOST_M, math.pi)
+                self._robots[name] = DeadReckoning(lost)
+                self.publish_event(name, "is at an unknown place: it was moved before this localizer began")
+
+    def _keep(self, now_s: float) -> None:
+        self._kept_s, self._is_kept = now_s, True
+        if self._file is None:
+            return
+        memory = Memory(now_s, {name: robot.believe(now_s) for name, robot in self._robots.items()})
+        try:
+            self._file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            replace_file(self._file, msgspec.msgpack.encode(memory), is_lasting=False)
+        except OSError as error:
+            log.warning("%s: the beliefs are not kept: %s", self._file, error)
+
+
+def _pose_of(body: str, belief: Belief) -> Pose:
+    at = belief.pose
+    return Pose(body, belief.at_s, at.x_m, at.y_m, at.heading_rad, belief.source, belief.spread_m, belief.spread_rad)
+
+
+def _read(file: Path | None) -> Memory | None:
+    """Return what an earlier life of this localizer kept."""
+    if file is None or not file.exists():
+        return None
+    try:
+        return msgspec.msgpack.decode(file.read_bytes(), type=Memory)
+    except (OSError, msgspec.DecodeError) as error:
+        log.error("%s: %s", file, error)
+        return Memory(0.0, {})  # there was a life before, so robots may be anywhere

@@ -1,0 +1,55 @@
+"""A Scout goes to a place and home by dead reckoning, in processes of their own; the simulated world tells the truth."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from pathlib import Path
+
+import pytest
+from running_mission import mission_up
+
+from backbone.bus.interface import Bus
+from backbone.keys import Conversation
+from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus
+from resource_pool.localization import AskPose, Pose, PoseSource
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
+
+GO_TO = Path(__file__).parents[2] / "docs" / "examples" / "go-to.xml"
+GOAL, HOME = (3.0, 2.0), (1.0, 1.0)
+THERE_WITHIN_S = 90.0
+
+
+async def truth(bus: Bus) -> Pose:
+    return await bus.ask("resource_pool/world", AskPose("scout1"), Pose, within_s=2)
+
+
+def away_m(at: Pose, place: tuple[float, float]) -> float:
+    return math.hypot(at.x_m - place[0], at.y_m - place[1])
+
+
+async def test_a_scout_goes_to_its_place_and_home_by_dead_reckoning() -> None:
+    with mission_up(mission_xml=GO_TO) as mission:
+        async with mission.bus() as bus:
+            published: list[Pose] = []
+            bus.subscribe(
+                "resource_pool/localizer", Conversation.POSES, Pose, lambda heard: published.append(heard.body)
+            )
+            nearest_m, ends_s = math.inf, time.monotonic() + THERE_WITHIN_S
+            while True:
+                nearest_m = min(nearest_m, away_m(await truth(bus), GOAL))
+                errand = await bus.ask("mission_control/errand", AskBehavior(), BehaviorState, within_s=2)
+                if errand.status.is_final:
+                    break
+                assert time.monotonic() < ends_s, f"{errand}\n{mission.story()}"
+                await asyncio.sleep(0.2)
+            assert errand.status is BehaviorStatus.SUCCESS, f"{errand}\n{mission.story()}"
+            at = await truth(bus)
+            believed = await bus.ask("resource_pool/localizer", AskPose("scout1"), Pose, within_s=2)
+        assert nearest_m < 0.4  # measured: 0.15 m
+        assert away_m(at, HOME) < 0.6  # measured: 0.2 m
+        assert away_m(at, (believed.x_m, believed.y_m)) <= 2 * believed.spread_m
+        assert {pose.body for pose in published} == {"scout1", "scout2"}
+        assert {pose.source for pose in published} == {PoseSource.DEAD_RECKONING}
