@@ -72,13 +72,13 @@ async def test_robots_are_on_the_map_with_name_source_spread_and_trail_and_an_ol
         )
         mark = page.locator("#map-plan [data-body=scout1]")
         assert await mark.locator(".name").text_content() == "scout1"
-        assert await mark.locator(".source").text_content() == "from a camera above the room"
+        assert await mark.locator(".source").text_content() == "tracked from above"
         spread_px = float(await mark.locator(".spread").get_attribute("r"))
         assert spread_px == pytest.approx(0.1 * (await page.locator("#map-plan").bounding_box())["width"] / 6, rel=0.05)
         turn = await mark.locator(".arrow").evaluate("one => one.parentNode.getAttribute('transform')")
         assert float(turn.removeprefix("rotate(").removesuffix(")")) == pytest.approx(-90, abs=0.1)
         assert await page.locator("#map-plan .furniture").count() == 1
-        chip = page.get_by_role("button", name="scout1 from a camera")
+        chip = page.get_by_role("button", name="scout1 tracked")
         assert "±0.10 m" in await chip.text_content()
         floor.eye.is_silent = True
         await page.wait_for_selector("#map-plan [data-body=scout1].is-stale")
