@@ -203,6 +203,34 @@ export interface NodeView {
   because: string;
 }
 
+export type OrderKind =
+  | "follow"
+  | "go_to"
+  | "return_home"
+  | "watch_for_motion";
+
+export type OrderState =
+  | "done"
+  | "ended"
+  | "failed"
+  | "running"
+  | "starting"
+  | "waiting";
+
+export interface OrderView {
+  robot: string;
+  kind: OrderKind;
+  number: number;
+  words: string;
+  state: OrderState;
+  why: string;
+  by: string;
+  line: string;
+  x_m: number;
+  y_m: number;
+  target: string;
+}
+
 export interface OwnView {
   console: string;
   user: string;
@@ -223,6 +251,7 @@ export interface OwnView {
   lost: LostView | null;
   link_down_s: number;
   moment: number;
+  orders: OrderView[];
 }
 
 export interface ParameterView {
