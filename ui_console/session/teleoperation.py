@@ -128,11 +128,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Robot → its order; one that is done, failed or ended keeps its robot for the operator until it is taken."""
         return self._orders.orders
 
-    def order(self, order: Order) -> None:
-        """Tell a robot to do something by itself; see ``order_group``."""
-        self.order_group([order])
+    def order(self, order: Order) -> int:
+        """Tell a robot to do something by itself; return the order's number; see ``order_group``."""
+        return self.order_group([order])[0]
 
-    def order_group(self, orders: Sequence[Order]) -> None:
+    def order_group(self, orders: Sequence[Order]) -> list[int]:
         """Tell robots to do something by themselves, all at once; ``OrderChanged`` shows what becomes of each.
 
         An order claims its robot with this console's priority, whether the stick holds it or not; a robot in hand stays
@@ -140,11 +140,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
         nothing before it was let go; a new press, ``take`` and ``interrupt`` end the order of the robot at the stick.
 
         Args:
-            orders: One for each robot.
+            orders: One for each robot; without a robot it is for the one at the stick.
+
+        Returns:
+            The number of each order, from 1, unique at this console.
         """
         self.touch()
         self.require_let_go()
-        self._orders.give(orders)
+        return self._orders.give(orders)
 
     def interrupt(self) -> None:
         """Take the robot at the stick from its order, if one goes on; it comes to rest."""

@@ -171,7 +171,7 @@ class Session:
         """Set a parameter; return whether the component applied it."""
         return await self._ready_console().set_parameter(name, parameter, value)
 
-    def _with_robot(self, act: Callable[[Teleoperation], None]) -> None:
+    def _with_robot(self, act: Callable[[Teleoperation], object]) -> None:
         if isinstance(self._console, Teleoperation) and self._console.is_ready:
             act(self._console)
 
