@@ -11,6 +11,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import msgspec
+from msgspec.structs import replace
 
 from backbone.component.abilities import CameraForm
 from backbone.component_database.messages import ComponentType, Types
@@ -29,11 +30,11 @@ LEAST_ROOM_M = 2.0  # chosen: a floor of which nothing is known is shown at leas
 
 SOURCES = {
     PoseSource.SIMULATOR: "from the simulator",
-    PoseSource.TRACKING: "from a camera above the room",
-    PoseSource.DEAD_RECKONING: "reckoned from its commands",
-    PoseSource.LANDMARK: "from a landmark it sees",
+    PoseSource.TRACKING: "tracked from above",
+    PoseSource.DEAD_RECKONING: "dead reckoning",
+    PoseSource.LANDMARK: "by a landmark",
 }
-"""For people."""
+"""For people, in the few words for which there is room beside a robot."""
 
 
 class FloorView(msgspec.Struct, frozen=True):
@@ -111,7 +112,8 @@ class MapBoard:
     def __init__(self, picture: MissionPicture, links: LinkBoard) -> None:
         self._picture, self._links = picture, links
         self._told: FloorPlan | None = None
-        self._grown: FloorPlan | None = None
+        self._floor: FloorPlan | None = None
+        self._far_m = LEAST_ROOM_M, LEAST_ROOM_M
         self._tracks: dict[str, _Track] = {}
         self._types: dict[str, ComponentType] = {}
 
@@ -119,6 +121,7 @@ class MapBoard:
     def take_plan(self, plan: FloorPlan) -> None:
         """Take in the plan of the floor; the newest counts."""
         self._told = plan
+        self._lay_floor()
 
     def take_pose(self, pose: Pose) -> None:
         """Take in where a body is believed to be; a message older than the last one changes nothing."""
@@ -128,7 +131,9 @@ class MapBoard:
         if track is None:
             track = self._tracks[pose.body] = _Track(pose)
         track.take(pose)
-        self._grow(pose)
+        far_x_m, far_y_m = self._far_m
+        self._far_m = max(far_x_m, float(math.ceil(pose.x_m))), max(far_y_m, float(math.ceil(pose.y_m)))
+        self._lay_floor()
 
     def take_types(self, types: Types) -> None:
         """Take in the component types of the mission, which declare the robots' cameras."""
@@ -137,11 +142,11 @@ class MapBoard:
     # ------------------------------------------------------------------ views out
     @property
     def floor(self) -> FloorPlan | None:
-        """The plan of the floor; while no localizer told one, an empty floor around the bodies; None: no body either.
+        """The plan of the floor; None: no localizer told one, and no body has a place.
 
-        It is the same object until it changes.
+        Where no extent was told it holds every place so far. It is the same object until it changes.
         """
-        return self._told or self._grown
+        return self._floor
 
     @property
     def names(self) -> list[str]:
@@ -185,17 +190,21 @@ class MapBoard:
             raise NoFloorThere(f"no localizer knows where {robot} is", remedy="Drive it by hand.")
         x_m, y_m = floor_place(column_px, row_px, size_px, camera, stand)
         plan = self._told
-        if plan is not None and not (0.0 <= x_m <= plan.width_m and 0.0 <= y_m <= plan.depth_m):
+        is_known = plan is not None and plan.width_m > 0.0 and plan.depth_m > 0.0
+        if plan is not None and is_known and not (0.0 <= x_m <= plan.width_m and 0.0 <= y_m <= plan.depth_m):
             raise NoFloorThere(f"the floor there, {x_m:.1f} {y_m:.1f} m, would be outside of the room")
         return x_m, y_m
 
     # ------------------------------------------------------------------ within
-    def _grow(self, pose: Pose) -> None:
-        """Let the floor, of which no localizer told a plan, hold this place, in whole meters."""
-        known = self._grown or FloorPlan(LEAST_ROOM_M, LEAST_ROOM_M)
-        width_m, depth_m = max(known.width_m, math.ceil(pose.x_m)), max(known.depth_m, math.ceil(pose.y_m))
-        if self._grown is None or (width_m, depth_m) != (known.width_m, known.depth_m):
-            self._grown = FloorPlan(float(width_m), float(depth_m))
+    def _lay_floor(self) -> None:
+        """Let the floor be as a localizer told it; where it told no extent, the floor holds every place so far."""
+        told, (far_x_m, far_y_m) = self._told or FloorPlan(0.0, 0.0), self._far_m
+        if told.width_m > 0.0 and told.depth_m > 0.0:
+            self._floor = told
+            return
+        floor = replace(told, width_m=told.width_m or far_x_m, depth_m=told.depth_m or far_y_m)
+        if floor != self._floor:
+            self._floor = floor
 
     def _body(self, track: _Track, robot: RcView | None, now_s: float) -> BodyView:
         pose = track.now

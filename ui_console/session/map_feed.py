@@ -83,7 +83,8 @@ class MapFeed:
         asking = [self._ask_once(one, ListTypes(), Types) for one in known_types]
         localizers, now_s = self._of_type(LOCALIZER), self._clock.now_s()
         if localizers:
-            robots = [robot for robot in robots if now_s - self._heard_s.get(robot, -QUIET_S) >= QUIET_S]
+            bodies = sorted(self._heard_s.keys() | robots)
+            robots = [body for body in bodies if now_s - self._heard_s.get(body, -QUIET_S) >= QUIET_S]
         for at in (localizers or self._of_type(WORLD))[:1]:
             asking.append(self._ask_once(at, AskFloorPlan(), FloorPlan))
             asking += [self._ask_pose(at, robot) for robot in robots]

@@ -47,7 +47,7 @@ def body(made: TeamModel, now_s: float, name: str = "scout1") -> BodyView:
 def test_the_source_and_spread_of_a_place_are_told_and_an_old_place_is_marked_with_its_age() -> None:
     made = team(pose(8.0, 1.0, source=PoseSource.LANDMARK, spread_m=0.05), pose(8.0, 3.0, body="guest"))
     fresh = body(made, 8.0 + STALE_S)
-    assert (fresh.source, fresh.spread_m, fresh.is_robot) == ("from a landmark it sees", 0.05, True)
+    assert (fresh.source, fresh.spread_m, fresh.is_robot) == ("by a landmark", 0.05, True)
     assert (fresh.is_stale, fresh.age_s) == (False, 0.0)
     old = body(made, 20.0)
     assert (old.is_stale, old.age_s) == (True, 12.0)
@@ -90,6 +90,8 @@ def test_without_a_plan_the_floor_holds_every_body_and_a_plan_takes_its_place() 
     assert made.map.floor is made.map.floor
     made.apply(Heard(9.0, PLAN))
     assert made.map.floor is PLAN
+    made.apply(Heard(9.0, FloorPlan(0.0, 0.0, PLAN.shapes)))
+    assert made.map.floor == FloorPlan(4.0, 2.0, PLAN.shapes), "a plan without an extent"
 
 
 def test_a_point_in_a_picture_is_where_the_robot_stood_when_the_picture_was_taken() -> None:

@@ -134,7 +134,7 @@ def test_a_localizer_is_heard_in_place_of_the_world_and_asked_once_it_is_silent(
             on.beside(robots[1]),
             on.beside(on.observer()),
         ):
-            await on.until(lambda: on.source == "from a camera above the room")
+            await on.until(lambda: on.source == "tracked from above")
             await on.until(lambda: on.model.team.map.floor == PLAN)
             for _turn in range(20):
                 localizer.x_m += 0.1

@@ -158,7 +158,7 @@ class Stage:
         self.hub = WebHub(launch, network.join(launch.address, clock), clock, join, kind="capture")
         self.port = 0
         self.robots: dict[str, FakeRobot] = {}
-        self._network = network
+        self.network = network
         self._others: list[Bus] = []
 
     @property
@@ -169,19 +169,19 @@ class Stage:
     def place_robots(self, *names: str) -> None:
         """Add robots that can be stopped, without holders."""
         for name in names:
-            bus = self._network.join(address(Subsystem.RESOURCE_POOL, name), self.clock)
+            bus = self.network.join(address(Subsystem.RESOURCE_POOL, name), self.clock)
             self.robots[name] = FakeRobot(bus, self.clock, name, self._stop_changed)
         self.publish_schedule(**dict.fromkeys(names, ""))
 
     def know_commands(self, types: Sequence[ComponentType] = ()) -> None:
         """Add a component database with these types; none: each robot is held with a lamp beside it."""
-        bus = self._network.join(COMPONENT_DATABASE, self.clock)
+        bus = self.network.join(COMPONENT_DATABASE, self.clock)
         serve_types(bus, types or lit_types("capture"))
         self._others.append(bus)
 
     def keep_log(self, events: Iterable[StoryEvent]) -> None:
         """Add a launcher that has kept these events."""
-        log, bus = MissionLog(), self._network.join(LAUNCHER, self.clock)
+        log, bus = MissionLog(), self.network.join(LAUNCHER, self.clock)
         for event in events:
             log.add(event)
 

@@ -1,0 +1,137 @@
+"""The map of a real mission in a real browser: robots are sent by taps, and the world tells where they went."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+import web_browser
+from running_mission import mission_up
+from served_page import Served, serving
+
+from backbone.bus.interface import Bus
+from resource_pool.localization import AskPose, Pose
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
+
+WITHIN_S = 60.0
+ROOM_M = (9.0, 6.0)
+LOCALIZER = '<resource type="localizer" name="localizer" process="hardware"/>\n  </resources>'
+NEAR_M = 0.4  # as the test of go_to itself: dead reckoning
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    with mission_up(change={"</resources>": LOCALIZER}) as mission, serving(mission) as made:
+        yield made
+        made.process.terminate()
+        assert made.process.wait(20) == 0
+
+
+async def truth(bus: Bus, robot: str) -> Pose:
+    return await bus.ask("resource_pool/world", AskPose(robot), Pose, within_s=5.0)
+
+
+async def wait_until(is_so: Callable[[], Awaitable[bool]], what: str) -> None:
+    try:
+        async with asyncio.timeout(WITHIN_S):
+            while not await is_so():  # noqa: ASYNC110  what another process does gives no event here
+                await asyncio.sleep(0.2)
+    except TimeoutError:
+        pytest.fail(f"never: {what}")
+
+
+async def wait_there(page: Any, bus: Bus, robot: str, x_m: float, y_m: float) -> None:
+    """Return when the robot is at the place in truth."""
+
+    async def is_there() -> bool:
+        pose = await truth(bus, robot)
+        return math.dist((pose.x_m, pose.y_m), (x_m, y_m)) < NEAR_M
+
+    try:
+        await wait_until(is_there, f"{robot} at {x_m}, {y_m}")
+    except pytest.fail.Exception:
+        told = await page.locator("#orders").text_content()
+        pytest.fail(f"{robot} is at {await truth(bus, robot)}, not at {x_m}, {y_m}; orders: {told}")
+
+
+@asynccontextmanager
+async def page_at(served: Served) -> AsyncIterator[Any]:
+    address = f"http://127.0.0.1:{served.port}/#token={served.token}"
+    async with web_browser.page_at("desktop", address, shows="#map-plan [data-body=scout3]") as page:
+        yield page
+
+
+async def tap(page: Any, x_m: float, y_m: float) -> None:
+    plan = page.locator("#map-plan")
+    await plan.scroll_into_view_if_needed()
+    box = await plan.bounding_box()
+    scale = box["width"] / ROOM_M[0]
+    await page.mouse.click(box["x"] + scale * x_m, box["y"] + box["height"] - scale * y_m)
+
+
+async def test_robots_go_where_a_person_taps_on_the_map_and_one_goes_on_while_the_person_drives_another(
+    served: Served,
+) -> None:
+    async with served.mission.bus() as bus, page_at(served) as page:
+        assert await page.locator("#map-plan [data-body=scout3] .source").text_content() == "dead reckoning"
+        assert await page.locator("#map-plan .furniture").count() == 4
+        await page.locator("#map-bodies [data-body=scout3]").click()
+        await tap(page, 5.5, 2.2)
+        await page.wait_for_selector("#orders [data-order=scout3]")
+        await page.locator(".robot[data-robot=scout1]").get_by_role("button", name="Take over").click()
+        await page.wait_for_selector("body[data-held=scout1]")
+        await page.wait_for_selector("#map-plan [data-goal=scout3]")
+        await wait_there(page, bus, "scout3", 5.5, 2.2)
+        assert await page.locator("body").get_attribute("data-held") == "scout1"
+        await web_browser.keep_picture(page, "web-map")
+
+
+async def test_a_robot_goes_to_the_place_that_was_tapped_in_its_picture_and_the_stick_takes_it_back(
+    served: Served,
+) -> None:
+    async with served.mission.bus() as bus, page_at(served) as page:
+        before = await truth(bus, "scout2")
+        await page.locator(".robot[data-robot=scout2]").get_by_role("button", name="Take over").click()
+        await page.wait_for_selector("body[data-held=scout2]")
+        await page.wait_for_selector(".robot.is-large[data-robot=scout2]:not(.is-stale)")
+        canvas = page.locator(".robot.is-large[data-robot=scout2] canvas")
+        box = await canvas.bounding_box()
+        await page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.75 * box["height"])
+        await page.wait_for_selector("body[data-ordered=scout2]")
+        goal = page.locator("#orders [data-order=scout2]")
+        assert "go to" in await goal.text_content()
+        place = (await goal.text_content()).split("go to ")[1].split(" (")[0].split(", ")
+        x_m, y_m = map(float, place)
+        ahead_m = math.dist((x_m, y_m), (before.x_m, before.y_m))
+        bearing_rad = math.atan2(y_m - before.y_m, x_m - before.x_m)
+        assert 0.2 < ahead_m < 1.6
+        assert abs(math.remainder(bearing_rad - before.heading_rad, math.tau)) < 0.2, "straight ahead, as it was tapped"
+        await page.keyboard.down("ArrowRight")
+        await page.wait_for_timeout(200)
+        await page.keyboard.up("ArrowRight")
+        await page.wait_for_selector("body[data-held=scout2]")
+        assert "by the stick" in await goal.text_content()
+
+
+async def test_a_group_goes_to_places_side_by_side_and_an_order_is_stopped(served: Served) -> None:
+    async with served.mission.bus() as bus, page_at(served) as page:
+        for robot in ("scout1", "scout2"):
+            await page.locator(f"#map-bodies [data-body={robot}]").click()
+        places = [await truth(bus, robot) for robot in ("scout1", "scout2")]
+        await tap(page, (places[0].x_m + places[1].x_m) / 2, 2.5)
+        for robot in ("scout1", "scout2"):
+            await page.wait_for_selector(f"#map-plan [data-goal={robot}]")
+
+        async def has_moved() -> bool:
+            now = await truth(bus, "scout1")
+            return math.dist((now.x_m, now.y_m), (places[0].x_m, places[0].y_m)) > 0.3
+
+        await wait_until(has_moved, "scout1 goes")
+        await page.locator("#map-end").click()
+        for robot in ("scout1", "scout2"):
+            await page.wait_for_selector(f"#orders .is-over[data-order={robot}]")
