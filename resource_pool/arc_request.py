@@ -55,7 +55,7 @@ def claim_parameters(
     maximum_runtime_s: float = 0.0,
     wish: dict[str, str] | None = None,
     features: dict[str, list[str]] | None = None,
-    usage: Usage | Sequence[Usage] = (),
+    usage: Usage | Sequence[Usage] | None = None,
     console: bool = False,
     idle: bool = False,
     stops_at_once: bool = False,
@@ -71,8 +71,8 @@ def claim_parameters(
         wish: Role → name of the RC (``{"scout": "scout2"}``, ``{ROBOT: "scout2"}``); roles left out: any.
         features: Role → features the RC must have (``{"scout": ["camera"]}``).
         usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
-            kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period. None: what its
-            kind of ARC needs for a hand on a stick.
+            kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period. None: that of
+            the ARC's class, for a hand on a stick.
         console: True for consoles.
         idle: True: no time is wanted yet.
         stops_at_once: True: the owner needs no time to stop at the end of a slice. Then ``arc_suspending`` is not
@@ -80,10 +80,10 @@ def claim_parameters(
         may_say_not_now: True: the owner is asked shortly before the end of each slice that can be extended.
 
     Raises:
-        ValueError: Two usages have the same kind.
+        ValueError: There are no usages in the sequence, or two have the same kind.
     """
-    usages = [usage] if isinstance(usage, Usage) else list(usage)
-    if len({one.kind for one in usages}) < len(usages):
+    usages = [usage] if isinstance(usage, Usage) else list(usage or ())
+    if (not usages and usage is not None) or len({one.kind for one in usages}) < len(usages):
         raise ValueError(f"{owner} claims with usages of the kinds {[one.kind for one in usages]}")
     return {
         "owner": owner,

@@ -223,6 +223,8 @@ class ArcEvents:
 
     def ask_anew_beside(self, arc: ArcEntry) -> bool:
         """Let holders ask anew beside which the ARC would be late; return whether there are any."""
+        if not self._understating:
+            return False
         asked = dict.fromkeys(holder for rc in arc.shares for holder in self._table.understating(rc, [arc]))
         for holder in asked:
             self._ask_anew(holder)

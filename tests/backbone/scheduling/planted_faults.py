@@ -212,4 +212,40 @@ FAULTS = [
         "wanted = stands and self._is_waited_for(arc)",
         "wanted = stands",
     ),
+    Planted(
+        "an ARC is connected beside packets that take longer than declared",
+        "schedule_manager.py",
+        "            if not self._arcs.ask_anew_beside(turn.arc):",
+        "            if True:",
+    ),
+    Planted(
+        "holders whose packets are late together all stay",
+        "schedule_manager.py",
+        "        self._arcs.ask_anew_where_late()\n",
+        "",
+    ),
+    Planted(
+        "more holders ask anew than must",
+        "table.py",
+        "            if self.state.compatibility.serves_measured(rc, kept):\n                break\n",
+        "",
+    ),
+    Planted(
+        "what was measured counts no more after the slice",
+        "arc_events.py",
+        "        elif waits and arc.understates:\n            self._ask_anew(arc)\n",
+        "",
+    ),
+    Planted(
+        "the last measurement counts, not the longest",
+        "packet_times.py",
+        "known.get((rc, kind), 0.0) < packet_time_s",
+        "0.0 < packet_time_s",
+    ),
+    Planted(
+        "an ARC inherits what was measured of one of its name",
+        "arc_events.py",
+        "        self._packet_times.forget(name)\n",
+        "",
+    ),
 ]

@@ -108,6 +108,21 @@ def test_who_fits_beside_the_others_also_with_the_longer_time_is_never_revoked()
     assert (bench.runs("a"), bench.runs("b")) == ([(0.0, None)], [(2.0, None)])
 
 
+def test_at_the_end_of_its_slice_an_arc_asks_anew_also_where_all_fits():
+    bench = Bench(manager(), sharable("r"), unit("v"))
+    bench.tell(ask("a", {"r": load(0.3), "v": RcUse()}))
+    bench.tell(ask("b", "v"))
+    bench.at(1.0, measured("a", 0.05))
+    bench.run(4.9)
+    assert packet_s(bench, "a") == pytest.approx(0.03)
+    bench.run(6.0)
+    assert packet_s(bench, "a") == 0.05
+    assert [why for _, _, why in revoked(bench)] == ["slice"]
+    bench.run(20.0)
+    assert bench.runs("a")[:2] == [(0.0, 5.0), (10.0, 15.0)]
+    assert bench.verdict() == []
+
+
 def test_what_a_lower_one_needs_is_not_taken_from_a_higher_one():
     bench = Bench(manager(), sharable("r"))
     bench.tell(ask("high", {"r": load(0.4)}, priority=2))
