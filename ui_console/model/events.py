@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import msgspec
 
 from backbone.component.messages import ComponentState, MissionTime, Parameters, SetParameter, Statistics, StoryEvent
+from backbone.component_database.messages import Types
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log.log import Log, PeopleKnown
@@ -231,6 +232,7 @@ Said = (
     | HostLoad
     | StopState
     | Readings
+    | Types
     | MissionTime
     | Statistics
     | MissionHealth

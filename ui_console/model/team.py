@@ -24,6 +24,7 @@ from backbone.component.messages import (
     Statistics,
     StoryEvent,
 )
+from backbone.component_database.messages import Types
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.mission_log.log import AskLog, Log, PeopleKnown
 from backbone.mission_log.operators import OperatorActed
@@ -120,6 +121,8 @@ class TeamModel:
                 self.robots.take_stop(said, at_s)
             case Readings():
                 self.robots.take_readings(said, at_s)
+            case Types():
+                self.robots.take_types(said)
             case Statistics():
                 self.links.take_counts(component_of(source), said.values, at_s)
             case MissionTime():
