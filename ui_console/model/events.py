@@ -247,6 +247,7 @@ Said = (
     | HostLoad
     | StopState
     | Readings
+    | Types
     | MissionTime
     | Statistics
     | MissionHealth

@@ -1,16 +1,30 @@
-"""Gauges: what a robot reports, as words and shares. Pure; units come from the names of the reports' fields."""
+"""Gauges: what a robot reports, as words, places in ranges and flags. Pure.
+
+Names and units come from the names of the reports' fields; ranges and meanings from their declaration, once known.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import get_args
+
 import msgspec
 
-from backbone.component.abilities import unit_of
+from backbone import ranges
+from backbone.component.abilities import FieldForm, unit_of
 from resource_pool.arc_client import Readings
 from ui_console.model.applied import words_of
+from ui_console.model.fields import has_range
 
 SHARE = "_share"
 BATTERY = "battery_share"
 LOW_BATTERY = 0.2  # as the robots' RCs, ``RobotParameters.battery_alarm_share``
+OF_THE_BUS = frozenset(
+    (limits.ge, limits.le)
+    for kind in (ranges.Meters, ranges.Radians, ranges.Speed, ranges.TurnRate, ranges.WheelSpeed, ranges.Measure)
+    for limits in get_args(kind)[1:]
+)
+"""Ranges that only keep nonsense away: no hardware's own, and nothing is read from a place in one."""
 
 
 class GaugeView(msgspec.Struct, frozen=True):
@@ -18,23 +32,38 @@ class GaugeView(msgspec.Struct, frozen=True):
 
     Attributes:
         name: For people.
-        text: The value with its unit.
-        share: The value as a share, 0 to 1, of its most; negative: it is no share.
+        text: The value with its unit; of a flag ``on`` or ``off``.
+        share: The value's place in its range, 0 at the least to 1 at the most; negative: it has no range.
+        is_share: True: the value itself is a share, such as a battery's charge.
+        flag: The value of a flag; None: it is no flag.
+        span: Its range with its unit; empty: it has none.
+        doc: Its meaning; empty: not known.
     """
 
     name: str
     text: str
     share: float = -1.0
+    is_share: bool = False
+    flag: bool | None = None
+    span: str = ""
+    doc: str = ""
 
 
-def gauges(readings: Readings) -> list[GaugeView]:
+def gauges(readings: Readings, reports: Sequence[FieldForm] = ()) -> list[GaugeView]:
     """Return a gauge for each value, shares first, in the order of the report.
 
+    Args:
+        readings: The values.
+        reports: Their declarations, as far as they are known.
+
     Example:
-        >>> [gauge.text for gauge in gauges(Readings("r", 1.0, {"tilt_rad": 0.5, "battery_share": 0.871, "up": True}))]
-        ['87 %', '0.5 rad', 'yes']
+        >>> values = {"tilt_rad": 0.5, "battery_share": 0.871, "up": True}
+        >>> [gauge.text for gauge in gauges(Readings("r", 1.0, values))]
+        ['87 %', '0.5 rad', 'on']
     """
-    return sorted((_gauge(name, value) for name, value in readings.values.items()), key=lambda one: one.share < 0)
+    declared = {form.name: form for form in reports}
+    found = (_gauge(name, value, declared.get(name)) for name, value in readings.values.items())
+    return sorted(found, key=lambda one: not one.is_share)
 
 
 def battery_of(readings: Readings) -> float | None:
@@ -43,10 +72,17 @@ def battery_of(readings: Readings) -> float | None:
     return None if share is None else float(share)
 
 
-def _gauge(name: str, value: float | bool) -> GaugeView:
+def _gauge(name: str, value: float | bool, form: FieldForm | None) -> GaugeView:
+    doc = form.doc if form is not None else ""
     if isinstance(value, bool):
-        return GaugeView(words_of(name), "yes" if value else "no")
+        return GaugeView(words_of(name), "on" if value else "off", flag=value, doc=doc)
     if name.endswith(SHARE):
-        return GaugeView(words_of(name.removesuffix(SHARE)), f"{100 * value:.0f} %", min(1.0, max(0.0, value)))
+        share = min(1.0, max(0.0, value))
+        return GaugeView(words_of(name.removesuffix(SHARE)), f"{100 * value:.0f} %", share, is_share=True, doc=doc)
     unit = unit_of(name)
-    return GaugeView(words_of(name), f"{value:.3g}{f' {unit}' if unit else ''}")
+    unit = f" {unit}" if unit else ""
+    text = f"{value:.3g}{unit}"
+    if form is None or not has_range(form) or form.most <= form.least or (form.least, form.most) in OF_THE_BUS:
+        return GaugeView(words_of(name), text, doc=doc)
+    place = min(1.0, max(0.0, (value - form.least) / (form.most - form.least)))
+    return GaugeView(words_of(name), text, place, span=f"{form.least:.3g} to {form.most:.3g}{unit}", doc=doc)

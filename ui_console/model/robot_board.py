@@ -9,6 +9,8 @@ from collections.abc import Mapping
 
 from msgspec.structs import replace
 
+from backbone.component.abilities import FieldForm
+from backbone.component_database.messages import Types
 from backbone.mission_log.people import is_console, screens_of
 from backbone.naming import Subsystem, component_of
 from backbone.picture.mission import MissionPicture
@@ -38,6 +40,7 @@ class RobotBoard:
         self._renewed: dict[tuple[str, str, int], float] = {}
         self._stops: dict[str, StopState] = {}
         self._readings: dict[str, Readings] = {}
+        self._reports: dict[str, list[FieldForm]] = {}
 
     # ------------------------------------------------------------------ messages in
     def take_schedule(self, schedule: Schedule) -> None:
@@ -76,6 +79,11 @@ class RobotBoard:
         is_low = battery is not None and battery < LOW_BATTERY
         line = f"the battery of {readings.rc} is low: {battery or 0.0:.0%}"
         self._alarms.hold(is_low, AlarmKind.BATTERY, readings.rc, line, at_s, "Bring it back while it can drive.")
+
+    def take_types(self, types: Types) -> None:
+        """Take in what the robots of each type declare to report."""
+        kinds = (one.component_type for one in types.types)
+        self._reports = {kind.name: kind.abilities.reports for kind in kinds if kind.abilities.reports}
 
     # ------------------------------------------------------------------ views out
     def views(self, now_s: float) -> list[RobotView]:
@@ -132,7 +140,7 @@ class RobotBoard:
             waiting,
             self.stop_view(rc.rc, now_s),
             self._picture.people.named(component.feedback) if component is not None else "",
-            gauges=gauges(readings) if readings is not None else [],
+            gauges=gauges(readings, self._reports.get(rc.kind, ())) if readings is not None else [],
             reported_age_s=max(0.0, now_s - readings.at_s) if readings is not None else NONE_S,
         )
         if not rc.holders:

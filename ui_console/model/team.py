@@ -124,6 +124,8 @@ class TeamModel:
                 self.robots.take_stop(said, at_s)
             case Readings():
                 self.robots.take_readings(said, at_s)
+            case Types():
+                self.robots.take_types(said)
             case Statistics():
                 self.links.take_counts(component_of(source), said.values, at_s)
             case MissionTime():

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable
 from types import TracebackType
 
-from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
+from backbone.addresses import COMPONENT_DATABASE, LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.messages import (
     AskParameters,
@@ -28,6 +28,7 @@ from backbone.component.messages import (
     Story,
     StoryEvent,
 )
+from backbone.component_database.messages import ListTypes, Types
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal
@@ -78,7 +79,7 @@ class ConsoleFeed:
         self._hosts: dict[str, list[Subscription]] = {}
         self._radios: set[str] = set()
         self._robots: set[str] = set()
-        self._listing = asyncio.Event()
+        self._listing, self._types_due = asyncio.Event(), asyncio.Event()
         self.listed = asyncio.Event()
         """Set once every component answered the first questions, or did not in time."""
         self._is_up = True
@@ -102,6 +103,7 @@ class ConsoleFeed:
         """Ask for the mission's state, now and whenever the link is back, and measure the link; until cancelled."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self._list_when_due(), name="feed:list")
+            group.create_task(self._ask_types_when_due(), name="feed:types")
             group.create_task(self._feel_link(), name="feed:link")
             group.create_task(self._feel_pulse(), name="feed:pulse")
 
@@ -211,7 +213,7 @@ class ConsoleFeed:
         while True:
             await self._listing.wait()
             self._listing.clear()
-            await asyncio.gather(self._list(), self._ask_schedule())
+            await asyncio.gather(self._list(), self._ask_schedule(), self._ask_types())
             self.listed.set()
 
     async def _list(self) -> None:
@@ -221,7 +223,11 @@ class ConsoleFeed:
             at = [component.address for component in listing.components]
             behaviors = [one for one in at if one.startswith(f"{Subsystem.MISSION_CONTROL}/")]
             robots = [component_of(one.address) for one in listing.components if one.is_robot]
-            await asyncio.gather(*map(self._ask_how_it_went, behaviors), *map(self._ask_stop, robots), self._ask_log())
+            await asyncio.gather(
+                *map(self._ask_how_it_went, behaviors),
+                *map(self._ask_stop, robots),
+                self._ask_log(),
+            )
 
     async def _ask_schedule(self) -> None:
         with self._showing_failure():
@@ -240,6 +246,17 @@ class ConsoleFeed:
         with _quietly("the launcher", "did not answer with its log"):
             self._hear(await self._bus.ask(LAUNCHER, AskPeople(), PeopleKnown, within_s=REPLY_TIME_S))
             self._hear(await self._bus.ask(LAUNCHER, AskLog(most=LOG_KEPT), Log, within_s=REPLY_TIME_S))
+
+    async def _ask_types_when_due(self) -> None:
+        while True:
+            await self._types_due.wait()
+            self._types_due.clear()
+            await self._ask_types()
+
+    async def _ask_types(self) -> None:
+        """Show what the kinds of robots report, with units and ranges."""
+        with _quietly(COMPONENT_DATABASE, "did not answer with its types"):
+            self._hear(await self._bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S))
 
     async def _ask_stop(self, robot: str) -> None:
         with _quietly(robot, "did not answer with its stop"):  # a robot of another make may know no such stop
@@ -279,6 +296,8 @@ class ConsoleFeed:
         match envelope.body:
             case Appeared(component=component):
                 self._hear(component)
+                if component.address == COMPONENT_DATABASE:
+                    self._types_due.set()
             case Disappeared() as disappeared:
                 self._hear(disappeared)
 

@@ -191,7 +191,7 @@ def _robot_facts(robot: views.RobotView, now_s: float) -> Iterator[str]:
     if robot.holder and robot.until_s >= 0:
         yield from _slice_end(robot.until_s, now_s)
     if robot.gauges and 0 <= robot.reported_age_s <= REPORTED_S:
-        yield from (f"{gauge.name} {gauge.text}" for gauge in robot.gauges if gauge.share >= 0)
+        yield from (f"{gauge.name} {gauge.text}" for gauge in robot.gauges if gauge.is_share)
     if robot.waiting:
         yield "then " + ", ".join(robot.waiting)
     if robot.holder:

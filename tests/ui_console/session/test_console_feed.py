@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from contextlib import AsyncExitStack
 from typing import Any
 
 import pytest
@@ -10,9 +11,11 @@ from console_scenes import SCHEDULE
 
 from backbone.addresses import LAUNCHER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.component.abilities import Abilities, field_forms
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, StoryEvent
+from backbone.component_database.messages import ComponentType, ListTypes, TypeCount, Types
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
@@ -22,6 +25,8 @@ from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.requests import Lease
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
+from resource_pool.messages import Readings
+from resource_pool.robots.rover.report import RoverReport
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 from ui_console.model.console import ConsoleModel
@@ -68,6 +73,16 @@ class Robot(Component[Any]):
             case LiftStop(number=number, user=user):
                 self.latch.lift(number, user, self.clock.now_s())
         return self.latch.state
+
+
+class Database(Component[Any]):
+    """Knows one kind of robot, which reports as a rover does."""
+
+    accepts = ListTypes
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        abilities = Abilities(is_robot=True, reports=field_forms(RoverReport))
+        return Types([TypeCount(ComponentType("scout", "x:Y", Subsystem.RESOURCE_POOL, abilities=abilities), 1)])
 
 
 class Stage:
@@ -175,6 +190,29 @@ def test_a_death_is_an_alarm_and_a_good_end_is_none(stage: Callable[[Scene], Non
                 await on.until(on.model.alarm_views)
             [alarm] = on.model.alarm_views()
             assert (alarm.kind, alarm.subject) == (AlarmKind.LOST, "scout2")
+
+    stage(scene)
+
+
+@pytest.mark.parametrize("is_late", [False, True])
+def test_what_robots_report_is_asked_of_the_database_also_of_one_that_comes_late(
+    stage: Callable[[Scene], None], is_late: bool
+) -> None:
+    async def scene(on: Stage) -> None:
+        database = on.make(Database, Subsystem.BACKBONE, "component_database", "component_database")
+        robot = on.robot("scout1")
+        async with on.beside(on.manager()), on.beside(robot), AsyncExitStack() as later:
+            if not is_late:
+                await later.enter_async_context(on.beside(database))
+            await later.enter_async_context(on.beside(on.observer()))
+            await on.until(lambda: "components" in on.words())
+            if is_late:
+                assert "types" not in on.words()
+                await later.enter_async_context(on.beside(database))
+            await on.until(lambda: "types" in on.words())
+            robot.bus.publish(robot.address, Conversation.READINGS, Readings("scout1", 1.0, {"lift": 0.25}))
+            await on.until(lambda: on.model.robots(2.0)[0].gauges)
+            assert [gauge.span for gauge in on.model.robots(2.0)[0].gauges] == ["0 to 1"]
 
     stage(scene)
 

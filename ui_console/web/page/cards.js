@@ -1,6 +1,7 @@
 // One card for each robot: its newest picture, its holder, and the operator's actions. One card is large.
 
 import { make } from "./dom.js";
+import { Gauges, lineOf } from "./gauges.js";
 import { actWhenHeld } from "./holding.js";
 import { notice } from "./notices.js";
 import { Screen } from "./pictures.js";
@@ -150,8 +151,9 @@ class Card {
     top.append(title, this.state);
     this.holder = make("p", "holder");
     this.gauges = make("p", "gauges");
+    this.reports = new Gauges(name);
     this.take = this.button("Take over", "take");
-    this.root.append(this.screen.root, top, this.holder, this.gauges, this.makeButtons());
+    this.root.append(this.screen.root, top, this.holder, this.gauges, this.reports.root, this.makeButtons());
   }
 
   /** @param {Tap | null} tap */
@@ -205,8 +207,9 @@ class Card {
     const who = robot.is_mine ? "you" : robot.holder;
     set(this.holder, who ? `${who}: ${robot.feedback || robot.because}${next}` : robot.feedback + next);
     const isReported = robot.reported_age_s >= 0 && robot.reported_age_s <= REPORTED_S;
-    const shares = isReported ? robot.gauges.filter((gauge) => gauge.share >= 0) : [];
-    set(this.gauges, shares.map((gauge) => `${gauge.name} ${gauge.text}`).join(", "));
+    const gauges = isReported ? robot.gauges : [];
+    set(this.gauges, lineOf(gauges));
+    this.reports.show(gauges);
     const isWanted = own.is_asked && own.robot === this.name;
     set(this.take, robot.is_mine ? "Yours" : isWanted ? "Waiting…" : "Take over");
     this.take.disabled = robot.is_mine || isWanted === true;

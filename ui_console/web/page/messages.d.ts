@@ -150,6 +150,10 @@ export interface GaugeView {
   name: string;
   text: string;
   share: number;
+  is_share: boolean;
+  flag: boolean | null;
+  span: string;
+  doc: string;
 }
 
 export interface HealthView {
