@@ -140,6 +140,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self._suspended_because = self._reported_because = ""
         self._is_wound_up = self._has_begun = False
         self._tree_version, self._left = 0, set[str]()
+        self._need: ArcNeed | None = None
         self._claim: dict[str, object] = {}
         self._parent: ParentReports | KeeperReports | None = None
         self._keeping: asyncio.Task[None] | None = None
@@ -338,7 +339,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         )
 
     async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
-        self._claim = self._claim_of(need)
+        self._need, self._claim = need, self._claim_of(need)
         try:
             await arc.keep(self.clock, need.kind, self._claim, patience_s=START_PATIENCE_S, on_changed=self.changed)
         except Refusal as refusal:
@@ -403,13 +404,14 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if taken.version >= self._tree_version:
             anew = taken.anew if taken.version > self._tree_version else []
             self._tree_version = taken.version
-            self.parameters = self._with_parameters(taken.place)
+            arc, self.parameters = self.parameters.arc, self._with_parameters(taken.place)
             before, nodes = set(self._nodes), {node.name: node for node in self.parameters.children}
             self._left = (self._left | before) - nodes.keys()
             self._nodes.clear()
             self._nodes.update(nodes)
-            if self._claim and (need := self.need()) is not None:
-                self._claim.update(self._claim_of(need))
+            if self._need is not None:
+                self._need = (self.need() if self.parameters.arc != arc else None) or self._need
+                self._claim.update(self._claim_of(self._need))
             self.story.note(self.name, f"takes its place in version {taken.version} of the tree")
             self.children_changed()
             await self._children.rearranged(self._left, anew)

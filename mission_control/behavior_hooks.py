@@ -26,7 +26,7 @@ class BehaviorHooks:
     def need(self) -> ArcNeed | None:
         """Return the ARC to claim.
 
-        When: after ``start``, and after a change of the tree at this behavior. What: by default the ARC of the tree; a
+        When: after ``start``, and after a change of its ARC in the tree. What: by default the ARC of the tree; a
         behavior that computes better run times returns the same need with these. Not: ask for another kind of ARC.
         """
         return None
