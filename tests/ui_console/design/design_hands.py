@@ -1,4 +1,4 @@
-"""Actions of people at the designer's page, with a mouse or a finger, and the tutorial carried out by them."""
+"""Actions of people at the designer's page, with a mouse or a finger, and tutorials carried out by them."""
 
 from __future__ import annotations
 
@@ -65,6 +65,10 @@ class Hands:
         for tab in await self.page.locator(f"#below-tabs [data-pane={pane}]").all():
             await tab.click()
 
+    async def settle(self) -> None:
+        """Return when the page shows all that was done."""
+        await self.page.wait_for_selector("#designer[aria-busy=false]", state="attached")
+
     async def answer(self, **answers: str) -> None:
         """Answer the questions."""
         for name, value in answers.items():
@@ -76,13 +80,18 @@ class Hands:
                 await field.fill(value)
         await self.page.locator("#ask button[value=done]").click()
         await self.page.wait_for_selector("#ask", state="hidden")
+        await self.settle()
 
     async def set(self, name: str, value: str) -> None:
-        """Set a property of the chosen element."""
+        """Set an attribute or a parameter of the chosen element."""
         await self.open("details")
-        field = self.page.locator(f"#properties [data-key='{name}']")
-        await field.fill(value)
-        await field.press("Enter")
+        field = self.page.locator(f"#properties :is([data-key='{name}'], [data-key='parameter {name}'])")
+        if await field.evaluate("field => field.tagName") == "SELECT":
+            await field.select_option(value)
+        else:
+            await field.fill(value)
+            await field.press("Enter")
+        await self.settle()
 
     async def see(self, told: str) -> None:
         await self.open("tree")
@@ -152,14 +161,21 @@ class Finger(Hands):
         await send("touchEnd", [])
 
 
-async def build_by_tutorial(hands: Hands, keep_problem: Callable[[], Awaitable[None]]) -> None:
+async def nothing() -> None:
+    """Keep no picture."""
+
+
+async def build_by_tutorial(
+    hands: Hands, keep_problem: Callable[[], Awaitable[None]] = nothing, tutorial: Path = TUTORIAL
+) -> None:
     """Do what the tutorial says, and see what it says is shown.
 
     Args:
         hands: Mouse or finger.
         keep_problem: Called while a problem is shown.
+        tutorial: Which one.
     """
-    for kind, block in re.findall(r"```(page|screen)\n(.*?)```", TUTORIAL.read_text(), re.DOTALL):
+    for kind, block in re.findall(r"```(page|screen)\n(.*?)```", tutorial.read_text(), re.DOTALL):
         for line in block.splitlines():
             if kind == "page":
                 await _do(hands, line)

@@ -32,7 +32,12 @@ const view = {};
 /** @type {Link<Heard, Said>} */
 const link = new Link({ heard, saw: () => {}, changed, silentMs: SILENT_MS, oldMs: OLD_MS });
 const login = new Login({ form: find("login", HTMLFormElement), enter: (hello) => link.open(hello) });
-const changes = new Changes({ say: (message) => link.say(message), revision: () => view.status?.revision, refused });
+const changes = new Changes({
+  say: (message) => link.say(message),
+  revision: () => view.status?.revision,
+  refused,
+  busy: (isBusy) => find("designer").setAttribute("aria-busy", String(isBusy)),
+});
 /** @type {Change} */
 const change = (make) => changes.add(make);
 const choice = new Choice({ view, say: (message) => link.say(message) });

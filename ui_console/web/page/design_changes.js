@@ -6,17 +6,18 @@
  * Sends a change as soon as the one before it was done; it is made only then, so that it is not refused as too old.
  *
  * `say` returns whether it was sent, `revision` the draft's, undefined if none is known yet; `refused` is called when a
- * change cannot be sent.
+ * change cannot be sent, `busy` with whether a change waits for the server.
  */
 export class Changes {
   /**
    * @param {{ say: (change: DraftChange) => boolean, revision: () => number | undefined,
-   *   refused: (text: string, remedy: string) => void }} given
+   *   refused: (text: string, remedy: string) => void, busy?: (isBusy: boolean) => void }} given
    */
-  constructor({ say, revision, refused }) {
+  constructor({ say, revision, refused, busy = () => {} }) {
     this.say = say;
     this.revision = revision;
     this.refused = refused;
+    this.busy = busy;
     /** @type {MakeChange[]} */
     this.waiting = [];
     /** @type {DraftChange | null} */
@@ -39,9 +40,15 @@ export class Changes {
   drop() {
     this.underway = null;
     this.waiting.length = 0;
+    this.busy(false);
   }
 
   pump() {
+    this.send();
+    this.busy(this.underway !== null);
+  }
+
+  send() {
     const revision = this.revision();
     if (revision === undefined) return;
     while (this.underway === null) {

@@ -6,11 +6,14 @@ import { test } from "node:test";
 import { Changes } from "../../../../ui_console/web/page/design_changes.js";
 
 function stage() {
-  const on = { said: [], refusals: [], isUp: true, revision: 1 };
+  const on = { said: [], refusals: [], isUp: true, revision: 1, isBusy: false };
   on.changes = new Changes({
     say: (message) => on.isUp && on.said.push(message) > 0,
     revision: () => on.revision,
     refused: (text) => on.refusals.push(text),
+    busy: (isBusy) => {
+      on.isBusy = isBusy;
+    },
   });
   return on;
 }
@@ -24,6 +27,16 @@ test("the next is made when the one before it is done, for the revision of then"
   on.revision = 2;
   on.changes.handled();
   assert.deepEqual(on.said[1], { revision: 2, do: "redo" });
+});
+
+test("it is busy until the last change is done", () => {
+  const on = stage();
+  on.changes.add(() => ({ do: "undo" }));
+  on.changes.add(() => ({ do: "redo" }));
+  on.changes.handled();
+  assert.equal(on.isBusy, true);
+  on.changes.handled();
+  assert.equal(on.isBusy, false);
 });
 
 test("without a connection the change is refused, and what waits is forgotten", () => {
