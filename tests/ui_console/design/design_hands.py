@@ -175,14 +175,18 @@ async def build_by_tutorial(
         keep_problem: Called while a problem is shown.
         tutorial: Which one.
     """
-    for kind, block in re.findall(r"```(page|screen)\n(.*?)```", tutorial.read_text(), re.DOTALL):
-        for line in block.splitlines():
-            if kind == "page":
-                await _do(hands, line)
-            else:
-                await _see(hands, line)
-                if line.startswith("problem: "):
-                    await keep_problem()
+    for kind, line in _steps(tutorial):
+        if kind == "page":
+            await _do(hands, line)
+        else:
+            await _see(hands, line)
+            if line.startswith("problem: "):
+                await keep_problem()
+
+
+def _steps(tutorial: Path) -> list[tuple[str, str]]:
+    blocks = re.findall(r"```(page|screen)\n(.*?)```", tutorial.read_text(), re.DOTALL)
+    return [(kind, line) for kind, block in blocks for line in block.splitlines()]
 
 
 async def _do(hands: Hands, line: str) -> None:
