@@ -25,6 +25,8 @@ from resource_pool.messages import COMMAND_TIMEOUT_S
 LEAST_SHARE = 0.01  # chosen: of the way; so much the spread grows at least, also on a way back
 JUMP_M = 0.5  # chosen: longer than a Scout's jump over 30 cm carries it
 JUMP_RAD = math.pi / 2  # chosen: it lands on its wheels, but turned
+ROUND_M = 0.01  # chosen: resolution of a count
+ROUND_RAD = 0.02  # chosen: same
 FASTEST_M_S = 5.0  # chosen: faster than any robot of a room; an odometer that says more has begun anew
 MOST_RAD_S = 50.0  # chosen: faster than any robot of a room turns
 FARTHEST_M = 1e6  # the limit of ``Meters``
@@ -104,6 +106,7 @@ class DeadReckoning:
         self._until_s = begin.at_s
         self._count: tuple[float, float, float] | None = None  # its own count of way and turn at the last reading, when
         self._counted_from = (begin, self._doubt)
+        self._commanded: tuple[float, float] | None = (0.0, 0.0)  # way and turn until the first count
         self._sighted_s = -math.inf
         self._past = deque([(begin.at_s, begin.pose)], maxlen=REMEMBERED)
 
@@ -132,12 +135,18 @@ class DeadReckoning:
     def counts(self, way_m: float, turned_rad: float, at_s: float) -> None:
         """Take the robot's own count of its way and turn since it was switched on, in place of the commanded ones.
 
-        The first count, the first after a sighting, and one that no robot can have reached, begin a new series.
+        The first count, the first after a sighting, and one that no robot can have reached, begin a new series. But a
+        first count of no more than was commanded since the begin has counted since the begin.
         """
         if not _are_sane(FARTHEST_M, way_m, turned_rad):
             return
         self._advance(at_s)
         now, before = self._belief, self._count
+        if self._commanded is not None:
+            way, turn = self._commanded
+            if abs(way_m) <= way + ROUND_M and abs(turned_rad) <= turn + ROUND_RAD:
+                before = (0.0, 0.0, self._counted_from[0].at_s)
+            self._commanded = None
         if before is not None:
             way_m_since, turned_since, passed_s = way_m - before[0], turned_rad - before[1], now.at_s - before[2]
             may_s = passed_s + COMMAND_TIMEOUT_S
@@ -163,13 +172,14 @@ class DeadReckoning:
         seen = pose.after(then, now.pose)
         self._belief = Belief(seen, now.at_s, spread_m, min(math.pi, spread_rad), PoseSource.LANDMARK)
         self._doubt = Doubt.of(self._belief.spread_m, self._belief.spread_rad)
-        self._count, self._sighted_s = None, now.at_s
+        self._count, self._commanded, self._sighted_s = None, None, now.at_s
         self._past.clear()
         self._remember()
 
     def _loses(self, spread_m: float, spread_rad: float) -> None:
         self._doubt = self._doubt.larger(spread_m, spread_rad)
         self._widen(math.hypot(self._belief.spread_m, spread_m), math.hypot(self._belief.spread_rad, spread_rad))
+        self._commanded = None
         if self._count is not None:
             self._counted_from = (self._belief, self._doubt)
 
@@ -198,7 +208,10 @@ class DeadReckoning:
             return
         lasted_s = max(0.0, min(now_s, self._until_s) - before.at_s)
         forward_m_s, turn_rad_s = self._moves
-        self._go(forward_m_s * lasted_s, turn_rad_s * lasted_s, now_s)
+        way_m, turned_rad = forward_m_s * lasted_s, turn_rad_s * lasted_s
+        self._go(way_m, turned_rad, now_s)
+        if self._commanded is not None:
+            self._commanded = (self._commanded[0] + abs(way_m), self._commanded[1] + abs(turned_rad))
         if now_s - self._sighted_s > SIGHT_LASTS_S and any(self._moves) and lasted_s:
             self._belief = replace(self._belief, source=PoseSource.DEAD_RECKONING)
         if now_s >= self._until_s:

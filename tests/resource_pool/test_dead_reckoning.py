@@ -196,6 +196,17 @@ def test_a_robots_own_count_replaces_the_commanded_way(
     assert are_near(robot.believe(at_s).pose, expected)
 
 
+def test_a_first_count_of_less_than_was_commanded_has_counted_since_the_begin() -> None:
+    """A robot that starts slowly, and whose first answer comes late."""
+    slow, other = DeadReckoning(BEGIN), DeadReckoning(BEGIN)
+    for robot in (slow, other):
+        robot.moves(0.2, 0.4, 0.0)
+    slow.counts(0.03, 0.1, 0.5)
+    assert are_near(slow.believe(0.5).pose, HERE.moved(0.03, 0.1))
+    other.counts(7.03, 0.1, 0.5)
+    assert are_near(other.believe(0.5).pose, HERE.moved(0.1, 0.2))
+
+
 def test_a_count_that_begins_anew_moves_nothing() -> None:
     robot = DeadReckoning(BEGIN)
     robot.counts(500.0, 3.0, 1.0)

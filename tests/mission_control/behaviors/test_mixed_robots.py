@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from behaviors_at_work import EXAMPLES, Person, at_work, driving, hear, pose, wait_until
+from errands import errand
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
@@ -58,6 +59,10 @@ def test_a_person_who_drives_the_rover_declares_packets_as_long_as_they_are() ->
     seen: list[str] = []
     run_virtual(main())
     assert seen
+
+
+def test_a_rover_goes_out_and_home_by_dead_reckoning() -> None:
+    run_virtual(errand(MIXED, "rover1", "rover", (6.0, 4.0)))
 
 
 @pytest.mark.processes
