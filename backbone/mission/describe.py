@@ -31,14 +31,11 @@ from backbone.mission.room_files import room_text
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, parameter_value
 
 
-def describe(
-    mission: MissionElement, source: str, classes: Mapping[str, ClassFacts], text: bytes = b""
-) -> MissionDescription:
+def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFacts]) -> MissionDescription:
     """Return the description of a mission without faults.
 
     Args:
         classes: Class path → what is known of the class.
-        text: What the mission's file holds.
     """
     hosts = () if mission.hosts is None else mission.hosts.host
     world = mission.world
@@ -57,7 +54,6 @@ def describe(
         components=() if world is None else (_world(world, resources, source, host_of_process, types),),
         behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
         source=source,
-        text=text,
     )
 
 

@@ -90,7 +90,6 @@ class MissionDescription(_Part):
         components: Further components to start, in this order, before the behaviors.
         behaviors: Roots of the behavior tree, children of the mission's own node.
         source: Path of the file.
-        text: What the file holds; empty: there is none.
     """
 
     name: str
@@ -102,7 +101,6 @@ class MissionDescription(_Part):
     components: tuple[ComponentDescription, ...]
     behaviors: tuple[BehaviorDescription, ...]
     source: str
-    text: bytes = b""
 
     @property
     def other_hosts(self) -> tuple[Host, ...]:
