@@ -70,12 +70,12 @@ def main() -> None:
         sys.exit(ExitCode.INTERRUPTED)
 
 
-def read_or_exit(mission_file: Path) -> Any:
-    """Return the checked mission description, or print every fault and exit with 3."""
-    from backbone.mission.reader import MissionInvalid, read_mission
+def read_or_exit(mission_file: Path) -> tuple[Any, bytes]:
+    """Return the checked mission description and the file's text, or print every fault and exit with 3."""
+    from backbone.mission.reader import MissionInvalid, read_written_mission
 
     try:
-        return read_mission(mission_file)
+        return read_written_mission(mission_file)
     except MissionInvalid as invalid:
         print(invalid)
         raise typer.Exit(int(ExitCode.MISSION_INVALID)) from None
@@ -105,7 +105,7 @@ def check(
     """Check a mission file whole: every fault at once as file:line:column. Starts nothing."""
     if not dry_run and (for_s is not None or trace is not None):
         raise typer.BadParameter("--for and --trace need --dry-run")
-    description = read_or_exit(mission_file)
+    description, _ = read_or_exit(mission_file)
     say(
         f"{mission_file}: mission {description.name} is fine: {counted(len(description.resources), 'resource')}, "
         f"{counted(len(description.types), 'component type')} on {counted(len(description.hosts), 'host')}"
@@ -141,7 +141,7 @@ def up(
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
-    description = read_or_exit(mission_file)
+    description, text = read_or_exit(mission_file)
     if detach:
         from backbone.launcher.detached import up_detached
 
@@ -150,7 +150,8 @@ def up(
     from backbone.launcher.core_launches import UpOptions
     from backbone.launcher.verdict import VerdictPipe
 
-    options, live = UpOptions(speed=speed, trace=trace, for_s=for_s), not headless and sys.stdout.isatty()
+    options = UpOptions(speed=speed, trace=trace, for_s=for_s, text=text)
+    live = not headless and sys.stdout.isatty()
     verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
     run(lambda: bring_up_on_console(description, options, live=live, verdict=verdict))
 

@@ -29,11 +29,13 @@ class UpOptions:
         speed: Mission seconds per second of the machine.
         trace: File for the schedule trace, or None.
         for_s: Mission seconds from readiness to the end; None: until an order ends it.
+        text: What the mission file holds: its tree is changed there. Empty: its tree cannot be changed.
     """
 
     speed: float = 1.0
     trace: Path | None = None
     for_s: float | None = None
+    text: bytes = b""
 
 
 def core_launches(description: MissionDescription, own: Launch, options: UpOptions) -> list[Launch]:

@@ -86,6 +86,7 @@ class Launcher(Component[NoParameters]):
             bus,
             clock,
             description,
+            options.text,
             begin_root=self._begin_root,
             leave_root=self._leave_root,
             begin=self.start_task,
@@ -165,7 +166,7 @@ class Launcher(Component[NoParameters]):
             case AskTree():
                 return self._tree.tree()
             case change if isinstance(change, TreeChange):
-                if self.outcome.ready_after_s is None or self.state is not LifeState.READY:
+                if self.outcome.ready_after_s is None or self.state is not LifeState.READY or not self._options.text:
                     raise NotUpYet(f"{self._description.name} is coming up or ending")
                 return await self._tree.change(change, asked.source)
             case EndMission(at_once=at_once):

@@ -71,6 +71,7 @@ class TreeKeeper:
         bus: Bus of the launcher.
         clock: The mission's clock.
         description: The mission as it came up.
+        text: What its file holds.
         begin_root: Keeps a root running from now on; returns when it runs, or raises the refusal of its first start.
         leave_root: Keeps a root running no longer.
         begin: Runs work as a task of the launcher.
@@ -82,6 +83,7 @@ class TreeKeeper:
         bus: Bus,
         clock: Clock,
         description: MissionDescription,
+        text: bytes,
         *,
         begin_root: Callable[[Start], Awaitable[None]],
         leave_root: Callable[[str], Awaitable[None]],
@@ -90,6 +92,8 @@ class TreeKeeper:
     ) -> None:
         self.description = description
         """The mission as it is now."""
+        self.text = text
+        """Its file as it is now."""
         self.version = 0
         """Number of changes since it came up."""
         self._bus, self._clock, self._begin_root, self._leave_root = bus, clock, begin_root, leave_root
@@ -105,7 +109,7 @@ class TreeKeeper:
 
     def tree(self) -> Tree:
         """Return the tree as it is now."""
-        return Tree(self.version, self.description.text.decode())
+        return Tree(self.version, self.text.decode())
 
     def newest(self, order: Start) -> Start:
         """Return the order as the tree is now, of a behavior of the tree; any other order as it is."""
@@ -129,20 +133,20 @@ class TreeKeeper:
             raise ChangedMeanwhile(
                 f"the tree has version {self.version}, and the change is for {change.version}", version=self.version
             )
-        edited = changed(self.description.text, change)
+        edited = changed(self.text, change)
         new = await self._checked(edited)
         follows = consequences(self.description, new, edited.anew)
         if isinstance(change, SetInTree):
             await self._set(change, user)
-        before = self.description, self.version
-        self.description, self.version = new, self.version + 1
+        before = self.description, self.text, self.version
+        self.description, self.text, self.version = new, edited.text, self.version + 1
         self._moved |= {told.order.name for told in follows.told}
         for told in follows.told:
             self._owed.setdefault(told.order.name, set()).update(told.anew)
         try:
             remarks = await self._carry_out(follows, insists=not isinstance(change, AddBranch))
         except Refusal:  # of the start of a new root, before which nothing else was done
-            self.description, self.version = before
+            self.description, self.text, self.version = before
             raise
         self._note(self.description.name, f"{user} changed the tree, which has version {self.version} now")
         return TreeChanged(self.version, remarks)

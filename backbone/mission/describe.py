@@ -35,14 +35,11 @@ from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, ROOM, SIMULATED, 
 NOTHING_KNOWN = ClassFacts()
 
 
-def describe(
-    mission: MissionElement, source: str, classes: Mapping[str, ClassFacts], text: bytes = b""
-) -> MissionDescription:
+def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFacts]) -> MissionDescription:
     """Return the description of a mission without faults.
 
     Args:
         classes: Class path → what is known of the class.
-        text: What the mission's file holds.
     """
     hosts = () if mission.hosts is None else mission.hosts.host
     world, tree = mission.world, mission.behaviors or BehaviorsElement()
@@ -62,7 +59,6 @@ def describe(
         components=() if world is None else (_world(world, resources, source, host_of_process, types),),
         behaviors=tuple(map(_behavior, tree.behavior)),
         source=source,
-        text=text,
         last=(
             None
             if tree.last is None

@@ -103,7 +103,6 @@ class MissionDescription(_Part):
         components: Further components to start, in this order, before the behaviors.
         behaviors: Roots of the behavior tree, children of the mission's own node.
         source: Path of the file.
-        text: What the file holds; empty: there is none.
         last: The branch that runs at the end, instead of the other behaviors; None: none.
     """
 
@@ -116,7 +115,6 @@ class MissionDescription(_Part):
     components: tuple[ComponentDescription, ...]
     behaviors: tuple[BehaviorDescription, ...]
     source: str
-    text: bytes = b""
     last: LastBranchDescription | None = None
 
     @property

@@ -18,11 +18,16 @@ from backbone.mission.report import Fault, MissionInvalid, Report
 from backbone.mission.tables import Tables, section
 from backbone.mission.validation import fill_defaults, repair, validated
 
-__all__ = ["Fault", "MissionInvalid", "read_mission", "read_mission_bytes"]
+__all__ = ["Fault", "MissionInvalid", "read_mission", "read_mission_bytes", "read_written_mission"]
 
 
 def read_mission(path: str | Path) -> MissionDescription:
-    """Return the mission the file describes. No component is started.
+    """Return the mission the file describes; see ``read_written_mission``."""
+    return read_written_mission(path)[0]
+
+
+def read_written_mission(path: str | Path) -> tuple[MissionDescription, bytes]:
+    """Return the mission the file describes, and what the file holds. No component is started.
 
     The classes of the file's own types are asked for their parameters in a process of its own, which imports them.
 
@@ -36,7 +41,7 @@ def read_mission(path: str | Path) -> MissionDescription:
     data = read_bytes(Path(path), report)
     if data is None:
         raise MissionInvalid(report.faults())
-    return read_mission_bytes(data, str(path))
+    return read_mission_bytes(data, str(path)), data
 
 
 def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFacts] | None = None) -> MissionDescription:
@@ -64,7 +69,7 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
     faults = report.faults()
     if faults or mission is None:
         raise MissionInvalid(faults)
-    return describe(mission, source, known, data)
+    return describe(mission, source, known)
 
 
 def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:

@@ -231,7 +231,7 @@ def test_after_any_changes_all_runs_as_if_it_had_come_up_so_and_what_stays_was_n
     running, done = Running(mission), 0
     for change in changes:
         try:
-            edited = changed(mission.text, change)
+            edited = changed(text, change)
             new = read(edited.text)
         except (Refusal, MissionInvalid):
             continue
@@ -242,5 +242,5 @@ def test_after_any_changes_all_runs_as_if_it_had_come_up_so_and_what_stays_was_n
         if not isinstance(change, ReplaceBranch | MoveBranch):
             stay = orders(mission).keys() & orders(new).keys()
             assert {name: running.numbers[name] for name in stay} == {name: before[name] for name in stay}
-        mission = new
+        mission, text = new, edited.text
     assume(done)

@@ -65,6 +65,7 @@ class Scene:
             bus,
             self.clock,
             read_mission_bytes(MISSION, "m.xml"),
+            MISSION,
             begin_root=self.begin_root,
             leave_root=self.leave_root,
             begin=self.begin,
@@ -179,7 +180,7 @@ def test_of_two_changes_of_one_version_the_second_is_refused(scene: Play) -> Non
         first, second = await asyncio.gather(*both, return_exceptions=True)
         assert first.version == one.keeper.version == 1
         assert isinstance(second, ChangedMeanwhile)
-        assert b"morning" in one.keeper.description.text
+        assert b"morning" in one.keeper.text
 
     scene(body)
 
@@ -197,7 +198,7 @@ def test_a_refused_change_tells_nobody_and_leaves_the_text(scene: Play) -> None:
             assert one.told == []
         with pytest.raises(NoHost):
             await one.change(AddBranch(0, "m", NEW, "b.xml"))
-        assert (one.keeper.version, one.keeper.description.text) == (0, MISSION)
+        assert (one.keeper.version, one.keeper.text) == (0, MISSION)
 
     scene(body)
 
