@@ -31,17 +31,48 @@ class WhileSuspended(StrEnum):
     WAIT = "wait"  # it stands still: no time runs, and the parent waits for it
     COUNT = "count"  # its time runs on
     NEXT = "next"  # it is not available now: the next alternative stands in for it until it is at work again
+    FAIL = "fail"  # it is ended and counts as failed
+    SKIP = "skip"  # it counts as if there were none such, until it is at work again
 
 
 class Composite(Children):
-    """A parent that decides by rule alone. Without children it has finished at once."""
+    """A parent that decides by rule alone. Without children it has finished at once.
+
+    With ``WhileSuspended.FAIL``, a child that was suspended for ``patience_s`` without a break counts as failed. At one
+    instant, reports of children come before the end of the patience.
+    """
 
     expects_failures = True
     in_file_order = True
+    while_suspended: WhileSuspended = WhileSuspended.WAIT
+    patience_s: float = 0.0
 
     def _settle(self, now_s: float) -> list[Instruction]:
         """Arrange, also without children: then the parent has nothing to wait for."""
         return self._arrange(now_s)
+
+    def time_passed(self, now_s: float) -> list[Instruction]:
+        """Give up the children that exhausted the patience, then do what is due; see ``Children.time_passed``."""
+        return [*self._give_up(now_s), *super().time_passed(now_s)]
+
+    @property
+    def wakes_at_s(self) -> float:
+        """When the first suspended child exhausts the patience."""
+        if self.has_finished or self.while_suspended is not WhileSuspended.FAIL:
+            return math.inf
+        return min(map(self._patient_until_s, self.suspensions), default=math.inf)
+
+    def _patient_until_s(self, name: str) -> float:
+        return self.suspensions[name].since_s + self.patience_s
+
+    def _give_up(self, now_s: float) -> list[Instruction]:
+        instructions: list[Instruction] = []
+        for name in self._names if self.while_suspended is WhileSuspended.FAIL else ():
+            if name in self.suspensions and self._patient_until_s(name) <= now_s:
+                detail = f"it was suspended for {self.patience_s:g} s: {self.suspensions[name].because}"
+                self.reported(name, BehaviorStatus.FAILURE, {"detail": detail})
+                instructions += self.decided(name, self.decision(name), now_s)
+        return instructions
 
     @property
     def sentence(self) -> str:
@@ -69,10 +100,20 @@ class Composite(Children):
 
 
 class InSequence(Composite):
-    """One child after the other: success after all have succeeded, failure at the first that fails."""
+    """One child after the other: success after all have succeeded, failure at the first that fails.
 
-    def __init__(self, names: Sequence[str]) -> None:
+    A suspended child can fail, see ``Composite``; no later child stands in for it, because their order matters.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        *,
+        while_suspended: WhileSuspended = WhileSuspended.WAIT,
+        patience_s: float = 0.0,
+    ) -> None:
         super().__init__(names, together=False)
+        self.while_suspended, self.patience_s = while_suspended, patience_s
 
     def _because(self) -> str:
         before = self._with_status(BehaviorStatus.SUCCESS)
@@ -124,14 +165,15 @@ class InFallback(Composite):
 
     @property
     def wakes_at_s(self) -> float:
-        """When the first running child becomes unavailable."""
-        times = [self._unavailable_at_s(name) for name in self._running[-1:]]
-        return math.inf if self.has_finished or len(self._running) == len(self._open) else min(times, default=math.inf)
+        """When the first running child becomes unavailable, or fails."""
+        if self.has_finished or len(self._running) == len(self._open):
+            return super().wakes_at_s
+        return min([super().wakes_at_s, *map(self._unavailable_at_s, self._running[-1:])])
 
     def _unavailable_at_s(self, name: str) -> float:
         if self.while_suspended is not WhileSuspended.NEXT or name not in self.suspensions:
             return math.inf
-        return self.suspensions[name].since_s + self.patience_s
+        return self._patient_until_s(name)
 
     def _because(self) -> str:
         failed = self._with_status(BehaviorStatus.FAILURE)
@@ -142,53 +184,6 @@ class InFallback(Composite):
         return f", {self._place(self._running[-1])}{because}"
 
 
-class InParallel(Composite):
-    """All children at the same time: the numbers of successes and of failures decide.
-
-    Args:
-        names: Names of the children.
-        success_count: So many successes are a success; -1: all, -2: all but one, and so on.
-        failure_count: So many failures are a failure; negative as above. It also fails as soon as too few children are
-            left to succeed.
-    """
-
-    def __init__(self, names: Sequence[str], *, success_count: int = ENDLESS, failure_count: int = 1) -> None:
-        super().__init__(names)
-        self.success_count, self.failure_count = success_count, failure_count
-
-    def decision(self, name: str) -> Decision:  # noqa: ARG002
-        """Leave every finished child; the verdict counts."""
-        return Decision.NEXT
-
-    def verdict(self, now_s: float) -> FinishParent | None:  # noqa: ARG002
-        """Return the result as soon as the counts say it."""
-        succeeded, failed = self._with_status(BehaviorStatus.SUCCESS), self._with_status(BehaviorStatus.FAILURE)
-        in_all = len(succeeded) + len(failed) + len(self._undecided)
-        needed = self._threshold(self.success_count, in_all)
-        if len(succeeded) >= needed:
-            return FinishParent(BehaviorStatus.SUCCESS)
-        if in_all - len(failed) < needed or len(failed) >= self._threshold(self.failure_count, in_all):
-            reasons = "; ".join(map(self.why_failed, failed))
-            detail = f"{len(succeeded)} of {in_all} succeeded, {needed} needed" + (f": {reasons}" if reasons else "")
-            return FinishParent(BehaviorStatus.FAILURE, {"failed": failed, "detail": detail})
-        return None
-
-    @property
-    def _undecided(self) -> list[str]:
-        finished = [name for name, status in self.status.items() if status.is_final]
-        return [name for name in self._open if name not in finished]
-
-    @staticmethod
-    def _threshold(count: int, in_all: int) -> int:
-        return count if count >= 0 else max(in_all + count + 1, 0)
-
-    def _because(self) -> str:
-        succeeded, failed = self._with_status(BehaviorStatus.SUCCESS), self._with_status(BehaviorStatus.FAILURE)
-        needed = self._threshold(self.success_count, len(succeeded) + len(failed) + len(self._undecided))
-        because = f", because {self.why_failed(failed[-1])}" if failed else ""
-        return f", {len(succeeded)} of {needed} needed successes{because}"
-
-
 class Again(Composite):
     """Its child again and again: how often, and after which end, is for derived classes.
 
@@ -196,13 +191,24 @@ class Again(Composite):
         names: Name of the child.
         most: Number of starts; -1: without end.
         pause_s: Time from an end of the child to its next start.
+        while_suspended: With FAIL, a start fails whose child exhausts the patience, see ``Composite``.
+        patience_s: See ``Composite``.
     """
 
     again_after: ClassVar[BehaviorStatus]
 
-    def __init__(self, names: Sequence[str], *, most: int, pause_s: float = 0.0) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        *,
+        most: int,
+        pause_s: float = 0.0,
+        while_suspended: WhileSuspended = WhileSuspended.WAIT,
+        patience_s: float = 0.0,
+    ) -> None:
         super().__init__(names, together=False)
         self.most, self.pause_s = most, pause_s
+        self.while_suspended, self.patience_s = while_suspended, patience_s
         self._ends, self._starts_at_s = 0, -math.inf
 
     def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
@@ -235,8 +241,8 @@ class Again(Composite):
 
     @property
     def wakes_at_s(self) -> float:
-        """When the pause is over."""
-        return math.inf if self.has_finished or self._running else self._starts_at_s
+        """When the pause is over, or the child exhausts the patience."""
+        return super().wakes_at_s if self.has_finished or self._running else self._starts_at_s
 
     @property
     def sentence(self) -> str:

@@ -19,6 +19,7 @@ from mission_control.composites import ENDLESS
 
 MOST_CHILDREN = 256  # chosen: as many as a path may have steps; a mission has a dozen
 PAUSE_S = 1.0  # chosen: ten times the start of a process, so that a child that fails at once costs little
+PATIENCE_S = 10.0  # chosen: two of the papers' slices
 MOST_TIMES = 100_000  # chosen: once a minute for ten weeks
 
 Seconds = Annotated[float, msgspec.Meta(gt=0, le=A_DAY_S)]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
-from mission_control.behaviors.composed import Composed, Pause
+from mission_control.behaviors.composed import PATIENCE_S, Composed, Pause
 from mission_control.composites import InFallback, WhileSuspended
 
 
@@ -15,12 +15,16 @@ class FallbackParameters(BehaviorParameters, frozen=True, kw_only=True):
 
     Attributes:
         while_suspended: What a suspended child means. wait: it stands still, and the fallback waits. next: it is not
-            available, and the next child runs until it is at work again.
-        patience_s: With next, the time for which a child may be suspended before the next child starts.
+            available, and the next child runs until it is at work again. fail: it counts as failed for good.
+        patience_s: With next or fail, the mission time for which a child may be suspended before; with fail above 0.
     """
 
-    while_suspended: Literal["wait", "next"] = "wait"
-    patience_s: Pause = 10.0  # chosen: two of the papers' slices
+    while_suspended: Literal["wait", "next", "fail"] = "wait"
+    patience_s: Pause = PATIENCE_S
+
+    def __post_init__(self) -> None:
+        if self.while_suspended == "fail" and self.patience_s == 0:
+            raise ValueError("patience_s is 0: with fail, a child fails before its first grant; write more")
 
 
 class Fallback(Composed[FallbackParameters]):

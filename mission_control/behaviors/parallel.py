@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
-from mission_control.behaviors.composed import Composed, Threshold
-from mission_control.composites import ENDLESS, InParallel
+from mission_control.behaviors.composed import PATIENCE_S, Composed, Seconds, Threshold
+from mission_control.composites import ENDLESS, WhileSuspended
+from mission_control.in_parallel import InParallel
 
 
 class ParallelParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -15,10 +17,16 @@ class ParallelParameters(BehaviorParameters, frozen=True, kw_only=True):
     Attributes:
         success_count: Number of children that must succeed, 1 for any; -1: all, -2: all but one, and so on.
         failure_count: Number of children that must fail for a failure; negative as above.
+        while_suspended: What a suspended child means. wait: it stands still, and is counted as one that is at work.
+            fail: after patience_s it counts as failed. skip: after patience_s it counts as if there were none such,
+            until it is at work again.
+        patience_s: With fail or skip, the mission time for which a child may be suspended.
     """
 
     success_count: Threshold = ENDLESS
     failure_count: Threshold = 1
+    while_suspended: Literal["wait", "fail", "skip"] = "wait"
+    patience_s: Seconds = PATIENCE_S
 
     def __post_init__(self) -> None:
         if self.success_count == 0:
@@ -46,3 +54,5 @@ class Parallel(Composed[ParallelParameters]):
     def _set_rules(self) -> None:
         self._rules.success_count = self.parameters.success_count
         self._rules.failure_count = self.parameters.failure_count
+        self._rules.while_suspended = WhileSuspended(self.parameters.while_suspended)
+        self._rules.patience_s = self.parameters.patience_s

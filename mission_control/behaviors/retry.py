@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
-from mission_control.behaviors.composed import PAUSE_S, Composed, Pause, Times
-from mission_control.composites import WithRetries
+from mission_control.behaviors.composed import PATIENCE_S, PAUSE_S, Composed, Pause, Seconds, Times
+from mission_control.composites import WhileSuspended, WithRetries
 
 
 class RetryParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -15,10 +16,15 @@ class RetryParameters(BehaviorParameters, frozen=True, kw_only=True):
     Attributes:
         num_attempts: Number of attempts, the first included; -1: without end.
         pause_s: Mission time from an end of the child to its next start.
+        while_suspended: What a suspended child means. wait: it stands still, and the retry waits. fail: after
+            patience_s the attempt counts as failed, and the child is started again.
+        patience_s: With fail, the mission time for which the child may be suspended.
     """
 
     num_attempts: Times
     pause_s: Pause = PAUSE_S
+    while_suspended: Literal["wait", "fail"] = "wait"
+    patience_s: Seconds = PATIENCE_S
 
     def __post_init__(self) -> None:
         if self.num_attempts == 0:
@@ -38,8 +44,11 @@ class Retry(Composed[RetryParameters]):
         return self._rules
 
     def parameters_changed(self) -> None:
-        """Apply them at the next end of the child."""
+        """Apply number and pause at the next end of the child, the others from now on."""
         self._set_rules()
+        self._children.look_again()
 
     def _set_rules(self) -> None:
         self._rules.most, self._rules.pause_s = self.parameters.num_attempts, self.parameters.pause_s
+        self._rules.while_suspended = WhileSuspended(self.parameters.while_suspended)
+        self._rules.patience_s = self.parameters.patience_s

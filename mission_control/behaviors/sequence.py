@@ -3,15 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Names
+from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
-from mission_control.behaviors.composed import Composed
-from mission_control.composites import InSequence
+from mission_control.behaviors.composed import PATIENCE_S, Composed, Seconds
+from mission_control.composites import InSequence, WhileSuspended
 
 
-class Sequence(Composed[BehaviorParameters]):
+class SequenceParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``Sequence``.
+
+    Attributes:
+        while_suspended: What a suspended child means. wait: it stands still, and the sequence waits. fail: after
+            patience_s it counts as failed. No later child stands in for it, because their order matters; where it does
+            not, take a fallback with next, or a parallel.
+        patience_s: With fail, the mission time for which a child may be suspended.
+    """
+
+    while_suspended: Literal["wait", "fail"] = "wait"
+    patience_s: Seconds = PATIENCE_S
+
+
+class Sequence(Composed[SequenceParameters]):
     """Runs its children one after the other; succeeds after all have succeeded, fails with the first that fails."""
+
+    parameters_type = SequenceParameters
 
     def rules(self, children: Names[str]) -> InSequence:
         """Return the rules of a sequence."""
-        return InSequence(children)
+        self._rules = InSequence(children)
+        self._set_rules()
+        return self._rules
+
+    def parameters_changed(self) -> None:
+        """Apply them from now on."""
+        self._set_rules()
+        self._children.look_again()
+
+    def _set_rules(self) -> None:
+        self._rules.while_suspended = WhileSuspended(self.parameters.while_suspended)
+        self._rules.patience_s = self.parameters.patience_s

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 from mission_control.children import Children, Decision, FinishParent, Instruction, StartChild, StopChild
 from mission_control.composites import (
     InFallback,
-    InParallel,
     InSequence,
     WhileSuspended,
     WithDelay,
@@ -24,6 +23,7 @@ from mission_control.composites import (
     WithRetries,
     WithTimeout,
 )
+from mission_control.in_parallel import InParallel
 from mission_control.messages import BehaviorStatus
 
 LONGEST = 120  # ticks of one run
@@ -69,6 +69,8 @@ def trees(draw: st.DrawFn, depth: int = 4, name: str = "n") -> Plan:
     kind = draw(st.sampled_from([*inner, *inner, "leaf", "wait"] if inner else ["leaf", "leaf", "leaf", "wait"]))
     count = draw(st.integers(1, 3)) if kind in ("sequence", "fallback", "parallel") else int(kind in inner)
     children = tuple(draw(trees(depth - 1, f"{name}{number}")) for number in range(count))
+    impatient = {"while_suspended": WhileSuspended.FAIL, "patience_s": draw(st.integers(1, 8))} if inner else {}
+    patience = st.sampled_from([{}, impatient])
     match kind:
         case "leaf":
             outcomes = draw(st.lists(st.tuples(st.integers(1, 12), st.booleans()), min_size=1, max_size=3))
@@ -76,8 +78,10 @@ def trees(draw: st.DrawFn, depth: int = 4, name: str = "n") -> Plan:
         case "parallel":
             thresholds = st.integers(1, count) | st.integers(-count, -1)
             settings = {"success_count": draw(thresholds), "failure_count": draw(thresholds)}
+            settings |= draw(patience | st.just({**impatient, "while_suspended": WhileSuspended.SKIP}))
         case "retry" | "repeat":
             settings = {"most": draw(st.sampled_from([-1, 1, 2, 3])), "pause_s": draw(st.integers(0, 3))}
+            settings |= draw(patience)
         case "timeout":
             how = draw(st.sampled_from([WhileSuspended.WAIT, WhileSuspended.COUNT]))
             settings = {"seconds": draw(st.integers(1, 30)), "while_suspended": how}
@@ -86,9 +90,34 @@ def trees(draw: st.DrawFn, depth: int = 4, name: str = "n") -> Plan:
         case "fallback":
             how = draw(st.sampled_from([WhileSuspended.WAIT, WhileSuspended.NEXT]))
             settings = {"while_suspended": how, "patience_s": draw(st.integers(0, 5))}
+            settings = draw(st.just(settings) | st.just(impatient))
         case _:
-            settings = {}
+            settings = draw(patience)
     return Plan(kind, name, children, settings=settings)
+
+
+@st.composite
+def impatient_trees(draw: st.DrawFn, kind: str, how: WhileSuspended = WhileSuspended.FAIL) -> Plan:
+    """Draw a parent of this kind that has little patience, with children that are suspended for long, and again."""
+    names = [f"n{number}" for number in range(draw(st.integers(2, 3)) if kind in ("parallel", "fallback") else 1)]
+    settings = {"patience_s": draw(st.integers(1, 5)), "while_suspended": how}
+    match kind:
+        case "retry" | "repeat":
+            settings |= {"most": draw(st.sampled_from([-1, 2, 3])), "pause_s": draw(st.integers(0, 3))}
+        case "parallel":
+            thresholds = st.integers(1, len(names)) | st.integers(-len(names), -1)
+            settings |= {"success_count": draw(thresholds), "failure_count": draw(thresholds)}
+    leaves = []
+    for name in names:
+        outcomes = draw(st.lists(st.tuples(st.integers(1, 20), st.booleans()), min_size=1, max_size=2))
+        gaps = draw(st.lists(st.tuples(st.integers(1, 6), st.integers(1, 12)), min_size=1, max_size=3))
+        suspended, tick = set[int](), 0
+        for at_work, stands in gaps:
+            tick += at_work
+            suspended |= {*range(tick, tick + stands)}
+            tick += stands
+        leaves.append(Plan("leaf", name, outcomes=tuple(outcomes), suspended=frozenset(suspended)))
+    return Plan(kind, "n", tuple(leaves), settings=settings)
 
 
 # ---------------------------------------------------------------------- by events
@@ -237,6 +266,7 @@ class Tick:
         self.plan, self.runs = plan, runs
         self.children = [reference(child, runs) for child in plan.children]
         self.is_running = False
+        self.stands_since: int | None = None
 
     @property
     def is_suspended(self) -> bool:
@@ -246,11 +276,29 @@ class Tick:
     def tick(self, now: int) -> BehaviorStatus:
         if not self.is_running:
             self.is_running = True
+            self.stands_since = None
             self.runs[self.plan.name] += 1
             self.reset(now)
         status = self.go_on(now)
         if status.is_final:
             self.halt()
+        if not self.is_suspended:
+            self.stands_since = None
+        elif self.stands_since is None:
+            self.stands_since = now
+        return status
+
+    def is_late(self, child: Tick, now: int) -> bool:
+        """Return whether a child has stood still for as long as this parent has patience."""
+        since = child.stands_since
+        return child.is_running and since is not None and now - since >= self.plan.settings["patience_s"]
+
+    def tick_with_patience(self, child: Tick, now: int) -> BehaviorStatus:
+        """Tick the only child that runs; with FAIL, halt it when it is late."""
+        status = child.tick(now)
+        if self.plan.settings.get("while_suspended") is WhileSuspended.FAIL and self.is_late(child, now):
+            child.halt()
+            return FAILURE
         return status
 
     def halt(self) -> None:
@@ -288,7 +336,7 @@ class TickInOrder(Tick):
 
     def go_on(self, now: int) -> BehaviorStatus:
         while self.at < len(self.children):
-            status = self.children[self.at].tick(now)
+            status = self.tick_with_patience(self.children[self.at], now)
             if status is not self.goes_on:
                 return status
             self.at += 1
@@ -329,26 +377,51 @@ class TickFallbackNext(Tick):
 
 
 class TickParallel(Tick):
+    """All children are ticked before any is judged to be late."""
+
     def reset(self, now: int) -> None:
         self.results: dict[int, BehaviorStatus] = {}
+        self.skipped = set[int]()
 
     def go_on(self, now: int) -> BehaviorStatus:
-        count = len(self.children)
-        needed, too_many = (
-            given if given >= 0 else max(count + given + 1, 0)
-            for given in (self.plan.settings["success_count"], self.plan.settings["failure_count"])
-        )
         for place, child in enumerate(self.children):
             if place in self.results:
                 continue
             status = child.tick(now)
             if status.is_final:
                 self.results[place] = status
-            found = Counter(self.results.values())
-            if found[SUCCESS] >= needed:
-                return SUCCESS
-            if count - found[FAILURE] < needed or found[FAILURE] == too_many:
-                return FAILURE
+            if status.is_final or not child.is_suspended:
+                self.skipped.discard(place)
+            if (result := self.judged()).is_final:
+                return result
+        open_places = [place for place in range(len(self.children)) if place not in self.results]
+        how = self.plan.settings.get("while_suspended", WhileSuspended.WAIT)
+        late = [
+            place for place in open_places if how is not WhileSuspended.WAIT and self.is_late(self.children[place], now)
+        ]
+        if how is WhileSuspended.SKIP:
+            self.skipped |= {*late}
+            return self.judged()
+        for place in late:
+            self.children[place].halt()
+            self.results[place] = FAILURE
+            if (result := self.judged()).is_final:
+                return result
+        return RUNNING
+
+    def judged(self) -> BehaviorStatus:
+        count = len(self.children) - len(self.skipped)
+        needed, too_many = (
+            given if given >= 0 else max(count + given + 1, 0)
+            for given in (self.plan.settings["success_count"], self.plan.settings["failure_count"])
+        )
+        found = Counter(self.results.values())
+        if count == 0:
+            return RUNNING
+        if found[SUCCESS] >= needed:
+            return SUCCESS
+        if count - found[FAILURE] < needed or found[FAILURE] >= too_many:
+            return FAILURE
         return RUNNING
 
 
@@ -361,7 +434,7 @@ class TickAgain(Tick):
     def go_on(self, now: int) -> BehaviorStatus:
         again = FAILURE if self.plan.kind == "retry" else SUCCESS
         while now >= self.rests_until:
-            status = self.children[0].tick(now)
+            status = self.tick_with_patience(self.children[0], now)
             if status is not again:
                 return status
             self.count += 1

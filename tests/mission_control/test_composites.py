@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from composed_trees import LONGEST, ByEvents, Plan, by_ticks, decide, trees
+from composed_trees import LONGEST, ByEvents, Plan, by_ticks, decide, impatient_trees, trees
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from mission_control.children import Children, FinishParent, Instruction, StartChild, StopChild
 from mission_control.composites import (
     InFallback,
-    InParallel,
     InSequence,
     WhileSuspended,
     WithDelay,
@@ -22,15 +22,36 @@ from mission_control.composites import (
     WithRetries,
     WithTimeout,
 )
+from mission_control.in_parallel import InParallel
 from mission_control.messages import BehaviorStatus
 
 SUCCESS, FAILURE, RUNNING = BehaviorStatus.SUCCESS, BehaviorStatus.FAILURE, BehaviorStatus.RUNNING
 NAMES = ["a", "b", "c"]
+FAIL: dict[str, Any] = {"while_suspended": WhileSuspended.FAIL, "patience_s": 2.0}
+SKIP: dict[str, Any] = {"while_suspended": WhileSuspended.SKIP, "patience_s": 2.0}
 
 
 @settings(suppress_health_check=[HealthCheck.too_slow])
 @given(trees())
 def test_a_tree_ends_as_the_reference_does_at_the_same_instant_after_the_same_starts(tree: Plan) -> None:
+    ends_as_the_reference(tree)
+
+
+@pytest.mark.parametrize(
+    ("kind", "how"),
+    [
+        *((kind, WhileSuspended.FAIL) for kind in ("sequence", "fallback", "parallel", "retry", "repeat")),
+        ("parallel", WhileSuspended.SKIP),
+    ],
+)
+@given(data=st.data())
+def test_a_parent_without_patience_ends_as_the_reference_does(
+    kind: str, how: WhileSuspended, data: st.DataObject
+) -> None:
+    ends_as_the_reference(data.draw(impatient_trees(kind, how)))
+
+
+def ends_as_the_reference(tree: Plan) -> None:
     result, starts = by_ticks(tree)
     events = ByEvents(tree)
     assert events.run() == result
@@ -105,6 +126,12 @@ MAKERS: dict[str, Callable[[], Children]] = {
     "retry": lambda: WithRetries(["a"], most=3),
     "retry-later": lambda: WithRetries(["a"], most=-1, pause_s=2.0),
     "repeat": lambda: WithRepeats(["a"], most=3),
+    "sequence-fail": lambda: InSequence(NAMES, **FAIL),
+    "fallback-fail": lambda: InFallback(NAMES, **FAIL),
+    "parallel-fail": lambda: InParallel(NAMES, success_count=1, failure_count=-1, **FAIL),
+    "parallel-skip": lambda: InParallel(NAMES, **SKIP),
+    "retry-fail": lambda: WithRetries(["a"], most=3, pause_s=1.0, **FAIL),
+    "repeat-fail": lambda: WithRepeats(["a"], most=3, **FAIL),
     "timeout": lambda: WithTimeout(["a"], seconds=7.0),
     "timeout-count": lambda: WithTimeout(["a"], seconds=7.0, while_suspended=WhileSuspended.COUNT),
     "wait": lambda: WithDelay([], seconds=7.0),
@@ -357,3 +384,75 @@ def test_before_its_begin_a_parent_only_notes_its_children() -> None:
     rules = InSequence(["a"])
     assert rules.rearranged(["b", "a"], (), 0.0) == []
     assert rules.begin(0.0) == [StartChild("b")]
+
+
+def test_a_sequence_without_patience_fails_with_the_child_that_is_suspended_too_long() -> None:
+    rules = begun(InSequence(["a", "b"], **FAIL))
+    assert rules.suspended("a", "higher by console-1", 1.0) == []
+    assert rules.wakes_at_s == 3.0
+    rules.suspended("a", "", 2.0)
+    rules.suspended("a", "slice", 2.5)
+    assert (rules.wakes_at_s, rules.time_passed(4.0)) == (4.5, [])
+    stop, finish = rules.time_passed(4.5)
+    assert stop == StopChild("a")
+    assert finish == FinishParent(FAILURE, {"child": "a", "detail": "it was suspended for 2 s: slice"})
+
+
+def test_a_retry_without_patience_begins_the_next_attempt() -> None:
+    rules = begun(WithRetries(["a"], most=2, pause_s=1.0, **FAIL))
+    rules.suspended("a", "slice", 0.0)
+    assert rules.time_passed(2.0) == [StopChild("a")]
+    assert rules.sentence == (
+        "starts a again at 3.0 s of mission time, attempt 2 of 2, because a failed: it was suspended for 2 s: slice"
+    )
+    assert rules.time_passed(3.0) == [StartChild("a")]
+    rules.suspended("a", "slice", 3.0)
+    *_, finish = rules.time_passed(5.0)
+    assert isinstance(finish, FinishParent)
+    assert finish.status is FAILURE
+
+
+def test_a_repeat_without_patience_fails_with_its_cycle() -> None:
+    rules = begun(WithRepeats(["a"], most=-1, **FAIL))
+    rules.suspended("a", "slice", 0.0)
+    *_, finish = rules.time_passed(2.0)
+    assert isinstance(finish, FinishParent)
+    assert finish.status is FAILURE
+
+
+def test_a_fallback_without_patience_leaves_a_child_for_good() -> None:
+    rules = begun(InFallback(["a", "b"], **FAIL))
+    rules.suspended("a", "slice", 0.0)
+    assert rules.time_passed(2.0) == [StopChild("a"), StartChild("b")]
+    assert rules.suspended("a", "", 3.0) == []
+    assert rules.sentence == "runs b, 2 of 2, because a failed: it was suspended for 2 s: slice"
+
+
+def test_a_parallel_counts_a_child_that_is_suspended_too_long_as_failed() -> None:
+    rules = begun(InParallel(NAMES, success_count=1, failure_count=-1, **FAIL))
+    rules.suspended("a", "slice", 0.0)
+    rules.suspended("b", "slice", 0.0)
+    assert rules.time_passed(2.0) == [StopChild("a"), StopChild("b")]
+    assert end(rules, "c", SUCCESS, 3.0)[-1] == FinishParent(SUCCESS)
+
+
+def test_a_parallel_may_skip_a_child_until_it_is_at_work_again() -> None:
+    rules = begun(InParallel(["a", "b"], **SKIP))
+    rules.suspended("a", "slice", 0.0)
+    assert rules.time_passed(2.0) == []
+    assert rules.wakes_at_s == math.inf
+    assert rules.sentence == "runs b, 0 of 1 needed successes, without a, suspended for too long"
+    rules.suspended("a", "", 3.0)
+    assert rules.sentence == "runs a and b, 0 of 2 needed successes"
+    rules.suspended("a", "slice", 4.0)
+    assert end(rules, "b", SUCCESS, 5.0) == [StopChild("b")]
+    assert rules.time_passed(6.0) == [StopChild("a"), FinishParent(SUCCESS)]
+
+
+def test_a_parallel_that_would_skip_all_waits_for_them() -> None:
+    rules = begun(InParallel(["a", "b"], **SKIP))
+    rules.suspended("a", "slice", 0.0)
+    rules.suspended("b", "slice", 1.0)
+    assert (rules.time_passed(2.0), rules.time_passed(3.0)) == ([], [])
+    rules.suspended("b", "", 4.0)
+    assert end(rules, "b", SUCCESS, 5.0)[-1] == FinishParent(SUCCESS)

@@ -209,6 +209,40 @@ def test_the_next_alternative_stands_in_until_the_first_has_its_robot_back(place
     placer_world(scene)
 
 
+def test_an_attempt_that_a_person_holds_up_fails_and_the_next_one_begins(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        patience = {"while_suspended": "fail", "patience_s": 5.0}
+        patrol = node("leaf", "patrol", arc=ARC)
+        top = await root(placer, node("retry", "again", patrol, num_attempts=2, pause_s=1.0, **patience))
+        arc = await granted(placer, "patrol")
+        held = placer.components["patrol"]
+        await arc.suspend("higher", "console-1")
+        await placer.clock.sleep_s(4.0)
+        assert placer.components["patrol"] is held
+        because = "because patrol failed: it was suspended for 5 s: higher by console-1"
+        await placer.wait(lambda: top.feedback.endswith(f", attempt 2 of 2, {because}"), within_s=5.0)
+        await placer.wait(lambda: placer.components.get("patrol") not in (held, None), within_s=5.0)
+        await placer.wait(lambda: top.status is FAILURE, within_s=10.0)  # its second life gets no grant at all
+
+    placer_world(scene)
+
+
+def test_a_parallel_succeeds_without_the_child_that_a_person_holds_up(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        held, free = node("leaf", "held", arc=ARC), node("leaf", "free")
+        top = await root(placer, node("parallel", "both", held, free, while_suspended="skip", patience_s=5.0))
+        arc = await granted(placer, "held")
+        await arc.suspend("higher", "console-1")
+        await placer.clock.sleep_s(6.0)
+        assert top.feedback == "runs free, 0 of 1 needed successes, without held, suspended for too long"
+        assert is_running(placer, "both", "held", "free")
+        await ended(placer, "free", SUCCESS)
+        await placer.wait(lambda: top.status is SUCCESS)
+        await placer.wait(lambda: is_running(placer, "both"))
+
+    placer_world(scene)
+
+
 def test_grants_that_change_faster_than_children_start_and_stop_leave_the_right_one(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         first, second = node("leaf", "first", arc=ARC), node("leaf", "second")
