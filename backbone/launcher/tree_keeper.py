@@ -36,7 +36,7 @@ from backbone.launcher.tree_changes import (
     orders,
     written,
 )
-from backbone.mission.behavior_orders import TREE_PARAMETERS
+from backbone.mission.behavior_orders import PLACE_PARAMETERS
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission_bytes
 from backbone.mission.report import MissionInvalid
@@ -243,7 +243,7 @@ class TreeKeeper:
         at = address(Subsystem.MISSION_CONTROL, name)
         while at in self._alive and (order := orders(self.description).get(name)) is not None:
             owed = self._owed.get(name, set())
-            place = {key: order.parameters[key] for key in TREE_PARAMETERS}
+            place = {key: order.parameters[key] for key in PLACE_PARAMETERS}
             take = TakeBranch(self.version, place, sorted(owed))
             try:
                 taken = await self._bus.ask(at, take, BranchTaken, within_s=ENDS_WITHIN_S)

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 PathStep = tuple[str, int]
 Node = Mapping[str, Any]
 """A node of the behavior tree as plain data, with the nodes below it."""
-TREE_PARAMETERS = ("path", "arc", "children", "is_last", "keeper")
+PLACE_PARAMETERS = ("path", "arc", "children")
+"""What a change of the running tree may change of a behavior."""
+TREE_PARAMETERS = (*PLACE_PARAMETERS, "is_last", "keeper")
+"""What starts a behavior sets, and the mission file does not."""
 
 
 class ReservedParameter(Refusal):

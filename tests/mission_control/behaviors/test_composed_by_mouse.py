@@ -19,7 +19,7 @@ from mission_control.laboratory.simulation.whole_mission import RunningMission
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus
 
 EXAMPLE = EXAMPLES / "night.xml"
-ROOT, MOST_S = "night-watch", 400.0
+ROOT, MOST_S = "night-watch", 3000.0  # hiding takes up to 20 looks around, in slices of 5 s
 NEAR_M = 0.5  # dead reckoning over a round of patrol and the way there
 SUCCESS, FAILURE = BehaviorStatus.SUCCESS, BehaviorStatus.FAILURE
 
