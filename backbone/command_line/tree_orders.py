@@ -29,7 +29,7 @@ from backbone.launcher.messages import (
 from backbone.mission.outline import Node, outline
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import Subsystem
+from backbone.naming import Subsystem, component_of
 from backbone.spoken import value_text
 
 REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
@@ -50,7 +50,7 @@ async def print_tree(where: Where, *, as_json: bool) -> ExitCode:
         there = await bus.ask(
             NAMESERVER, ListComponents(subsystem=Subsystem.MISSION_CONTROL), Components, within_s=REPLY_TIME_S
         )
-    running = {component.address.rpartition("/")[2]: component for component in there.components}
+    running = {component_of(component.address): component for component in there.components}
     whole = outline(tree.text.encode())
     if as_json:
         found = [_plain(node, running) for node in _behaviors(whole.first("behaviors"))]
