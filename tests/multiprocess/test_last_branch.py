@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import signal
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
-from running_mission import RunningMission, mission_up
+from running_mission import BIN, RunningMission, mission_up
 
 from backbone.component.messages import AskState, ComponentState
 from backbone.keys import Conversation
@@ -57,6 +58,28 @@ async def test_down_has_the_scout_drive_home_and_leaves_nothing() -> None:
         assert "last branch end-of-day: succeeded after " in down.stderr
         assert "is down; asking was enough" in down.stderr
         assert mission.launcher.wait(30) == 0, mission.story()
+
+
+def test_it_gets_the_robot_that_a_person_holds() -> None:
+    with mission_up(mission_xml=HOME_AT_THE_END) as mission:
+        patrols(mission)
+        words = ["scout-console", "attach", "scout1", "--priority", "100", "--mission", mission.name, "--script", "-"]
+        console = subprocess.Popen(
+            [str(BIN / words[0]), *words[1:]],
+            env=mission.environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            mission.wait_for_line("scout1: was taken over by", 20.0)
+            down = mission.command("scout-backbone", "down")
+            assert "last branch end-of-day: succeeded after " in down.stderr, mission.story()
+            assert mission.launcher.wait(30) == 0, mission.story()
+            console.wait(10)
+        finally:
+            console.kill()
+            console.communicate()
 
 
 def test_a_second_down_ends_it_at_once() -> None:
