@@ -25,6 +25,7 @@ from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.health_watch import HealthWatch
+from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.mission.behavior_orders import behavior_orders
@@ -87,6 +88,8 @@ class Launcher(Component[NoParameters]):
     async def serve(self) -> None:
         """Start the mission through the placer and keep it running; publish its health."""
         self.start_task(self._health_watch.run(), "health")
+        if self.launch.run_directory:
+            self.start_task(NamesKeeper(self.bus, self.clock, Path(self.launch.run_directory)).run(), "names")
         try:
             await self._start_mission()
         except BackboneError as error:
