@@ -16,7 +16,7 @@ from backbone.command_line.options import (
     complete_mission,
     finite,
     hub_endpoint,
-    picture_for,
+    names_for,
     run,
 )
 from backbone.command_line.where import Where
@@ -30,7 +30,6 @@ WEB_PORT = 8420  # chosen: free on most machines
 LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
 LONGEST_WAIT_S = 86_400.0  # chosen: a day, as in a mission file
 SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
-BEHAVIORS = "mission_control"
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
@@ -46,16 +45,14 @@ app = typer.Typer(
 
 def complete_robot(ctx: typer.Context) -> list[str]:
     """Return the robots of the mission that is up, for a shell."""
-    picture = picture_for(ctx)
-    rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
-    return sorted(rc.rc for rc in rcs if rc.is_robot)
+    names = names_for(ctx)
+    return names.robots if names is not None else []
 
 
 def complete_behavior(ctx: typer.Context) -> list[str]:
     """Return the behaviors of the mission that is up, for a shell."""
-    picture = picture_for(ctx)
-    addresses = picture.components if picture is not None else ()
-    return sorted(name for subsystem, _, name in (one.partition("/") for one in addresses) if subsystem == BEHAVIORS)
+    names = names_for(ctx)
+    return names.behaviors if names is not None else []
 
 
 Mission = Annotated[

@@ -115,57 +115,50 @@ def typed_mission(ctx: typer.Context) -> tuple[str | None, str | None, Path | No
     return mission, endpoint, Path(secret_file) if secret_file is not None else None
 
 
-def picture_for(ctx: typer.Context) -> Any:
-    """Return the picture of the mission that the typed words name; None if it is not up.
+def names_for(ctx: typer.Context) -> Any:
+    """Return the names of the mission that the typed words name; None if it is not up.
 
-    The bus is loaded only if a mission is up.
+    On this machine its run folder has them. The bus is loaded only for a mission elsewhere, or one without that file.
     """
     typed = typed_mission(ctx)
     if typed is None:
         return None
-    from backbone.command_line.completion import picture_now
+    from backbone import run_names
 
-    return picture_now(*typed)
+    mission, endpoint, _ = typed
+    try:
+        names = run_names.read(mission) if endpoint is None else None
+    except (BackboneError, OSError):
+        return None
+    if names is not None:
+        return names
+    from backbone.command_line.completion import names_now
+
+    return names_now(*typed)
 
 
 def complete_name(ctx: typer.Context) -> list[str]:
     """Return the names that questions may use in the mission that is up."""
-    picture = picture_for(ctx)
-    if picture is None:
-        return []
-    from backbone.command_line.completion import names_of
-
-    return names_of(picture)
+    names = names_for(ctx)
+    return names.all if names is not None else []
 
 
 def complete_resource(ctx: typer.Context) -> list[str]:
     """Return the resources of the mission that is up."""
-    picture = picture_for(ctx)
-    if picture is None:
-        return []
-    from backbone.command_line.completion import resources_of
-
-    return resources_of(picture)
+    names = names_for(ctx)
+    return names.resources if names is not None else []
 
 
 def complete_type(ctx: typer.Context) -> list[str]:
     """Return the component types of the mission that is up."""
-    typed = typed_mission(ctx)
-    if typed is None:
-        return []
-    from backbone.command_line.completion import types_now
-
-    return types_now(*typed)
+    names = names_for(ctx)
+    return names.types if names is not None else []
 
 
 def complete_person(ctx: typer.Context) -> list[str]:
     """Return the people at the consoles of the mission that is up."""
-    picture = picture_for(ctx)
-    if picture is None:
-        return []
-    from backbone.command_line.completion import people_of
-
-    return people_of(picture)
+    names = names_for(ctx)
+    return names.people if names is not None else []
 
 
 Version = Annotated[

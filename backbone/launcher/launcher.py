@@ -36,6 +36,7 @@ from backbone.launcher.messages import (
     NotUpYet,
     TreeChange,
 )
+from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.tree_keeper import TreeKeeper
@@ -115,6 +116,8 @@ class Launcher(Component[NoParameters]):
     async def serve(self) -> None:
         """Start the mission through the placer and keep it running; publish its health."""
         self.start_task(self._health_watch.run(), "health")
+        if self.launch.run_directory:
+            self.start_task(NamesKeeper(self.bus, self.clock, Path(self.launch.run_directory)).run(), "names")
         try:
             await self._start_mission()
         except BackboneError as error:

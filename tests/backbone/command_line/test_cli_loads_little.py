@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from backbone import run_files, run_names
+
 pytestmark = pytest.mark.processes
 
 HEAVY = {"asyncio", "cv2", "lxml", "msgspec", "mujoco", "numpy", "pydantic", "rich", "textual", "uvloop", "zenoh"}
@@ -82,6 +84,28 @@ def test_completion_loads_nothing_heavy_where_no_mission_is_up(
     printed, loaded = run(typed[0], folder=tmp_path, variables=completing(*typed))
     assert printed.split() == offered
     assert loaded == (set() if offered else {"msgspec"}), "names come from run files"
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (("scout-backbone", "why", ""), ["scout1", "watch1"]),
+        (("scout-backbone", "start", ""), ["patrol"]),
+        (("scout-console", "attach", ""), ["scout1"]),
+        (("scout-console", "look", ""), ["watch1"]),
+    ],
+    ids=str,
+)
+def test_names_of_a_mission_that_is_up_are_completed_without_asking_it(
+    typed: tuple[str, ...], offered: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    up = run_files.RunFile("m", "tcp/127.0.0.1:1", os.getpid(), 0.0, 1.0, "base", "none")
+    names = run_names.MissionNames(["scout1", "watch1"], ["scout1"], ["scout1"], ["watch1"], [], ["patrol"])
+    run_names.write(run_files.write(up).parent, names)
+    printed, loaded = run(typed[0], folder=tmp_path, variables=completing(*typed))
+    assert printed.split() == offered
+    assert loaded == {"msgspec"}
 
 
 def test_status_of_no_mission_loads_no_description_and_no_simulation(tmp_path: Path) -> None:

@@ -10,14 +10,17 @@ import pytest
 from typer.testing import CliRunner
 
 from backbone.command_line.cli import app
-from backbone.command_line.completion import names_of, people_of, resources_of
 from backbone.command_line.options import hub_endpoint
 from backbone.command_line.tree_commands import tree
 from backbone.component.messages import ComponentState, LifeState
+from backbone.component_database.messages import ComponentType, TypeCount
 from backbone.errors import HubUnreachable
 from backbone.launcher.endings import ExitCode, complaint_of
 from backbone.moments import NoMoment
+from backbone.naming import Subsystem
 from backbone.picture.mission import MissionPicture
+from backbone.picture.names import names_in
+from backbone.run_names import MissionNames
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 from ui_console.cli import app as console_app
@@ -89,7 +92,7 @@ def picture() -> MissionPicture:
         component("ui_console/console-7", "console", "anna"),
         component("ui_console/console-8", "console", "Ben B."),
     ]
-    rc = RcView("scout1", "scout", "up", False, 1.0, [], 0, [])
+    rc = RcView("scout1", "scout", "up", False, 1.0, [], 0, [], is_robot=True)
     request = RequestView(
         "console-7-drive", found[2].address, RequestState.RUNNING, ["scout1"], 0.0, -1.0, -1.0, "", [], 5.0, "", 1
     )
@@ -97,11 +100,15 @@ def picture() -> MissionPicture:
 
 
 def test_what_can_be_asked_about_is_completed_and_nothing_a_shell_takes_apart() -> None:
-    assert names_of(picture()) == [
-        "anna", "base", "console-7", "console-7-drive", "console-8", "creator-base", "scout1", "watch1",
-    ]  # fmt: skip
-    assert resources_of(picture()) == ["scout1"]
-    assert people_of(picture()) == ["anna"]
+    types = [TypeCount(ComponentType("scout", "x:Y", Subsystem.RESOURCE_POOL), 1)]
+    assert names_in(picture(), types) == MissionNames(
+        ["anna", "base", "console-7", "console-7-drive", "console-8", "creator-base", "scout1", "watch1"],
+        ["scout1"],
+        ["scout1"],
+        ["watch1"],
+        ["anna"],
+        ["scout"],
+    )
 
 
 @pytest.mark.parametrize("words", [["why", ""], ["stop", ""], ["story", "sc"], ["log", "--robot", ""]])

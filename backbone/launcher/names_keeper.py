@@ -1,0 +1,95 @@
+"""Names keeper: the launcher keeps the file of the mission's names, from which shells complete."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from pathlib import Path
+
+from backbone import run_names
+from backbone.addresses import NAMESERVER, RC_MANAGER
+from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import ComponentState
+from backbone.component_database.messages import TypeCount
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
+from backbone.picture.look import LOOK_TIME_S, types_of
+from backbone.picture.mission import MissionPicture
+from backbone.picture.names import names_in
+from backbone.printable import printable_all
+from backbone.run_names import MissionNames
+from backbone.scheduling.views import Schedule
+from backbone.wire import Envelope, Message
+
+log = logging.getLogger(__name__)
+
+WRITE_EVERY_S = 0.5  # chosen: a person types no name of a component sooner; seconds of the machine
+LIST_AGAIN_S = 10.0  # chosen: a person who signs in, or a message that was lost, is caught up with soon
+
+
+class NamesKeeper:
+    """Listens to nameserver and RC manager, and writes the names whenever they have changed.
+
+    Args:
+        bus: Of the launcher.
+        clock: The mission's.
+        directory: The run folder.
+    """
+
+    def __init__(self, bus: Bus, clock: Clock, directory: Path) -> None:
+        self._bus, self._clock, self._directory = bus, clock, directory
+        self._picture = MissionPicture(bus.mission)
+        self._types: list[TypeCount] = []
+        self._written: MissionNames | None = None
+        self._news = asyncio.Event()
+
+    async def run(self) -> None:
+        """Keep the file until cancelled; at most one write in ``WRITE_EVERY_S``."""
+        hearing = [
+            self._bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard, latest=True),
+            self._bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard),
+            self._bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard),
+        ]
+        try:
+            async with asyncio.TaskGroup() as loops:
+                loops.create_task(self._list_again_and_again())
+                while True:
+                    await self._news.wait()
+                    self._news.clear()
+                    self._write()
+                    await self._clock.sleep_s(WRITE_EVERY_S * self._clock.rate)
+        finally:
+            for subscription in hearing:
+                subscription.close()
+
+    async def _list_again_and_again(self) -> None:
+        while True:
+            try:
+                listed = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=LOOK_TIME_S)
+                self._picture.take(printable_all(listed))
+                if not self._types:
+                    self._types = await types_of(self._bus)
+            except (LinkError, Refusal) as error:  # the health watch reports it
+                log.info("the names are as they were: %s", error)
+            self._news.set()
+            await self._clock.sleep_s(LIST_AGAIN_S * self._clock.rate)
+
+    def _heard(self, envelope: Envelope[Message]) -> None:
+        match printable_all(envelope.body):
+            case Appeared(component=component):
+                self._picture.take(component)
+            case Schedule() | ComponentState() | Disappeared() as said:
+                self._picture.take(said)
+        self._news.set()
+
+    def _write(self) -> None:
+        names = names_in(self._picture, self._types)
+        if names == self._written:
+            return
+        try:
+            run_names.write(self._directory, names)
+            self._written = names
+        except OSError as error:  # shells ask the mission then
+            log.info("the names are not written: %s", error)
+            self._written = None

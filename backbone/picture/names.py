@@ -1,0 +1,36 @@
+"""Names in the picture of a mission, for shells that complete them. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from backbone.component_database.messages import TypeCount
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.mission_log.people import is_console
+from backbone.naming import Subsystem, component_of
+from backbone.picture.mission import MissionPicture
+from backbone.run_names import MissionNames
+
+
+def names_in(picture: MissionPicture, types: Iterable[TypeCount] = ()) -> MissionNames:
+    """Return the names in a picture and of these types; a person's name only if a shell takes it as one word."""
+    components, schedule = picture.components, picture.schedule
+    rcs = schedule.rcs if schedule is not None else []
+    requests = schedule.requests if schedule is not None else []
+    found = {component_of(at) for at in components}
+    found |= {component.host for component in components.values() if component.type == CREATOR}
+    found |= {component.user for component in components.values() if is_word(component.user)}
+    found |= {rc.rc for rc in rcs} | {request.arc for request in requests}
+    return MissionNames(
+        sorted(found - {""}),
+        sorted(rc.rc for rc in rcs),
+        sorted(rc.rc for rc in rcs if rc.is_robot),
+        sorted(component_of(at) for at in components if at.startswith(f"{Subsystem.MISSION_CONTROL}/")),
+        sorted({one.user for at, one in components.items() if is_console(at) and is_word(one.user)}),
+        sorted(one.component_type.name for one in types),
+    )
+
+
+def is_word(text: str) -> bool:
+    """Return whether a shell takes the text as one word."""
+    return bool(text) and text.isprintable() and not any(each in text for each in " \t'\"\\$`&|;<>()*?[]#~=%!{}:")
