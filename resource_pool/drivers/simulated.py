@@ -49,7 +49,8 @@ class RadioOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Options of a simulated radio.
 
     Attributes:
-        bits_per_s: Its bit rate; a packet that takes longer than its ARC declared raises an alarm, and its time counts.
+        bits_per_s: Its bit rate; a packet that takes longer than its ARC declared raises an alarm, and the longer time
+            counts.
     """
 
     bits_per_s: Annotated[float, msgspec.Meta(gt=0)] = 115_200.0
