@@ -27,8 +27,8 @@ from backbone.creator.zygote import Zygote
 from backbone.errors import BackboneError
 from backbone.heaps import share_heaps
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, launcher_launch, service_launch
+from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.launcher.launcher import LISTING_TIME_S, Launcher
-from backbone.launcher.messages import EndMission, MissionEnding
 from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up

@@ -18,8 +18,8 @@ from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.errors import LinkError
 from backbone.launcher.bring_up import end_mission
+from backbone.launcher.ending_messages import AwaitLastBranch, LastBranchOver
 from backbone.launcher.endings import ExitCode, say
-from backbone.launcher.messages import AwaitLastBranch, LastBranchOver
 from backbone.launcher.verdict import await_verdict
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.waiting import first_of, set_within

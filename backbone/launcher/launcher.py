@@ -24,18 +24,11 @@ from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnde
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
+from backbone.launcher.ending_messages import AwaitLastBranch, EndMission, LastBranchOver, MissionEnding
 from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch
 from backbone.launcher.last_run import run_last
-from backbone.launcher.messages import (
-    AskTree,
-    AwaitLastBranch,
-    EndMission,
-    LastBranchOver,
-    MissionEnding,
-    NotUpYet,
-    TreeChange,
-)
+from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
 from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
