@@ -16,7 +16,7 @@ from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
-from backbone.component.messages import ComponentState, SetParameter
+from backbone.component.messages import AskParameters, ComponentState, SetParameter
 from backbone.component.messages import Parameters as ParametersAnswer
 from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import (
@@ -211,6 +211,18 @@ def test_a_revised_order_is_the_one_that_is_restarted(on_host: Callable) -> None
             await host.placer.ask(CREATOR, ReviseSpawn("scout2", {}), SpawnRevised, within_s=1.0)
         with pytest.raises(NotThePlacer):
             await host.stranger.ask(CREATOR, ReviseSpawn("scout1", {}), SpawnRevised, within_s=1.0)
+
+    on_host(body)
+
+
+def test_a_member_of_a_shared_process_begins_anew_with_its_revised_order(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        await host.spawn(order("Weighted", "scout1", parameters={"weight": 1}, process="hardware"))
+        await host.placer.ask(CREATOR, ReviseSpawn("scout1", {"weight": 2}), SpawnRevised, within_s=1.0)
+        host.zygote.kill(next(iter(host.zygote.lives)), signal.SIGKILL)
+        await VirtualClock().sleep_s(2.0)
+        now = await host.stranger.ask("resource_pool/scout1", AskParameters(), ParametersAnswer, within_s=1.0)
+        assert now.values == {"weight": 2}
 
     on_host(body)
 
