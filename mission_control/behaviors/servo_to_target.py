@@ -20,7 +20,8 @@ import numpy as np
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
-from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behavior import BehaviorParameters
+from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import Driver
 from mission_control.messages import BehaviorStatus
 from mission_control.vision.landmark import Picture
