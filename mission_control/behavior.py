@@ -28,7 +28,7 @@ from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
-from mission_control.behavior_hooks import BehaviorHooks
+from mission_control.behavior_hooks import BehaviorHooks, suspended_because
 from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw
 from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_by_placer, end_task, why
 from mission_control.children import Children, Decision
@@ -476,17 +476,3 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             work.close()
             return None
         return self.start_task(work, name)
-
-
-def suspended_because(reason: str, by: str) -> str:
-    """Return the reason of a suspension, as part of a sentence.
-
-    Args:
-        reason: The scheduler's word.
-        by: The component that caused it; empty: none.
-
-    Example:
-        >>> suspended_because("higher", "console-1"), suspended_because("silent", "")
-        ('higher by console-1', 'silent')
-    """
-    return f"{reason} by {by}" if by else reason

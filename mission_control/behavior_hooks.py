@@ -131,3 +131,17 @@ class BehaviorHooks:
 
         When: the last child finished, or one aborted the others. What: by default, finish with the same status.
         """
+
+
+def suspended_because(reason: str, by: str) -> str:
+    """Return the reason of a suspension, as part of a sentence.
+
+    Args:
+        reason: The scheduler's word.
+        by: The component that caused it; empty: none.
+
+    Example:
+        >>> suspended_because("higher", "console-1"), suspended_because("silent", "")
+        ('higher by console-1', 'silent')
+    """
+    return f"{reason} by {by}" if by else reason

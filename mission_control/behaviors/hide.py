@@ -13,7 +13,8 @@ import numpy as np
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behavior import BehaviorParameters
+from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.dark_search import VIEW_COLUMNS, VIEW_ROWS, DarkSearch, SearchStage, glimpse
 from mission_control.behaviors.driver import Driver
 from mission_control.behaviors.motion import MOST_M_S, STILL

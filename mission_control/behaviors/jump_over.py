@@ -14,7 +14,8 @@ import math
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behavior import BehaviorParameters
+from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
 from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, JumpStage, Obstacle
 from mission_control.behaviors.motion import MOST_M_S, Motion, read_places

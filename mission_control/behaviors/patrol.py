@@ -13,7 +13,8 @@ import math
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
-from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behavior import BehaviorParameters
+from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
 from mission_control.behaviors.motion import MOST_M_S, NEAREST_M, read_places
 from mission_control.behaviors.patrol_route import PatrolRoute, Visit

@@ -22,7 +22,8 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.keys import Conversation
-from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behavior import BehaviorParameters
+from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import Driver
 from mission_control.messages import BehaviorStatus
 from mission_control.vision.landmark import Picture

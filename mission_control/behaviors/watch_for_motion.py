@@ -18,7 +18,8 @@ from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.spoken import counted
-from mission_control.behavior import Behavior, BehaviorParameters, suspended_because
+from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.behavior_hooks import suspended_because
 from mission_control.behavior_tree import ArcNeed
 from mission_control.behaviors.run_times import RunTimes, useful_run_times
 from mission_control.messages import MotionSeen, Region

@@ -1,0 +1,163 @@
+"""Messages about the behavior tree of a running mission: to the launcher, which owns it, and from it to behaviors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from backbone.errors import Refusal
+from backbone.ranges import MANY, Count, Document, Line, Mention, Text, Values
+from backbone.wire import Message
+
+
+class AskTree(Message, frozen=True):
+    """Ask for the mission as it is now."""
+
+
+class Tree(Message, frozen=True):
+    """Answer to ``AskTree``.
+
+    Attributes:
+        version: Number of changes since the mission came up.
+        text: The mission file with these changes.
+    """
+
+    version: Count
+    text: Document
+
+
+# ---------------------------------------------------------------------- changes
+class AddBranch(Message, frozen=True):
+    """Add a branch to the running tree.
+
+    Attributes:
+        version: Version of the tree that the operator saw. So it is in each change.
+        parent: The behavior below which it comes; the mission's name: it is a root.
+        branch: Its XML: one ``<behavior>`` with all that is in it.
+        source: Name of the branch's file, for faults.
+        place: Its number among its siblings, from 1; 0: the last.
+    """
+
+    version: Count
+    parent: Mention
+    branch: Document
+    source: Line
+    place: Count = 0
+
+
+class RemoveBranch(Message, frozen=True):
+    """End a behavior and all below it, and take them out of the tree."""
+
+    version: Count
+    name: Mention
+
+
+class MoveBranch(Message, frozen=True):
+    """Put a branch elsewhere.
+
+    Below its present parent it only changes its place among its siblings. Below another parent it ends and begins anew
+    there, because its path changes.
+
+    Attributes:
+        place: As in ``AddBranch``.
+    """
+
+    version: Count
+    name: Mention
+    parent: Mention
+    place: Count = 0
+
+
+class ReplaceBranch(Message, frozen=True):
+    """End a behavior and all below it; another branch begins in its place.
+
+    Attributes:
+        branch: As in ``AddBranch``.
+        source: As in ``AddBranch``.
+    """
+
+    version: Count
+    name: Mention
+    branch: Document
+    source: Line
+
+
+class SetInTree(Message, frozen=True):
+    """Change a value of one behavior, now and for each later start.
+
+    Attributes:
+        parameter: ``priority``, ``minimum_runtime_s``, ``maximum_runtime_s``, or a parameter of the behavior.
+        value: The new value.
+    """
+
+    version: Count
+    name: Mention
+    parameter: Mention
+    value: Any
+
+
+TreeChange = AddBranch | RemoveBranch | MoveBranch | ReplaceBranch | SetInTree
+
+
+class TreeChanged(Message, frozen=True):
+    """Answer to a change: the tree is as ordered.
+
+    Attributes:
+        version: Its version from now on.
+        remarks: What an operator should know, one line each.
+    """
+
+    version: Count
+    remarks: Annotated[list[Text], MANY] = []
+
+
+class ChangedMeanwhile(Refusal):
+    """The tree has changed since the operator saw it; nothing is changed."""
+
+    code = "tree.changed_meanwhile"
+    remedy = "Look at it again with 'scout-backbone tree', then decide anew."
+
+
+class TreeInvalid(Refusal):
+    """With this change the mission file would be wrong; nothing is changed. The detail has each fault on a line."""
+
+    code = "tree.invalid"
+    remedy = "Mend the faults; the mission runs on as it was."
+
+
+class UnknownBehavior(Refusal):
+    """The tree has no behavior of this name."""
+
+    code = "tree.unknown"
+    remedy = "See 'scout-backbone tree' for the names of all behaviors."
+
+
+class NotUpYet(Refusal):
+    """The mission is coming up, or is ending; its tree is not changed meanwhile."""
+
+    code = "tree.not_up"
+    remedy = "Try again when 'scout-backbone status' shows the mission."
+
+
+# ---------------------------------------------------------------------- to a behavior
+class TakeBranch(Message, frozen=True):
+    """The tree has changed at or around a behavior. The behavior ends the children that it no longer has.
+
+    Attributes:
+        version: Of the tree; a behavior that has heard of a later one changes nothing.
+        place: Its parameters ``path``, ``arc`` and ``children`` from now on.
+        anew: Names of children that end and begin anew, because they are other ones now.
+    """
+
+    version: Count
+    place: Values
+    anew: Annotated[list[Mention], MANY] = []
+
+
+class BranchTaken(Message, frozen=True):
+    """Answer to ``TakeBranch``: children that are gone have ended.
+
+    Attributes:
+        finished: The behavior's final status, if it has one: then it starts no children. Empty: it is at work.
+    """
+
+    finished: Mention = ""
