@@ -247,7 +247,7 @@ def test_a_newer_order_has_the_robot_right_after_the_older() -> None:
         await anna.until(lambda: anna.console.is_held)
         arcs = [f"{CONSOLE}-{what}" for what in ("order-1-drive", "order-2-drive", "capture")]
         assert anna.grants(since_s=since_s) == arcs
-        assert anna.states() == [STARTING, WAITING, RUNNING, ENDED, STARTING, RUNNING, DONE]
+        assert anna.states() == [STARTING, WAITING, RUNNING, ENDED, STARTING, WAITING, RUNNING, DONE]
 
     play(scene)
 
