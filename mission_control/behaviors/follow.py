@@ -14,7 +14,8 @@ from typing import Annotated
 import msgspec
 
 from backbone.errors import Refusal
-from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behavior import BehaviorParameters
+from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
 from mission_control.behaviors.motion import MOST_M_S, FloorPoint
 from mission_control.behaviors.way import keep_distance

@@ -14,7 +14,8 @@ from typing import TypeVar
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
-from mission_control.behavior import BehaviorParameters, suspended_because
+from mission_control.behavior import BehaviorParameters
+from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
 from mission_control.behaviors.motion import MOST_M_S, NEAREST_M, FloorPoint
 from mission_control.behaviors.way import Way
