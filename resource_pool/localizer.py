@@ -49,12 +49,11 @@ from scout_model.description import WorldDescription
 log = logging.getLogger(__name__)
 
 EVERY_S = 0.2  # chosen: five poses a second are a smooth track on a map
-KEEP_EVERY_S = 1.0  # chosen: what a robot does in a second is less than what it can do until a restart
 PLACED_M = 0.02  # chosen: a robot is put on its mark by hand
 PLACED_RAD = math.radians(2.0)  # chosen: same
 SIGHTED_RAD = math.radians(3.0)  # chosen: twice what servoing at 1 m was measured to err
-UNSEEN_M_S = 0.5  # chosen: what a small robot can go meanwhile
-UNSEEN_RAD_S = 2.0  # chosen: what it can turn meanwhile
+UNSEEN_M_S = 0.2  # chosen: standard deviation of a speed of up to 0.35 m/s to and fro
+UNSEEN_RAD_S = 0.9  # chosen: same, of up to 1.5 rad/s
 LOST_M = 100.0  # chosen: larger than a room: it may be anywhere
 LATE_S = 0.5  # chosen: a message that is older says nothing of now
 FIRST_REPLY_S = 0.5  # chosen: an RC that runs answers in milliseconds
@@ -144,9 +143,7 @@ class Localizer(ResourceController[LocalizerParameters]):
         self._robots: dict[str, DeadReckoning] = {}
         self._numbers = dict.fromkeys(self._homes, 0)
         self._published: dict[str, Pose] = {}
-        self._news = asyncio.Event()
-        self._kept_s = -math.inf
-        self._is_kept = True
+        self._stir = asyncio.Event()
         self._heard = self._sightings = self._poses = 0
 
     async def connect(self) -> None:
@@ -162,7 +159,7 @@ class Localizer(ResourceController[LocalizerParameters]):
     async def serve(self) -> None:
         """Publish each pose that changes, and keep the beliefs."""
         self.start_task(self._publish_when_changed(), "poses")
-        self._news.set()
+        self._stir.set()
         await super().serve()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -194,13 +191,13 @@ class Localizer(ResourceController[LocalizerParameters]):
             robot.jumps(at_s)
         elif "forward_m_s" in told.values and "turn_rad_s" in told.values:
             robot.moves(told.values["forward_m_s"], told.values["turn_rad_s"], at_s)
-        self._news.set()
+        self._stir.set()
 
     def _counted(self, told: Readings) -> None:
         robot = self._robots.get(told.rc)
         if robot is not None and WAY in told.values and TURNED in told.values:
             robot.counts(told.values[WAY], told.values[TURNED], self._plausible_s(told.at_s))
-            self._news.set()
+            self._stir.set()
 
     def _sighted(self, envelope: Envelope[LandmarkSighting]) -> None:
         sighting, robot = envelope.body, self._robots.get(envelope.body.robot)
@@ -210,7 +207,7 @@ class Localizer(ResourceController[LocalizerParameters]):
         if pose is not None:
             robot.sighted(pose, sighting.spread_m, SIGHTED_RAD, min(sighting.at_s, self.clock.now_s()))
             self._sightings += 1
-            self._news.set()
+            self._stir.set()
 
     def _plausible_s(self, at_s: float) -> float:
         """Return the time that a message states, unless it is one at which it cannot have been sent."""
@@ -239,12 +236,12 @@ class Localizer(ResourceController[LocalizerParameters]):
 
     async def _publish_when_changed(self) -> None:
         while True:
-            await self._news.wait()
-            self._news.clear()
+            await self._stir.wait()
+            self._stir.clear()
             self._publish()
             await self.clock.sleep_s(EVERY_S * max(1.0, self.clock.rate))
-            if not self._is_kept or any(robot.is_moving for robot in self._robots.values()):
-                self._news.set()
+            if any(robot.is_moving for robot in self._robots.values()):
+                self._stir.set()
 
     def _publish(self) -> None:
         now_s = self.clock.now_s()
@@ -254,9 +251,7 @@ class Localizer(ResourceController[LocalizerParameters]):
                 self._published[name] = pose
                 self.bus.publish(self.address, Conversation.POSES, pose)
                 self._poses += 1
-                self._is_kept = False
-        if not self._is_kept and now_s - self._kept_s >= KEEP_EVERY_S * max(1.0, self.clock.rate):
-            self._keep(now_s)
+        self._keep(now_s)
 
     # ------------------------------------------------------------------ from life to life
     async def _begin(self, name: str) -> None:
@@ -295,7 +290,6 @@ class Localizer(ResourceController[LocalizerParameters]):
         )
 
     def _keep(self, now_s: float) -> None:
-        self._kept_s, self._is_kept = now_s, True
         if self._file is None:
             return
         robots = {

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import math
+import os
+import signal
 import time
 from pathlib import Path
 
@@ -53,3 +55,28 @@ async def test_a_scout_goes_to_its_place_and_home_by_dead_reckoning() -> None:
         assert away_m(at, (believed.x_m, believed.y_m)) <= 2 * believed.spread_m
         assert {pose.body for pose in published} == {"scout1", "scout2"}
         assert {pose.source for pose in published} == {PoseSource.DEAD_RECKONING}
+
+
+async def test_a_localizer_that_is_killed_on_the_way_is_back_and_the_scout_gets_there(tmp_path: Path) -> None:
+    """It missed no command: without an answer of the localizer the behavior gave none."""
+    alone = tmp_path / "alone.xml"
+    text = GO_TO.read_text(encoding="utf-8")
+    alone.write_text(text.replace('name="localizer" process="hardware"', 'name="localizer"'), encoding="utf-8")
+    with mission_up(mission_xml=alone) as mission:
+        async with mission.bus() as bus:
+            ends_s = time.monotonic() + THERE_WITHIN_S
+            while away_m(await truth(bus), HOME) < 0.5:
+                assert time.monotonic() < ends_s, mission.story()
+                await asyncio.sleep(0.1)
+            os.kill(mission.component("localizer")["pid"], signal.SIGKILL)
+            nearest_m = math.inf
+            while True:
+                nearest_m = min(nearest_m, away_m(await truth(bus), GOAL))
+                errand = await bus.ask("mission_control/errand", AskBehavior(), BehaviorState, within_s=2)
+                if errand.status.is_final or nearest_m < 0.3:
+                    break
+                assert time.monotonic() < ends_s, f"{errand}\n{mission.story()}"
+                await asyncio.sleep(0.2)
+        assert mission.component("localizer")["restarts"] == 1
+        assert not errand.status.is_final, f"{errand}\n{mission.story()}"
+        assert nearest_m < 0.4
