@@ -16,7 +16,9 @@ from backbone.bus.clock import run_virtual
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component_database.messages import ComponentType
+from backbone.errors import Refusal, code_of
 from backbone.keys import Conversation
+from backbone.mission.behavior_reports import BreakOff, BrokenOff
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.mission_log.operators import OperatorActed, OperatorAction
@@ -362,6 +364,20 @@ def test_a_console_that_answers_nothing_loses_its_orders() -> None:
         anna.console.answer = never  # type: ignore[method-assign]
         await anna.until(lambda: not anna.behaviors(), within_s=3.0)
         assert anna.grantee() == "patrol-scout1-drive"
+
+    play(scene)
+
+
+def test_only_the_console_of_an_order_can_break_it_off() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered()
+        for behavior in (f"{CONSOLE}-order-1", "patrol-scout1"):
+            with pytest.raises(Refusal) as refused:
+                await anna.running.bus.ask(f"mission_control/{behavior}", BreakOff(), BrokenOff, within_s=1.0)
+            assert code_of(refused.value) == "behavior.not_your_order"
+        await anna.running.clock.sleep_s(1.0)
+        assert anna.state() is RUNNING
 
     play(scene)
 
