@@ -1,8 +1,8 @@
-"""Messages of debug views: named intermediate pictures and values of a component, sent only while somebody looks.
+"""Messages of debug views: named intermediate pictures and values of a component, sent only during a look.
 
-* anybody → behavior: ``ListViews``, ``Look``.
+* console → behavior: ``ListViews``, ``LookAt``.
 * behavior → everybody: ``ViewPicture`` and ``ViewValue``, published under ``view_address`` (conversation ``views``)
-  while somebody looks.
+  during a look.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Views(Message, frozen=True):
     views: Annotated[list[ViewEntry], Meta(max_length=MOST_VIEWS)]
 
 
-class Look(Message, frozen=True):
+class LookAt(Message, frozen=True):
     """Look at a view for so long; to go on looking, ask again before the time is over.
 
     Attributes:
@@ -65,7 +65,7 @@ class Look(Message, frozen=True):
 
 
 class LookedAt(Message, frozen=True):
-    """Answer to ``Look``: the view is published when it changes, until this mission time at least."""
+    """Answer to ``LookAt``: the view is published when it changes, until this mission time at least."""
 
     view: Name
     kind: ViewKind

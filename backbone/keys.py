@@ -30,7 +30,7 @@ class Conversation(StrEnum):
     POSES = "poses"  # where a localizer believes robots to be
     SIGHTINGS = "sightings"  # landmarks that behaviors see in robots' pictures
     FRAMES = "frames"  # pictures
-    VIEWS = "views"  # debug views of a behavior, while somebody looks
+    VIEWS = "views"  # debug views of a behavior, during a look
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each
     SCHEDULE = "schedule"  # the RC manager's decisions and leases

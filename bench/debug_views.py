@@ -20,7 +20,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.launch import Launch
-from backbone.debug_views import LONGEST_LOOK_S, Look, ViewKind
+from backbone.debug_views import LONGEST_LOOK_S, LookAt, ViewKind
 from backbone.naming import Subsystem
 from mission_control.behaviors.watch_for_motion import WatchForMotion
 from resource_pool.arc_client import Frame
@@ -92,7 +92,7 @@ async def measure(count: int) -> None:
     entries = viewed.views.listed().views
     assert entries, "the watcher judged no picture"
     for entry in entries:
-        viewed.views.look(Look(entry.view, LONGEST_LOOK_S))
+        viewed.views.look(LookAt(entry.view, LONGEST_LOOK_S))
     looked = turns_s(viewed, bare, frames)
     await asyncio.sleep(0)
     viewed_s, bare_s = (sum(times) for times in zip(*unseen, strict=True))

@@ -22,7 +22,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
-from backbone.debug_views import ListViews, Look
+from backbone.debug_views import ListViews, LookAt
 from backbone.errors import LinkError, Refusal
 from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
@@ -112,7 +112,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior | TakeBranch | BreakOff | ListViews | Look
+    accepts: ClassVar[Accepts | None] = (
+        ArcNotice | ChildReport | AskBehavior | TakeBranch | BreakOff | ListViews | LookAt
+    )
     children_together: ClassVar[bool] = True
     children_allowed: ClassVar[tuple[int, int] | None] = None
     may_claim: ClassVar[bool] = True
@@ -127,7 +129,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.arc: ArcClient | None = None
         """The client of its ARC; None without an ARC."""
         self.views = DebugViews(bus, clock)
-        """Its debug views: pictures and values that cost nothing while nobody looks."""
+        """Its debug views: pictures and values that cost nothing unless a console looks."""
         self.times_resumed = self.times_suspended = self.frames_seen = 0
         self._nodes = {node.name: node for node in self.parameters.children}
         self._children = ChildrenLoop(
@@ -247,7 +249,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 return await self._take(taken)
             case ListViews():
                 return self.views.listed()
-            case Look() as look:
+            case LookAt() as look:
                 return self.views.look(look)
             case BreakOff():
                 if asked.source != self.parameters.keeper:
@@ -434,7 +436,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     async def _wind_up(self) -> None:
         """Give the ARC back, end the children, and repeat the report until the parent notes it.
 
-        A behavior that a console ordered keeps its ARC, so that nobody lower has the robot before the operator.
+        A behavior that a console ordered keeps its ARC, so that no lower ARC has the robot before the operator.
         """
         await self._stop_acting()
         if isinstance(self._parent, KeeperReports):

@@ -1,6 +1,6 @@
-"""Debug views of a behavior: named intermediate pictures and values that cost nothing while nobody looks.
+"""Debug views of a behavior: named intermediate pictures and values that cost nothing unless a console looks.
 
-A behavior shows what it has whenever it has it. A picture's maker is called only while somebody looks at that view, at
+A behavior shows what it has whenever it has it. A picture's maker is called only while a console looks at it, at
 most once in ``SHOWN_EVERY_S``; otherwise nothing is made and nothing goes over the bus.
 """
 
@@ -14,7 +14,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.debug_views import (
     MOST_VIEWS,
     SHOWN_EVERY_S,
-    Look,
+    LookAt,
     LookedAt,
     UnknownView,
     ViewEntry,
@@ -35,7 +35,7 @@ Shown = float | bool | str
 
 
 class LookBook:
-    """Which views somebody looks at, and when each may be shown again. Pure: times are arguments.
+    """Which views consoles look at, and when each may be shown again. Pure: times are arguments.
 
     Args:
         every_s: Shortest time between two of one view.
@@ -47,7 +47,7 @@ class LookBook:
         self._again_s: dict[str, float] = {}
 
     def look(self, view: str, until_s: float) -> float:
-        """Note that somebody looks until then; return until when the view is looked at by anybody."""
+        """Note that a console looks until then; return until when any console looks at the view."""
         self._until_s[view] = max(until_s, self._until_s.get(view, until_s))
         return self._until_s[view]
 
@@ -85,7 +85,7 @@ class DebugViews:
         self._values: dict[str, Shown] = {}
 
     def picture(self, view: str, make: Callable[[], NDArray[Any]]) -> None:
-        """Show a picture, if somebody looks at the view and its last picture is old enough.
+        """Show a picture, if a console looks at the view and its last picture is old enough.
 
         Args:
             view: A legal name, the same for each picture of this view.
@@ -103,7 +103,7 @@ class DebugViews:
             self._publish(view, picture_of(view, now_s, make()))
 
     def value(self, view: str, value: Shown) -> None:
-        """Show a value; the newest is in the list of views, and published while somebody looks.
+        """Show a value; the newest is in the list of views, and published while a console looks.
 
         Args:
             view: A legal name with the value's unit, the same for each value of this view.
@@ -123,7 +123,7 @@ class DebugViews:
         entries = ((view, kind, self._values.get(view, "")) for view, kind in sorted(self._kinds.items()))
         return Views([ViewEntry(view, kind, sendable(value)) for view, kind, value in entries])
 
-    def look(self, asked: Look) -> LookedAt:
+    def look(self, asked: LookAt) -> LookedAt:
         """Show this view from now on for the time asked; of a value the newest at once.
 
         Raises:

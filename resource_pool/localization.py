@@ -1,7 +1,7 @@
 """Messages of localizers: where robots are believed to be, how surely, from what, and the plan of the floor.
 
-* anybody → localizer: ``AskPose``, ``AskHome``, ``AskFloorPlan``; localizer → everybody: ``Pose``, published under its
-  address (conversation ``poses``) when a believed position changes.
+* component → localizer: ``AskPose``, ``AskHome``, ``AskFloorPlan``; localizer → everybody: ``Pose``, published under
+  its address (conversation ``poses``) when a believed position changes.
 * a behavior that sees a landmark → everybody: ``LandmarkSighting``, published (conversation ``sightings``).
 
 Positions are in meters in the room's frame: origin in a corner of the floor, x along its width, y along its depth,

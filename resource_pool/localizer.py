@@ -6,7 +6,7 @@ and to what they count themselves, and corrects itself when a behavior sees a la
 less sure by what a robot can have done by the commands that it missed, and without the file it is sure of no robot that
 was commanded before.
 
-In mission.xml: a resource of type ``localizer``, named by behaviors as ``localizer``. Nobody claims it.
+In mission.xml: a resource of type ``localizer``, named by behaviors as ``localizer``. No ARC needs it.
 """
 
 from __future__ import annotations

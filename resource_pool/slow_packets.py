@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from backbone.rc_manager.messages import LONGEST_PACKET_S, MeasuredPackets
 
-EVERY_S = 1.0  # chosen: each longer time makes an ARC ask anew; nobody plans faster than slices end
+EVERY_S = 1.0  # chosen: each longer time makes an ARC ask anew; no plan changes faster than slices end
 STEP_S = 1e-4  # chosen: a byte on the air at 115.2 kbit/s
 ROUNDING = 1e-6  # chosen: of a step; far above that of a division, far below a measurement
 

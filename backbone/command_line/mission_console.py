@@ -149,7 +149,7 @@ class ConsoleObserver:
 
 
 def _tell_if_possible(line: str, file: IO[str]) -> None:
-    """Print the line; a mission goes on also when its disk is full or nobody reads any longer."""
+    """Print the line; a mission goes on also when its disk is full or its reader has left."""
     with contextlib.suppress(OSError):
         print(line, file=file, flush=True)
 

@@ -15,7 +15,7 @@ from backbone.naming import component_of
 _FINISHED = {"success": "succeeded", "failure": "failed"}
 
 
-class Stage(Enum):
+class LastStage(Enum):
     """What became of the last branch; it only moves downwards in this list."""
 
     WAITS = auto()  # no order to end was given
@@ -34,7 +34,7 @@ class LastBranch:
     def __init__(self, declared: LastBranchDescription | None) -> None:
         self._declared = declared
         self._began_s = 0.0
-        self.stage = Stage.WAITS
+        self.stage = LastStage.WAITS
         self.how = ""
         """How it ended, as in *succeeded after 8.3 s*; empty before its end, and without a branch."""
 
@@ -56,7 +56,7 @@ class LastBranch:
     @property
     def is_at_work(self) -> bool:
         """True from the order to end until the branch is over."""
-        return self.stage in (Stage.FREES, Stage.RUNS)
+        return self.stage in (LastStage.FREES, LastStage.RUNS)
 
     @property
     def doing(self) -> str:
@@ -72,20 +72,20 @@ class LastBranch:
             is_up: False: the mission is still coming up, so that no branch can run.
             at_once: True: the order is to do without the branch.
         """
-        if self.stage is Stage.WAITS and self._declared is not None and is_up and not at_once:
-            self.stage, self._began_s = Stage.FREES, now_s
+        if self.stage is LastStage.WAITS and self._declared is not None and is_up and not at_once:
+            self.stage, self._began_s = LastStage.FREES, now_s
             return False
         match self.stage:
-            case Stage.WAITS:
+            case LastStage.WAITS:
                 self._end("skipped, as ordered" if at_once else "skipped, because the mission was not up")
-            case Stage.FREES | Stage.RUNS:
+            case LastStage.FREES | LastStage.RUNS:
                 self._end_after("ended by a second order", now_s)
         return True
 
     def began(self, now_s: float) -> float:
         """Take in that all else is stopped and the branch starts; return the time at which it must be over."""
-        if self.stage is Stage.FREES:
-            self.stage, self._began_s = Stage.RUNS, now_s
+        if self.stage is LastStage.FREES:
+            self.stage, self._began_s = LastStage.RUNS, now_s
         return self._began_s + self.within_s
 
     def finished(self, how: str, now_s: float) -> None:
@@ -104,8 +104,8 @@ class LastBranch:
         self._end(f"{how} after {now_s - self._began_s:.1f} s")
 
     def _end(self, how: str) -> None:
-        if self.stage is not Stage.OVER:
-            self.stage = Stage.OVER
+        if self.stage is not LastStage.OVER:
+            self.stage = LastStage.OVER
             self.how = how if self.name else ""
 
 

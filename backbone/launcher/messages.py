@@ -110,7 +110,7 @@ class TreeChanged(Message, frozen=True):
     remarks: Annotated[list[Text], MANY] = []
 
 
-class ChangedMeanwhile(Refusal):
+class TreeChangedMeanwhile(Refusal):
     """The tree has changed since the operator saw it; nothing is changed."""
 
     code = "tree.changed_meanwhile"

@@ -59,7 +59,7 @@ class Branch:
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
+class EditedFile:
     """The text of the mission file after a change.
 
     Attributes:
@@ -88,7 +88,7 @@ class Changed:
         return Fault(self.branch.source, line, max(1, column), fault.message, fault.remedy)
 
 
-def changed(text: bytes, change: TreeChange) -> Changed:
+def changed(text: bytes, change: TreeChange) -> EditedFile:
     """Return the text of the mission file after a change.
 
     Raises:
@@ -102,21 +102,21 @@ def changed(text: bytes, change: TreeChange) -> Changed:
             text, at = _with_section(text) if parent == edit.outline(text).text("name") else (text, None)
             at = _path_of(edit.outline(text), parent) if at is None else at
             number = _number(edit.outline(text).at(at), place)
-            return Changed(edit.insert(text, at, branch.text, number), frozenset({branch.name}), branch)
+            return EditedFile(edit.insert(text, at, branch.text, number), frozenset({branch.name}), branch)
         case RemoveBranch(name=name):
-            return Changed(edit.remove(text, _path_of(edit.outline(text), name)))
+            return EditedFile(edit.remove(text, _path_of(edit.outline(text), name)))
         case MoveBranch(name=name, parent=parent, place=place):
             whole = edit.outline(text)
             path = _path_of(whole, name)
             at = _section_of(whole) if parent == whole.text("name") else _path_of(whole, parent)
-            return Changed(edit.move(text, path, at, _number(whole.at(at), place, without=path)))
+            return EditedFile(edit.move(text, path, at, _number(whole.at(at), place, without=path)))
         case ReplaceBranch(name=name):
             branch = _branch(change)
             path = _path_of(edit.outline(text), name)
             without = edit.remove(text, path)
-            return Changed(edit.insert(without, path[:-1], branch.text, path[-1]), frozenset({branch.name}), branch)
+            return EditedFile(edit.insert(without, path[:-1], branch.text, path[-1]), frozenset({branch.name}), branch)
         case SetInTree(name=name, parameter=parameter, value=value):
-            return Changed(_with_value(text, name, parameter, written(name, parameter, value)))
+            return EditedFile(_with_value(text, name, parameter, written(name, parameter, value)))
 
 
 def written(name: str, parameter: str, value: object) -> str:
@@ -194,7 +194,7 @@ def _column(text: bytes, node: Node) -> int:
 
 # ---------------------------------------------------------------------- what follows
 @dataclass(frozen=True, slots=True)
-class Told:
+class NewPlace:
     """A behavior that stays and has another place.
 
     Attributes:
@@ -221,7 +221,7 @@ class Consequences:
 
     ended: list[str]
     begun: list[Start]
-    told: list[Told]
+    told: list[NewPlace]
     priorities: dict[str, int]
 
 
@@ -245,7 +245,7 @@ def consequences(old: MissionDescription, new: MissionDescription, anew: Collect
         is_same = name in before and before[name].parent == node.parent and name not in anew
         stay[name] = is_same and stay[node.parent]
     told = [
-        Told(
+        NewPlace(
             node.order,
             tuple(child for child in node.children if child in anew and child in before[name].children),
             tuple(child for child in before[name].children if child not in node.children),

@@ -18,19 +18,19 @@ from backbone.errors import LinkError, OutcomeUnknown, Refusal
 from backbone.launcher.messages import (
     AddBranch,
     BranchTaken,
-    ChangedMeanwhile,
     SetInTree,
     TakeBranch,
     Tree,
     TreeChange,
     TreeChanged,
+    TreeChangedMeanwhile,
 )
 from backbone.launcher.tree_changes import (
     PRIORITY,
     RUN_TIMES,
-    Changed,
     Consequences,
-    Told,
+    EditedFile,
+    NewPlace,
     changed,
     consequences,
     orders,
@@ -130,7 +130,7 @@ class TreeKeeper:
     # ------------------------------------------------------------------ one change
     async def _change(self, change: TreeChange, user: str) -> TreeChanged:
         if change.version != self.version:
-            raise ChangedMeanwhile(
+            raise TreeChangedMeanwhile(
                 f"the tree has version {self.version}, and the change is for {change.version}", version=self.version
             )
         edited = changed(self.text, change)
@@ -151,7 +151,7 @@ class TreeKeeper:
         self._note(self.description.name, f"{user} changed the tree, which has version {self.version} now")
         return TreeChanged(self.version, remarks)
 
-    async def _checked(self, edited: Changed) -> MissionDescription:
+    async def _checked(self, edited: EditedFile) -> MissionDescription:
         """Return the mission that this text describes; check it as 'scout-backbone check' does."""
         try:
             return await asyncio.to_thread(read_mission_bytes, edited.text, self.description.source)
@@ -225,7 +225,7 @@ class TreeKeeper:
         except (LinkError, Refusal) as error:  # its next life hears of its place when it appears
             log.warning("%s: its order is not revised: %s", order.name, error)
 
-    async def _tell(self, told: Told) -> str:
+    async def _tell(self, told: NewPlace) -> str:
         """Tell a behavior that runs of its place; return what an operator should know."""
         name = told.order.name
         try:

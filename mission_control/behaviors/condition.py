@@ -187,7 +187,7 @@ class MessageCondition(Behavior[MessageConditionParameters]):
             await self.clock.sleep_s(ASK_AGAIN_S)
 
     async def _give_up(self, rc: str) -> None:
-        """Fail if nothing was read until then, so that a tree does not wait for a robot that nobody holds."""
+        """Fail if nothing was read until then, so that a tree does not wait for a robot that no ARC holds."""
         await self.clock.sleep_s(FIRST_READINGS_S)
         self.finish(BehaviorStatus.FAILURE, {"detail": f"{rc} had no readings within {FIRST_READINGS_S:g} s"})
 

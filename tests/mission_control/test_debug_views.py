@@ -26,7 +26,7 @@ from backbone.debug_views import (
     MOST_VIEWS,
     SHOWN_EVERY_S,
     ListViews,
-    Look,
+    LookAt,
     LookedAt,
     UnknownView,
     ViewEntry,
@@ -129,7 +129,7 @@ def test_without_a_looker_nothing_is_made_and_nothing_goes_over_the_bus(local_mi
                 await clock.sleep_s(0.07)
             assert bus.statistics() == before
             views.picture("other", lambda: GREY)
-            views.look(Look("other", 1.0))
+            views.look(LookAt("other", 1.0))
             views.picture("never", never)
             views.value("threshold", 13.0)
             assert bus.statistics() == before
@@ -214,7 +214,7 @@ def test_a_looker_sees_ten_pictures_a_second_until_its_lease_is_over(local_missi
             )
         await film(placer, 1.0)
         assert heard == []
-        looked = await looker.ask(BEHAVIOR, Look("picture", LOOK_FOR_S), LookedAt, within_s=1.0)
+        looked = await looker.ask(BEHAVIOR, LookAt("picture", LOOK_FOR_S), LookedAt, within_s=1.0)
         assert looked == LookedAt("picture", ViewKind.PICTURE, placer.clock.now_s() + LOOK_FOR_S)
         await film(placer, 2 * LOOK_FOR_S)
         assert {shown.view for shown in heard} == {"picture"}
@@ -223,7 +223,7 @@ def test_a_looker_sees_ten_pictures_a_second_until_its_lease_is_over(local_missi
         moments = [shown.at_s for shown in heard]
         assert all(after - before >= SHOWN_EVERY_S - 1e-9 for before, after in itertools.pairwise(moments))
         heard.clear()
-        await looker.ask(BEHAVIOR, Look("level"), LookedAt, within_s=1.0)
+        await looker.ask(BEHAVIOR, LookAt("level"), LookedAt, within_s=1.0)
         await placer.clock.sleep_s(0.01)
         [first] = heard  # the newest at once, although the behavior has seen nothing since
         assert isinstance(first, ViewValue)
@@ -236,7 +236,7 @@ def test_the_views_are_listed_with_their_newest_values_and_a_wrong_name_is_refus
     async def play(placer: FakePlacer, looker: Bus) -> None:
         assert (await looker.ask(BEHAVIOR, ListViews(), Views, within_s=1.0)).views == []
         with pytest.raises(UnknownView, match="there is: none yet"):
-            await looker.ask(BEHAVIOR, Look("level"), LookedAt, within_s=1.0)
+            await looker.ask(BEHAVIOR, LookAt("level"), LookedAt, within_s=1.0)
         await film(placer, 0.2)
         listed = await looker.ask(BEHAVIOR, ListViews(), Views, within_s=1.0)
         assert listed.views == [
@@ -244,7 +244,7 @@ def test_the_views_are_listed_with_their_newest_values_and_a_wrong_name_is_refus
             ViewEntry("picture", ViewKind.PICTURE),
         ]
         with pytest.raises(UnknownView, match=r"no view 'pictur' \(did you mean 'picture'\?\); there is: level"):
-            await looker.ask(BEHAVIOR, Look("pictur"), LookedAt, within_s=1.0)
+            await looker.ask(BEHAVIOR, LookAt("pictur"), LookedAt, within_s=1.0)
 
     scene_of(play, local_mission)
 
@@ -267,7 +267,7 @@ def test_the_behavior_of_the_guide_shows_what_the_guide_says(local_mission: Any)
         heard: list[ViewPicture] = []
         at = view_address(BEHAVIOR, "edges")
         looker.subscribe(at, Conversation.VIEWS, ViewPicture, lambda envelope: heard.append(envelope.body))
-        await looker.ask(BEHAVIOR, Look("edges"), LookedAt, within_s=1.0)
+        await looker.ask(BEHAVIOR, LookAt("edges"), LookedAt, within_s=1.0)
         await film(placer, 0.5)
         assert {(shown.width_px, shown.height_px) for shown in heard} == {(1, 2)}
 

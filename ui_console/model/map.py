@@ -68,7 +68,7 @@ class BodyView(msgspec.Struct, frozen=True):
         is_stale: True: the place is old, and the body may be elsewhere.
         age_s: Age of the place in whole seconds while it is stale; 0 while it is fresh.
         trail: Where it was, oldest first: x and y in turn.
-        sees_rad: Angle of view of its camera while its holder gets pictures; 0: nobody sees through it.
+        sees_rad: Angle of view of its camera while its holder gets pictures; 0: no ARC gets them.
         link: How its commands go over the radio, for people; empty: not known.
         does: What its holder does with it, for people: an order of any operator too; empty: nobody has it.
     """

@@ -4,7 +4,7 @@ Laws:
 
 * A robot has at most one order that goes on; a newer one, a touch of the stick and the return of the robot end it.
 * A behavior is removed only when the stick has the robot, when the behavior of a newer order has it or waits for it
-  next, or when nobody wants it any more; so a robot is never free between stick and order.
+  next, or when its operator wants it no more; so a robot is never free between stick and order.
 * Every behavior that was begun is removed, and removed once.
 * Each order has at most one final state.
 
@@ -45,7 +45,7 @@ class Rest:
 
 
 @dataclass(frozen=True, slots=True)
-class Remove:
+class EndBehavior:
     """End the behavior of this order."""
 
     number: int
@@ -59,13 +59,13 @@ class Take:
 
 
 @dataclass(frozen=True, slots=True)
-class Changed:
+class ShowOrder:
     """Show the order as it is now."""
 
     given: GivenOrder
 
 
-Instruction = Begin | Yield | Rest | Remove | Take | Changed
+Instruction = Begin | Yield | Rest | EndBehavior | Take | ShowOrder
 
 
 class OrderBook:
@@ -105,7 +105,7 @@ class OrderBook:
         self.last += 1
         before = self._finish_all(order.robot, BY_NEWER)
         self._given[self.last] = GivenOrder(order, self.last)
-        return [*before, Changed(self._given[self.last]), Begin(self.last)]
+        return [*before, ShowOrder(self._given[self.last]), Begin(self.last)]
 
     def touched(self, robot: str) -> list[Instruction]:
         """Take in that the operator wants this robot by the stick."""
@@ -196,7 +196,7 @@ class OrderBook:
     def _of(self, robot: str) -> list[GivenOrder]:
         return [one for number, one in self._given.items() if one.order.robot == robot and number not in self._removing]
 
-    def _older(self, given: GivenOrder) -> list[Remove]:
+    def _older(self, given: GivenOrder) -> list[EndBehavior]:
         return [self._remove(one.number) for one in self._of(given.order.robot) if one.number < given.number]
 
     def _after(self, given: GivenOrder, *, in_front: bool) -> list[Instruction]:
@@ -214,10 +214,10 @@ class OrderBook:
                 ]
         return told
 
-    def _remove(self, number: int) -> Remove:
+    def _remove(self, number: int) -> EndBehavior:
         self._removing.add(number)
-        return Remove(number)
+        return EndBehavior(number)
 
     def _become(self, given: GivenOrder) -> list[Instruction]:
         self._given[given.number] = given
-        return [Changed(given)]
+        return [ShowOrder(given)]

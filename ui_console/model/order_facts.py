@@ -37,7 +37,7 @@ class CannotOrder(Refusal):
 
 
 @dataclass(frozen=True, slots=True)
-class Localizer:
+class FoundLocalizer:
     """Who tells where robots are.
 
     Attributes:
@@ -49,7 +49,7 @@ class Localizer:
     words: str
 
 
-def localizer_of(components: Sequence[ComponentState]) -> Localizer:
+def localizer_of(components: Sequence[ComponentState]) -> FoundLocalizer:
     """Return the mission's localizer, else its simulated world.
 
     Args:
@@ -63,7 +63,7 @@ def localizer_of(components: Sequence[ComponentState]) -> Localizer:
         if found:
             name = component_of(found[0])
             simulated = f"positions from {name}, the simulator itself: no real room has it"
-            return Localizer(found[0], simulated if kind == SIMULATED_WORLD else f"positions from {name}")
+            return FoundLocalizer(found[0], simulated if kind == SIMULATED_WORLD else f"positions from {name}")
     raise NoLocalizer("no component of this mission tells where robots are")
 
 
@@ -105,7 +105,14 @@ def behavior_of(console: str, number: int) -> str:
 
 
 def start_of(
-    order: Order, number: int, kind: str, localizer: Localizer | None, *, console: str, priority: int, runtime_s: float
+    order: Order,
+    number: int,
+    kind: str,
+    localizer: FoundLocalizer | None,
+    *,
+    console: str,
+    priority: int,
+    runtime_s: float,
 ) -> Start:
     """Return what starts the behavior of an order.
 

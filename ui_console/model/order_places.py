@@ -8,7 +8,7 @@ from dataclasses import replace
 from resource_pool.arc_client import FloorPlan
 from ui_console.model.orders import Order, OrderKind
 
-EDGE_M = 0.3  # chosen: a place for a rover of 45 cm beside a wall
+EDGE_M = 0.3  # chosen: a place beside a wall for a robot of 45 cm
 
 
 def inside(orders: Sequence[Order], floor: FloorPlan | None) -> list[Order]:

@@ -64,7 +64,7 @@ class OrderState(StrEnum):
 
     STARTING = "starting"  # its behavior starts; until it is ready the robot stays with the stick
     RUNNING = "running"  # the robot carries it out
-    WAITING = "waiting"  # the robot is stopped, or somebody higher has it
+    WAITING = "waiting"  # the robot is stopped, or a higher ARC has it
     DONE = "done"  # its behavior has finished
     FAILED = "failed"  # its behavior cannot reach its aim, was refused, or is gone
     ENDED = "ended"  # the operator touched the stick, gave another order, or gave the robot back
@@ -106,7 +106,7 @@ class GivenOrder:
         return f"{self.order.robot}: {self.order.sentence} ({'; '.join(remarks)})"
 
 
-APART_M = 0.5  # chosen: two Scouts of 11 cm pass each other, and a rover of 45 cm has a place of its own
+APART_M = 0.5  # chosen: robots of 11 cm pass each other, and one of 45 cm has a place of its own
 
 
 def group(order: Order, robots: Sequence[str]) -> list[Order]:

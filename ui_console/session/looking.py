@@ -1,4 +1,4 @@
-"""Looks at debug views: finds the behaviors that have some, and renews the lease on the one that somebody looks at."""
+"""Looks at debug views: finds the behaviors that have some, and renews the lease on the one that is looked at."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.debug_views import (
     LOOK_AGAIN_S,
     ListViews,
-    Look,
+    LookAt,
     LookedAt,
     UnknownView,
     ViewPicture,
@@ -122,11 +122,11 @@ async def keep_looking(
     at = view_address(behavior, view)
     hearing = bus.subscribe(at, Conversation.VIEWS, kinds, heard, latest=True)  # type: ignore[arg-type]
     try:
-        await bus.ask(behavior, Look(view), LookedAt, within_s=REPLY_TIME_S)
+        await bus.ask(behavior, LookAt(view), LookedAt, within_s=REPLY_TIME_S)
         while True:
             await clock.sleep_s(LOOK_AGAIN_S * clock.rate)
             try:
-                await bus.ask(behavior, Look(view), LookedAt, within_s=REPLY_TIME_S)
+                await bus.ask(behavior, LookAt(view), LookedAt, within_s=REPLY_TIME_S)
             except (UnknownView, LinkError) as error:
                 trouble(error)
     finally:

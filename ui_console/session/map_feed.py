@@ -1,7 +1,7 @@
 """The feed of a map: where robots are, the plan of the floor, and what cameras they have.
 
 Localizers publish a place when it changes; one that is silent for long is asked. In a mission without a localizer a
-simulated world, which knows every place, is asked a few times a second. It asks nothing while nobody looks at the map.
+simulated world, which knows every place, is asked a few times a second. It asks nothing while no page shows the map.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class MapFeed:
         self._bus.subscribe("*/*", Conversation.POSES, Pose, self._published)
 
     def watch(self, is_watched: bool) -> None:
-        """Note whether anybody looks at the map."""
+        """Note whether a page shows the map."""
         if is_watched:
             self._is_watched.set()
         else:
@@ -70,7 +70,7 @@ class MapFeed:
                 self._there.pop(at, None)
 
     async def run(self) -> None:
-        """Ask for what is not published, while somebody looks; until cancelled."""
+        """Ask for what is not published, while a page shows the map; until cancelled."""
         while True:
             await self._is_watched.wait()
             await self._look()

@@ -43,7 +43,7 @@ class Observer(Component[P_co], Generic[P_co]):
         user: The person at it, for the record; empty: the console's name.
         answers: The questions to its operator; None: new ones.
         answers_of: Returns the questions to this person, None for a person who left; None: one person sits here.
-        has_map: Also show where bodies are, and the plan of the floor, while ``map.watch`` says that somebody looks.
+        has_map: Also show where bodies are, and the plan of the floor, while ``map.watch`` says that a page shows it.
     """
 
     accepts: ClassVar[Accepts | None] = AskLift

@@ -31,7 +31,7 @@ from backbone.scheduling.views import Schedule
 from backbone.waiting import end_tasks
 from backbone.wire import Message
 from ui_console.model.events import OrderChanged
-from ui_console.model.order_book import Begin, Changed, Instruction, OrderBook, Remove, Rest, Take, Yield
+from ui_console.model.order_book import Begin, EndBehavior, Instruction, OrderBook, Rest, ShowOrder, Take, Yield
 from ui_console.model.order_facts import NEEDS_PLACES, behavior_of, kind_for, localizer_of, start_of
 from ui_console.model.orders import GivenOrder, Order, OrderState
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
@@ -116,7 +116,7 @@ class OrderKeeper:
         """End the order of this robot; return, once its behavior has let the robot go, whether it had one."""
         todo = self._book.given_back(robot, why)
         self._do(todo)
-        ends = [self._removals[step.number] for step in todo if isinstance(step, Remove)]
+        ends = [self._removals[step.number] for step in todo if isinstance(step, EndBehavior)]
         await asyncio.gather(*ends, return_exceptions=True)
         return bool(todo)
 
@@ -148,7 +148,7 @@ class OrderKeeper:
         """End all orders, because the console ends; those that are not ended in time end themselves."""
         for robot in list(self._book.orders):
             for step in self._book.given_back(robot, "the console ends"):
-                if isinstance(step, Changed):
+                if isinstance(step, ShowOrder):
                     self._show(step.given)
         ends = [self._end(number) for number in self._book.numbers]
         try:
@@ -162,7 +162,7 @@ class OrderKeeper:
         start_task = self._console.start_task
         for step in steps:
             match step:
-                case Changed(given):
+                case ShowOrder(given):
                     self._show(given)
                 case Begin(number):
                     self._carrying[number] = start_task(self._carry(number), f"order {number}")
@@ -170,7 +170,7 @@ class OrderKeeper:
                     start_task(self._pass_on(order), f"robot for order {number}")
                 case Rest(number):
                     start_task(self._rest(number), f"rest of order {number}")
-                case Remove(number):
+                case EndBehavior(number):
                     self._removals[number] = start_task(self._remove(number), f"end of order {number}")
                 case Take(robot):
                     self._take(robot)

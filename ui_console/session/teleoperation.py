@@ -267,7 +267,7 @@ class Teleoperation(OrderVerbs):
             self._take()
 
     async def _hand_to_order(self, robot: str, order: str) -> None:
-        """Give the robot from the stick to its order, which waits for it: nobody lower gets it in between."""
+        """Give the robot from the stick to its order, which waits for it: no lower ARC gets it in between."""
         if robot == self._robot and self._is_asking:
             self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
             await self._give_back_stick(f"ordered: {order}")

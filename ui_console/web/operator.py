@@ -29,7 +29,7 @@ from ui_console.web.found_log import FoundLog
 from ui_console.web.login import Welcome
 from ui_console.web.ordering import Ordering
 from ui_console.web.outbox import Outbox
-from ui_console.web.sights import Sight
+from ui_console.web.sights import PageSight
 
 log = logging.getLogger(__name__)
 
@@ -86,7 +86,7 @@ class Operator:
         self.news = asyncio.Event()
         """Set when there is something to send."""
         self.is_there = True
-        self.sight = Sight()
+        self.sight = PageSight()
         """The debug views that this page shows."""
         self.model = ConsoleModel(welcome.user, welcome.user, services.team)
         self.answers = ConsentAnswers(welcome.user, services.clock, self.show, services.observer.acted)
@@ -121,7 +121,7 @@ class Operator:
                 self.outbox.watch(frozenset(robots))  # also unknown ones: a page may be older than the server
                 self._services.watching_changed()
             case protocol.LookInto(behavior, view):
-                self._look(Sight(behavior, view))
+                self._look(PageSight(behavior, view))
             case protocol.Acknowledge(key):
                 self._acknowledge(key)
             case protocol.MoreLog(number, first):
@@ -251,7 +251,7 @@ class Operator:
             before_s = self._latency_s.get(robot, took_s)
             self._latency_s[robot] = before_s + LATENCY_STEP * (took_s - before_s)
 
-    def _look(self, sight: Sight) -> None:
+    def _look(self, sight: PageSight) -> None:
         if sight.behavior != self.sight.behavior:
             self.show_views(SeenViews(sight.behavior))
         self.sight = sight

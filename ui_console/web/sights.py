@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 LIST_EVERY_S = 1.0  # chosen: values are read, not followed; seconds of the machine
 
 
-class Sight(NamedTuple):
+class PageSight(NamedTuple):
     """What a page looks at.
 
     Attributes:
@@ -42,7 +42,7 @@ class Sight(NamedTuple):
 class Looker(Protocol):
     """A browser that looks at debug views."""
 
-    sight: Sight
+    sight: PageSight
 
     def show_views(self, seen: SeenViews) -> None:
         """Show the list of a behavior."""
@@ -69,18 +69,18 @@ class Sights:
         start_task: Callable[[Coroutine[object, None, None], str], asyncio.Task[None]],
     ) -> None:
         self._bus, self._clock, self._clients, self._start_task = bus, clock, clients, start_task
-        self._looks: dict[Sight, asyncio.Task[None]] = {}
+        self._looks: dict[PageSight, asyncio.Task[None]] = {}
         self._numbers = itertools.count(1)
 
     @property
-    def looked_at(self) -> frozenset[Sight]:
-        """Every list and picture that somebody looks at."""
+    def looked_at(self) -> frozenset[PageSight]:
+        """Every list and picture that a page shows."""
         return frozenset(self._looks)
 
     def changed(self) -> None:
         """Begin and end looks, because a client came, went, or looks at something else."""
         sights = [client.sight for client in self._clients() if client.sight.behavior]
-        wanted = {Sight(one.behavior) for one in sights} | {one for one in sights if one.view}
+        wanted = {PageSight(one.behavior) for one in sights} | {one for one in sights if one.view}
         for sight in self._looks.keys() - wanted:
             self._looks.pop(sight).cancel()
         for sight in wanted - self._looks.keys():
@@ -101,7 +101,7 @@ class Sights:
                     client.show_views(printable_all(seen))
             await self._clock.sleep_s(LIST_EVERY_S * self._clock.rate)
 
-    async def _look(self, sight: Sight) -> None:
+    async def _look(self, sight: PageSight) -> None:
         def saw(shown: ViewPicture | ViewValue) -> None:
             if isinstance(shown, ViewPicture) and shown.pixels:
                 self._show(sight, shown)
@@ -114,7 +114,7 @@ class Sights:
                 log.info("%s is not seen: %s", sight.stream, error)
             await self._clock.sleep_s(LIST_EVERY_S * self._clock.rate)
 
-    def _show(self, sight: Sight, shown: ViewPicture) -> None:
+    def _show(self, sight: PageSight, shown: ViewPicture) -> None:
         number = next(self._numbers)
         packed = packet(sight.stream, number, shown.at_s, jpeg(pixels_of(shown)))
         for client in self._clients():

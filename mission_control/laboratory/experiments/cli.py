@@ -42,7 +42,7 @@ class TargetKind(StrEnum):
     PERSON = "person"
 
 
-class Order(StrEnum):
+class TurnOrder(StrEnum):
     """Order of the turns of watchers and consoles."""
 
     ACTIVE_FIRST = "active-first"
@@ -72,7 +72,7 @@ def surveillance(
     target: Annotated[TargetKind | None, typer.Option("--target", help="What passes.")] = None,
     speed: Annotated[list[float] | None, typer.Option("--speed", help="Of the target, m/s; repeatable.")] = None,
     slice_s: Annotated[float | None, typer.Option("--slice", help="Minimum run time of all, seconds.")] = None,
-    order: Annotated[Order | None, typer.Option("--order", help="Whose turns come first.")] = None,
+    order: Annotated[TurnOrder | None, typer.Option("--order", help="Whose turns come first.")] = None,
     driven: Annotated[float | None, typer.Option("--driven", help="Share of the time consoles are driven.")] = None,
     noise: Annotated[float | None, typer.Option("--noise", help="Of the pictures: 0 none, 1 as in the papers.")] = None,
     frames: Annotated[int | None, typer.Option("--frames", help="Certain pictures a watcher wants.")] = None,

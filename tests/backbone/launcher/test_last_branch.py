@@ -14,7 +14,7 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import AskStory, LogLevel, Story, StoryEvent
 from backbone.keys import Conversation
-from backbone.launcher.last_branch import LastBranch, Stage, how_it_finished
+from backbone.launcher.last_branch import LastBranch, LastStage, how_it_finished
 from backbone.launcher.last_run import run_last
 from backbone.mission.behavior_orders import last_order
 from backbone.mission.model import BehaviorDescription, LastBranchDescription, MissionDescription
@@ -76,7 +76,7 @@ def test_it_runs_at_most_once_and_its_first_end_stands(steps: list[str], is_up: 
         match step:
             case "order" | "now":
                 goes_down = last.ordered(now_s, is_up=is_up, at_once=step == "now")
-                assert goes_down is (last.stage is Stage.OVER)
+                assert goes_down is (last.stage is LastStage.OVER)
                 runs += not goes_down
             case "began":
                 assert last.began(now_s) <= now_s + HOME.within_s
@@ -85,7 +85,7 @@ def test_it_runs_at_most_once_and_its_first_end_stands(steps: list[str], is_up: 
             case _:
                 last.not_started("no host")
         assert last.stage.value >= was.value
-        assert bool(last.told) is (last.stage is Stage.OVER)
+        assert bool(last.told) is (last.stage is LastStage.OVER)
         assert told in ("", last.told)
         told = last.told
     assert runs <= (1 if is_up else 0)

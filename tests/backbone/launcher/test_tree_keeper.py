@@ -18,12 +18,12 @@ from backbone.creator.messages import EndedBy
 from backbone.launcher.messages import (
     AddBranch,
     BranchTaken,
-    ChangedMeanwhile,
     MoveBranch,
     RemoveBranch,
     ReplaceBranch,
     SetInTree,
     TakeBranch,
+    TreeChangedMeanwhile,
     TreeInvalid,
 )
 from backbone.launcher.tree_keeper import ENDS_WITHIN_S, TreeKeeper
@@ -179,7 +179,7 @@ def test_of_two_changes_of_one_version_the_second_is_refused(scene: Play) -> Non
         both = [one.keeper.change(RemoveBranch(0, name), USER) for name in ("noon", "morning")]
         first, second = await asyncio.gather(*both, return_exceptions=True)
         assert first.version == one.keeper.version == 1
-        assert isinstance(second, ChangedMeanwhile)
+        assert isinstance(second, TreeChangedMeanwhile)
         assert b"morning" in one.keeper.text
 
     scene(body)

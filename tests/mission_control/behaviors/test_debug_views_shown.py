@@ -13,7 +13,7 @@ from fake_resource_pool import FakePlacer
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.debug_views import (
     ListViews,
-    Look,
+    LookAt,
     LookedAt,
     ViewKind,
     ViewPicture,
@@ -87,7 +87,7 @@ def test_a_behavior_shows_what_the_reference_names(local_mission: Any, name: str
         for entry in listed:
             at = view_address("mission_control/seer", entry.view)
             looker.subscribe(at, Conversation.VIEWS, ViewPicture | ViewValue, note)
-            looked = await looker.ask("mission_control/seer", Look(entry.view), LookedAt, within_s=1.0)
+            looked = await looker.ask("mission_control/seer", LookAt(entry.view), LookedAt, within_s=1.0)
             assert looked.kind is entry.kind
         assert {entry.view for entry in listed if entry.kind is ViewKind.PICTURE} & (IN_COLOR | SIZES.keys())
 

@@ -10,7 +10,7 @@ from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.naming import Subsystem
 from ui_console.model.arc_kinds import NoArcKind
-from ui_console.model.order_facts import CannotOrder, Localizer, NoLocalizer, kind_for, localizer_of, start_of
+from ui_console.model.order_facts import CannotOrder, FoundLocalizer, NoLocalizer, kind_for, localizer_of, start_of
 from ui_console.model.orders import Order, OrderKind
 
 POOL, MISSION_CONTROL = Subsystem.RESOURCE_POOL, Subsystem.MISSION_CONTROL
@@ -42,7 +42,7 @@ TYPES = [
 
 def test_the_missions_localizer_goes_before_its_simulated_world_which_is_called_by_its_name() -> None:
     world, tracker = there("world", "simulated_world"), there("tracker", "localizer")
-    assert localizer_of([world, tracker]) == Localizer("resource_pool/tracker", "positions from tracker")
+    assert localizer_of([world, tracker]) == FoundLocalizer("resource_pool/tracker", "positions from tracker")
     assert "simulator" in localizer_of([world]).words
 
 
@@ -80,7 +80,7 @@ def test_a_wrong_name_and_a_mission_without_the_behavior_are_refused() -> None:
 
 
 def test_the_behavior_is_below_its_console_and_wishes_exactly_its_robot() -> None:
-    order, localizer = Order(OrderKind.GO_TO, "scout1", 2.0, 1.5), Localizer("resource_pool/tracker", "")
+    order, localizer = Order(OrderKind.GO_TO, "scout1", 2.0, 1.5), FoundLocalizer("resource_pool/tracker", "")
     start = start_of(order, 3, "drive", localizer, console=CONSOLE, priority=100, runtime_s=5.0)
     assert (start.type, start.name) == ("go_to", "console-7-order-3")
     assert start.parameters == {
@@ -96,7 +96,7 @@ def test_the_behavior_is_below_its_console_and_wishes_exactly_its_robot() -> Non
 
 def test_each_kind_of_order_has_the_parameters_of_its_behavior_and_no_others() -> None:
     own = {"path", "arc", "children", "keeper"}
-    localizer = Localizer("resource_pool/tracker", "")
+    localizer = FoundLocalizer("resource_pool/tracker", "")
     for kind, further in ((OrderKind.RETURN, {"localizer"}), (OrderKind.FOLLOW, {"localizer", "target"})):
         order = Order(kind, "scout1", target="anna")
         start = start_of(order, 1, "drive", localizer, console=CONSOLE, priority=100, runtime_s=5.0)

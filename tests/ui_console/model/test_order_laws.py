@@ -11,7 +11,7 @@ from examples import share
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from ui_console.model.order_book import Begin, Changed, Instruction, OrderBook, Remove, Rest, Take, Yield
+from ui_console.model.order_book import Begin, EndBehavior, Instruction, OrderBook, Rest, ShowOrder, Take, Yield
 from ui_console.model.orders import Order, OrderKind, OrderState, group
 
 ROBOTS = ("scout1", "scout2")
@@ -51,7 +51,7 @@ class Operated(RuleBasedStateMachine):
                 case Begin(number):
                     self.begun[number] += 1
                     self.starting.add(number)
-                case Changed(given):
+                case ShowOrder(given):
                     self.robot_of[given.number] = given.order.robot
                     self.finals[given.number] += given.state.is_final
                     if given.state is OrderState.DONE and given.order.then_release:
@@ -67,7 +67,7 @@ class Operated(RuleBasedStateMachine):
                     if robot == self.front:
                         self.has_stick = True
                         self.wanted.add(robot)
-                case Remove(number):
+                case EndBehavior(number):
                     self.removed[number] += 1
                     self.removing.add(number)
         self.tell()
@@ -78,7 +78,7 @@ class Operated(RuleBasedStateMachine):
             holder = self.holder(robot)
             if holder == STICK:
                 for step in self.book.taken(robot):
-                    assert isinstance(step, Remove)
+                    assert isinstance(step, EndBehavior)
                     self.do([step])
             elif isinstance(holder, int):
                 if holder not in self.finished:
@@ -223,7 +223,7 @@ def test_a_touch_lets_the_robot_rest_before_the_stick_asks_for_it() -> None:
     book.give(Order(OrderKind.RETURN, "scout1"))
     book.queued(1)
     book.runs(1)
-    assert [type(step) for step in book.touched("scout1")] == [Rest, Changed, Take]
+    assert [type(step) for step in book.touched("scout1")] == [Rest, ShowOrder, Take]
     assert book.touched("scout2") == []
 
 
@@ -232,7 +232,7 @@ def test_a_touch_before_the_behavior_is_there_leaves_the_stick_its_robot() -> No
     book.give(Order(OrderKind.RETURN, "scout1"))
     book.touched("scout1")
     assert book.queued(1) == []
-    assert book.taken("scout1") == [Remove(1)]
+    assert book.taken("scout1") == [EndBehavior(1)]
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

@@ -9,7 +9,7 @@ from shown_views import BEHAVIOR, shower_at
 from web_stage import LOW, Browser, Stage
 
 from ui_console.web.pictures import jpeg
-from ui_console.web.sights import Sight
+from ui_console.web.sights import PageSight
 
 ROWS = [
     {"view": "red", "is_picture": True, "text": ""},
@@ -33,13 +33,13 @@ async def test_two_browsers_that_look_at_one_view_cost_one_look_and_the_end_of_b
                 await one.say(do="look", behavior=BEHAVIOR, view="red")
             await anna.wait(lambda: has_seen(anna, "red"), "pictures")
             await ben.wait(lambda: has_seen(ben, "red"), "pictures")
-            assert stage.hub.sights.looked_at == {Sight(BEHAVIOR), Sight(BEHAVIOR, "red")}
+            assert stage.hub.sights.looked_at == {PageSight(BEHAVIOR), PageSight(BEHAVIOR, "red")}
             assert set(shower.made) == {"red"}
             assert abs(shower.made["red"] - max(anna.pictures[f"{BEHAVIOR}/red"])) <= 1, "looked at once"
         await stage.placer.wait(lambda: len(stage.hub.clients) == 1)
         await anna.say(do="look", behavior=BEHAVIOR, view="white")
         await anna.wait(lambda: has_seen(anna, "white"), "the other view")
-        assert stage.hub.sights.looked_at == {Sight(BEHAVIOR), Sight(BEHAVIOR, "white")}
+        assert stage.hub.sights.looked_at == {PageSight(BEHAVIOR), PageSight(BEHAVIOR, "white")}
         assert all(numbers == sorted(set(numbers)) for numbers in anna.pictures.values())
         assert anna.view["drawn"] == {}, "latencies are those of robots"
         await anna.say(do="look")
