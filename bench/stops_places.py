@@ -83,6 +83,8 @@ WRITING = (
 DRIVING = (
     Place("picture alone", "action_bare", "v", close="v"),
     Place("dialog of commands", "action_command", "o", "which command", "Escape", needs="held"),
+    Place("dialog of orders", "action_order", "O", "to do by itself", "Escape"),
+    Place("field of an order", "action_order", "O Enter", "go to a place", "Escape"),
     Place("dialog of robots", "action_pick", "p Up", "which robot", "Escape", meant=OTHERS[1]),
     Place("field of a reason", "action_ask_consent_because", "M", "may I have it", "Escape"),
 )

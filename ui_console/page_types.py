@@ -31,7 +31,6 @@ from ui_console.design.views import (
 from ui_console.model import views
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.map import BodyView, FloorView
-from ui_console.model.order_views import OrderView
 from ui_console.model.timeline import TimelineView
 from ui_console.web.login import BeatRequest, Hello
 from ui_console.web.protocol import Intent
@@ -92,7 +91,6 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     log: list[LoggedEvent]
     floor: FloorView | None
     bodies: list[BodyView]
-    orders: list[OrderView]
     now_s: float
     beat: int
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
@@ -17,6 +18,7 @@ from backbone.moments import Now
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import GiveWish, MoveWish
 from ui_console.model.events import ConsoleEvent
+from ui_console.model.orders import Order
 from ui_console.session.verbs import Session
 
 
@@ -72,6 +74,9 @@ class WrittenSession(Session):
 
     async def switch(self, robot: str) -> None:
         self.wanted.append(("switch", robot))
+
+    def order_group(self, orders: Sequence[Order]) -> None:
+        self.wanted.append(("order", list(orders)))
 
     def touch(self) -> None:
         self.touched += 1

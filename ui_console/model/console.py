@@ -24,6 +24,7 @@ from ui_console.model.applied import command_line
 from ui_console.model.arc_abilities import SLOW, ArcAbilities, Reach
 from ui_console.model.consent import Settled, Sought, Topic
 from ui_console.model.lifting import question_line
+from ui_console.model.order_board import OrderBoard
 from ui_console.model.team import TeamModel
 
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
@@ -65,6 +66,8 @@ class ConsoleModel:
         self.applied: events.CommandApplied | None = None
         self.abilities: ArcAbilities | None = None
         """What the operator can do with the ARC that is asked for or held; None: not known."""
+        self.orders = OrderBoard()
+        """The operator's orders to robots."""
         self.sees = sees
         """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
         self._address = f"{Subsystem.UI_CONSOLE}/{name}"
@@ -179,7 +182,13 @@ class ConsoleModel:
             lost=self._lost_view(now_s),
             link_down_s=link_down_s,
             moment=self.moment,
+            orders=self.orders.views(now_s),
         )
+
+    @property
+    def mine(self) -> str:
+        """The robot that the operator has by the stick or by an order, of several the one at the stick; empty: none."""
+        return self.robot if self.held is not None or self.orders.of(self.robot) is not None else ""
 
     def other_screens(self) -> list[str]:
         """Return one line for each other screen of this console's person: its host and its activity."""
@@ -258,6 +267,8 @@ class ConsoleModel:
             slice_end = _slice_end(self.held.until_s, now_s)
             return f"you hold {self.robot or 'no robot'}{slice_end}"
         if self.asked is None:
+            if (given := self.orders.of(self.robot)) is not None:
+                return given.line
             if self._refused:
                 return f"you hold no robot: {self._refused}"
             there = "; ".join(self.other_screens())
@@ -287,6 +298,10 @@ class ConsoleModel:
                 self._must_let_go = is_needed
             case events.MomentBegan():
                 self.moment += 1
+            case events.OrderChanged():
+                self.orders.take(event)
+            case events.TurnedTo(robot=robot):
+                self.robot = robot
             case events.Asked(robot=robot):
                 self._asked_whom = self._went = None
                 self._refused = ""

@@ -15,6 +15,7 @@ from typing import Literal
 
 from ui_console.model.arc_abilities import Reach
 from ui_console.model.grip import ControlGrip
+from ui_console.model.orders import Order
 
 FIRST_HOLD_S = 0.5  # chosen: bridges the pause of usual keyboards before they repeat; a press moves 0.5 s at most
 KEYS_LET_GO_S = 0.7  # chosen: a longer pause than keyboards make before they repeat (X: 0.66 s), so a hand let go
@@ -84,9 +85,22 @@ class StopAll:
     reason: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class OrderWish:
+    """Tell a robot to do something by itself.
+
+    Attributes:
+        order: The order; without a robot it is for the one at the stick.
+        until_done: What follows waits until the order is over, and the robot is in hand again.
+    """
+
+    order: Order
+    until_done: bool = False
+
+
 Motion = MoveWish | DriveWish
 Command = Motion | HaltWish | GiveWish
-Wish = Command | GiveBack | StopRobot | StopAll
+Wish = Command | GiveBack | StopRobot | StopAll | OrderWish
 
 Direction = Literal["forward", "backward", "left", "right"]
 DIRECTIONS: dict[Direction, tuple[float, float]] = {

@@ -74,7 +74,8 @@ class OrderBook:
     def __init__(self) -> None:
         self._given: dict[int, GivenOrder] = {}  # those whose behavior is there, or is being started
         self._removing: set[int] = set()
-        self._last = 0
+        self.last = 0
+        """Number of the newest order; 0: none was given."""
 
     # ------------------------------------------------------------------ what is
     @property
@@ -101,10 +102,10 @@ class OrderBook:
     # ------------------------------------------------------------------ events of the operator
     def give(self, order: Order) -> list[Instruction]:
         """Take in a new order: the present one of its robot ends, and keeps the robot until the new one has it."""
-        self._last += 1
+        self.last += 1
         before = self._finish_all(order.robot, BY_NEWER)
-        self._given[self._last] = GivenOrder(order, self._last)
-        return [*before, Changed(self._given[self._last]), Begin(self._last)]
+        self._given[self.last] = GivenOrder(order, self.last)
+        return [*before, Changed(self._given[self.last]), Begin(self.last)]
 
     def touched(self, robot: str) -> list[Instruction]:
         """Take in that the operator wants this robot by the stick."""

@@ -70,9 +70,11 @@ def kind_for(order: Order, types: Sequence[ComponentType], resources: Collection
     """Return the kind of ARC that the order's behavior claims: one with pictures to watch, else one that drives.
 
     Raises:
-        CannotOrder: The robot cannot, or the mission knows no such behavior.
+        CannotOrder: No robot is named, it cannot, or the mission knows no such behavior.
         NoArcKind: No robot has this name.
     """
+    if not order.robot:
+        raise CannotOrder("no robot is meant", remedy="Name the robot, or take one first.")
     names = [one.name for one in types]
     if order.kind not in names:
         raise CannotOrder(f"this mission has no behavior {order.kind}{did_you_mean(order.kind, names)}")

@@ -26,7 +26,7 @@ class Order:
     """One order for one robot.
 
     Attributes:
-        robot: Name of the robot.
+        robot: Name of the robot; empty: the one at the operator's stick.
         x_m: Of the place to go to, in the room's frame; ``GO_TO`` only.
         y_m: Same.
         target: Name of the body to follow; ``FOLLOW`` only.

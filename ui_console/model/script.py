@@ -3,9 +3,10 @@
 ``{"at_s": 0.5, "forward_m_s": 0.1, "turn_rad_s": 1}`` moves until the next line, and so does ``{"at_s": 0.7,
 "left_rad_s": 4, "right_rad_s": 4}`` by two wheels. ``{"at_s": 1, "halt": true}`` stops, ``{"at_s": 2, "give": "shine",
 "values": {"brightness": 0.5}, "role": ""}`` gives any command of the ARC, ``"jump": true`` is short for one.
-``{"at_s": 3, "release": true}`` gives the robot back; the end of the script releases too. ``{"stop_robot": "scout2",
-"reason": "a child"}`` and ``{"stop_all": true}`` are emergency stops; without ``at_s`` they count as soon as they are
-read from a pipe, also before the grant.
+``{"at_s": 3, "order": "go_to", "x_m": 2, "y_m": 1, "until_done": true}`` tells the robot to do something by itself;
+with ``until_done`` the next line waits until the order is over. ``{"at_s": 3, "release": true}`` gives the robot back;
+the end of the script releases too. ``{"stop_robot": "scout2", "reason": "a child"}`` and ``{"stop_all": true}`` are
+emergency stops; without ``at_s`` they count as soon as they are read from a pipe, also before the grant.
 
 Rules of this file: no bus, no clock, no files. Times are mission seconds since the grant.
 """
@@ -28,10 +29,12 @@ from ui_console.model.driving import (
     HaltWish,
     Motion,
     MoveWish,
+    OrderWish,
     StopAll,
     StopRobot,
     Wish,
 )
+from ui_console.model.orders import Order, OrderKind
 
 
 class WrongScript(Refusal):
@@ -41,8 +44,12 @@ class WrongScript(Refusal):
     remedy = (
         'Write one JSON object a line: {"at_s": 0.5, "forward_m_s": 0.1, "turn_rad_s": 1}, or with "left_rad_s" and '
         '"right_rad_s", or with "halt", "jump", "release" or "stop_all": true, or "give": COMMAND with its "values" '
-        'and "role", or "stop_robot": NAME; at_s never decreases.'
+        'and "role", or "order": KIND with "x_m", "y_m", "target", "robot" and "until_done", or "stop_robot": NAME; '
+        "at_s never decreases."
     )
+
+
+NO_ORDER = [None, None, "", "", False]
 
 
 class _Line(msgspec.Struct, forbid_unknown_fields=True):
@@ -56,6 +63,12 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True):
     give: str = ""
     values: dict[str, int | float | bool | str] = {}
     role: str = ""
+    order: OrderKind | None = None
+    x_m: float | None = None
+    y_m: float | None = None
+    target: str = ""
+    robot: str = ""
+    until_done: bool = False
     release: bool = False
     stop_robot: str = ""
     stop_all: bool = False
@@ -110,11 +123,15 @@ class ScriptReader:
         moves = (line.forward_m_s, line.turn_rad_s) != (None, None)
         drives = (line.left_rad_s, line.right_rad_s) != (None, None)
         wished = [moves, drives, line.halt, line.jump, bool(line.give), line.release, bool(line.stop_robot)]
-        if [*wished, line.stop_all].count(True) != 1:
-            can = "forward_m_s and turn_rad_s, both wheel speeds, halt, jump, give, release, stop_robot, stop_all"
+        if [*wished, line.stop_all, line.order is not None].count(True) != 1:
+            can = (
+                "forward_m_s and turn_rad_s, both wheel speeds, halt, jump, give, order, release, stop_robot, stop_all"
+            )
             raise self._wrong(f"exactly one of: {can}")
         if (line.values or line.role) and not line.give:
             raise self._wrong("values and role belong to a command by give")
+        if line.order is not None or [line.x_m, line.y_m, line.target, line.robot, line.until_done] != NO_ORDER:
+            return self._order(line)
         if line.stop_robot:
             return StopRobot(line.stop_robot, line.reason)
         if line.stop_all:
@@ -126,6 +143,18 @@ class ScriptReader:
         if line.release:
             return GiveBack()
         return self._motion(line)
+
+    def _order(self, line: _Line) -> OrderWish:
+        if line.order is None:
+            raise self._wrong("x_m, y_m, target, robot and until_done belong to an order")
+        goes, follows = line.order is OrderKind.GO_TO, line.order is OrderKind.FOLLOW
+        if (line.x_m is None or line.y_m is None) if goes else (line.x_m, line.y_m) != (None, None):
+            raise self._wrong("x_m and y_m belong to go_to, both of them")
+        if bool(line.target) is not follows:
+            raise self._wrong("a target belongs to follow")
+        x_m, y_m = line.x_m or 0.0, line.y_m or 0.0
+        self._require_finite(x_m, y_m, "place")
+        return OrderWish(Order(line.order, line.robot, x_m, y_m, line.target), line.until_done)
 
     def _motion(self, line: _Line) -> Motion:
         if (line.forward_m_s, line.turn_rad_s) != (None, None):
@@ -164,7 +193,8 @@ class ScriptPlayer:
 
     Laws: no command before its time; a motion is repeated until the next line, as commands end by
     themselves at the robot; nothing after ``GiveBack``, which comes exactly once; after ``require_let_go`` no command
-    that moves the robot before a halt: in a script this line stands for letting go of a control.
+    that moves the robot before a halt: in a script this line stands for letting go of a control; no command between an
+    order that the script waits for and ``order_over``.
 
     Args:
         steps: The whole script; None: they are added.
@@ -177,13 +207,22 @@ class ScriptPlayer:
         self._ended = steps is not None
         self._drive: Motion | None = None
         self._next_s = 0.0
-        self._over = self.must_let_go = False
+        self._over = self.must_let_go = self._waits = False
         self.held_back = 0
         """How many lines were left out because no halt came before them."""
 
     def require_let_go(self) -> None:
         """Ignore commands that move the robot until a line halts."""
         self._drive, self.must_let_go = None, True
+
+    def order_over(self) -> None:
+        """Go on: the order that the script waits for is over."""
+        self._waits = False
+
+    @property
+    def waits(self) -> bool:
+        """True while the script waits for the end of an order."""
+        return self._waits
 
     @property
     def is_over(self) -> bool:
@@ -205,18 +244,19 @@ class ScriptPlayer:
             since_grant_s: Mission seconds since the grant.
         """
         wishes: list[Wish] = []
-        while self._steps and self._steps[0].at_s <= since_grant_s and not self._over:
+        while self._steps and self._steps[0].at_s <= since_grant_s and not (self._over or self._waits):
             wish = self._steps.popleft().wish
             self.must_let_go = self.must_let_go and not isinstance(wish, HaltWish)
             if self.must_let_go and self._is_motion(wish):
                 self.held_back += 1
                 continue
             self._over = isinstance(wish, GiveBack)
-            if isinstance(wish, Motion | HaltWish | GiveBack):
+            self._waits = isinstance(wish, OrderWish) and wish.until_done
+            if isinstance(wish, Motion | HaltWish | GiveBack | OrderWish):
                 self._drive = wish if isinstance(wish, Motion) else None
             self._next_s = since_grant_s + REPEAT_EVERY_S
             wishes.append(wish)
-        if self._ended and not self._steps and not self._over:
+        if self._ended and not self._steps and not (self._over or self._waits):
             self._over = True
             wishes.append(GiveBack())
         if not wishes and self._drive is not None and since_grant_s >= self._next_s:
@@ -225,12 +265,12 @@ class ScriptPlayer:
         return wishes
 
     def _is_motion(self, wish: Wish) -> bool:
-        return isinstance(wish, Motion) or (isinstance(wish, GiveWish) and self._moves(wish.word))
+        return isinstance(wish, Motion | OrderWish) or (isinstance(wish, GiveWish) and self._moves(wish.word))
 
     @property
     def next_s(self) -> float | None:
         """Seconds since the grant at which the next command is due; None: not before another step arrives."""
-        if self._over:
+        if self._over or self._waits:
             return None
         times = [self._steps[0].at_s] if self._steps else [0.0] if self._ended else []
         if self._drive is not None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TypeVar, assert_never
 
 from backbone.addresses import COMPONENT_DATABASE, DEPENDENCY_DATABASE, NAMESERVER, PLACER, RC_MANAGER
@@ -33,7 +34,7 @@ from ui_console.model.events import OrderChanged
 from ui_console.model.order_book import Begin, Changed, Instruction, OrderBook, Remove, Rest, Take, Yield
 from ui_console.model.order_facts import NEEDS_PLACES, behavior_of, kind_for, localizer_of, start_of
 from ui_console.model.orders import GivenOrder, Order, OrderState
-from ui_console.session.claim import TeleoperationParameters
+from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.observer import Observer
 
 Reply = TypeVar("Reply", bound=Message)
@@ -87,11 +88,14 @@ class OrderKeeper:
         """Return whether an order of this robot goes on."""
         return self._book.goes_on(robot)
 
-    def give(self, orders: Sequence[Order]) -> None:
-        """Give these orders, all at once; each is shown with its outcome."""
-        for order in orders:
-            self._console.acted(OperatorAction.ORDER, order.robot, order.sentence)
-            self._do(self._book.give(order))
+    def give(self, orders: Sequence[Order]) -> list[int]:
+        """Give these orders, all at once; each is shown with its outcome; return their numbers."""
+        return [self._give(order if order.robot else replace(order, robot=self._robot())) for order in orders]
+
+    def _give(self, order: Order) -> int:
+        self._console.acted(OperatorAction.ORDER, order.robot or ANY_ROBOT, order.sentence)
+        self._do(self._book.give(order))
+        return self._book.last
 
     def touched(self, robot: str) -> bool:
         """End the order of this robot, because its operator wants it by the stick; return whether it had one."""

@@ -14,13 +14,14 @@ from backbone.rc_manager.messages import StaleEpoch
 from backbone.waiting import set_within
 from resource_pool.arc_client import StopState, Suspended, SwappedOut
 from ui_console.model import events
-from ui_console.model.driving import GiveBack, GiveWish, HaltWish, Motion, StopAll, StopRobot
+from ui_console.model.driving import Command, GiveBack, GiveWish, HaltWish, Motion, OrderWish, StopAll, StopRobot
+from ui_console.model.orders import OrderState
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.session.teleoperation import Teleoperation
 
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
-_FOR_SCREENS_ONLY = (events.Asked, events.AbilitiesKnown, events.MomentBegan, events.PictureSeen)
+_FOR_SCREENS_ONLY = (events.Asked, events.AbilitiesKnown, events.MomentBegan, events.PictureSeen, events.TurnedTo)
 
 
 class ScriptDriver:
@@ -43,7 +44,8 @@ class ScriptDriver:
         self._wrong: WrongScript | None = None
         self._console: Teleoperation | None = None
         self._stops: list[StopRobot | StopAll] = []
-        self._stopped = self._is_unanswered = False
+        self._stopped = self._is_unanswered = self._order_is_over = False
+        self._awaited = 0
 
     def show(self, event: events.ConsoleEvent) -> None:
         """Write the event if it is one for scripts; unanswered commands are one line until an answer comes."""
@@ -57,7 +59,21 @@ class ScriptDriver:
             self._player.require_let_go()
         if isinstance(event, events.CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
             self._failed = True
+        self._follow_order(event)
         self._write(events.event_json(event))
+
+    def _follow_order(self, event: events.ConsoleEvent) -> None:
+        """Note how the order goes that the script waits for: it goes on once the robot is in hand again."""
+        if isinstance(event, events.OrderChanged):
+            self._failed = self._failed or event.given.state is OrderState.FAILED
+            is_awaited = event.given.number == self._awaited
+            self._order_is_over = self._order_is_over or (is_awaited and event.given.state.is_final)
+        is_held = self._console is not None and self._console.is_held
+        is_refused = isinstance(event, events.CommandRefused) and event.ends_claim
+        if self._order_is_over and (is_held or is_refused):
+            self._order_is_over = False
+            self._player.order_over()
+            self._news.set()
 
     @property
     def must_halt(self) -> bool:
@@ -130,6 +146,8 @@ class ScriptDriver:
             if next_s is not None and abs(since_s - next_s) < INSTANT_S:
                 since_s = next_s  # the step is due now, regardless of rounding
             for wish in self._player.due(since_s):
+                if isinstance(wish, Command):
+                    console.interrupt()
                 match wish:
                     case GiveBack():
                         self._show_wrong_line(clock.now_s())
@@ -137,6 +155,9 @@ class ScriptDriver:
                         return
                     case StopRobot() | StopAll():
                         await self._stop(console, wish)
+                    case OrderWish(order, until_done):
+                        [number] = console.order_group([order])
+                        self._awaited = number if until_done else 0
                     case GiveWish():
                         await console.do(wish)
                     case HaltWish() if console.is_held:

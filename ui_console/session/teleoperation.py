@@ -52,7 +52,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         see: Called with the newest picture; pictures of earlier grants never arrive.
         work: Run once the console is ready, instead of a wait for a request to end; its end ends the console.
         takes: Claim at once.
-        orders: Orders to give at once.
+        orders: Orders to give at once, with the stick at the robot of the parameters.
         watches: Also show events of other components.
         keeps_arc: Keep the ARC when the robot is given back, so that the next take needs no start of an ARC.
         signs_in: Publish that its operator came and left; False if another component does.
@@ -131,11 +131,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Robot → its order; one that is done, failed or ended keeps its robot for the operator until it is taken."""
         return self._orders.orders
 
-    def order(self, order: Order) -> None:
-        """Tell a robot to do something by itself; see ``order_group``."""
-        self.order_group([order])
+    def order(self, order: Order) -> int:
+        """Tell a robot to do something by itself; return the order's number; see ``order_group``."""
+        return self.order_group([order])[0]
 
-    def order_group(self, orders: Sequence[Order]) -> None:
+    def order_group(self, orders: Sequence[Order]) -> list[int]:
         """Tell robots to do something by themselves, all at once; ``OrderChanged`` shows what becomes of each.
 
         An order claims its robot with this console's priority, whether the stick holds it or not; a robot in hand stays
@@ -143,11 +143,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
         nothing before it was let go; a new press, ``take`` and ``interrupt`` end the order of the robot at the stick.
 
         Args:
-            orders: One for each robot.
+            orders: One for each robot; without a robot it is for the one at the stick.
+
+        Returns:
+            The number of each order, from 1, unique at this console.
         """
         self.touch()
         self.require_let_go()
-        self._orders.give(orders)
+        return self._orders.give(orders)
 
     def interrupt(self) -> None:
         """Take the robot at the stick from its order, if one goes on; it comes to rest."""
@@ -383,6 +386,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._takes:
             self.take()
         if self._first_orders:
+            self.show(events.TurnedTo(self.clock.now_s(), self.parameters.robot))
             self.order_group(self._first_orders)
         self.start_task(self._controls.run(), "keys")
         if self.parameters.away_after_s > 0:

@@ -79,6 +79,10 @@ class Session:
         """Robot → its order; see ``Teleoperation.orders``."""
         return self._console.orders if isinstance(self._console, Teleoperation) else {}
 
+    def robots_held(self) -> list[str]:
+        """Return the robots that the operator has, by the stick or by an order, sorted."""
+        return sorted({*self.orders, *([self.model.mine] if self.model.mine else [])})
+
     def order(self, order: Order) -> None:
         """Tell a robot to do something by itself."""
         self._with_robot(lambda console: console.order(order))
@@ -167,7 +171,7 @@ class Session:
         """Set a parameter; return whether the component applied it."""
         return await self._ready_console().set_parameter(name, parameter, value)
 
-    def _with_robot(self, act: Callable[[Teleoperation], None]) -> None:
+    def _with_robot(self, act: Callable[[Teleoperation], object]) -> None:
         if isinstance(self._console, Teleoperation) and self._console.is_ready:
             act(self._console)
 

@@ -22,6 +22,7 @@ from ui_console.terminal.display import ConsoleDisplay
 from ui_console.terminal.keys import keys_help, stop_meant
 from ui_console.terminal.lines import robot_rows
 from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
+from ui_console.terminal.order_dialog import OrderDialog
 from ui_console.terminal.tables import FIXED, PanelName
 from ui_console.terminal.widgets import DrivePad, Panel
 
@@ -85,8 +86,8 @@ class ConsoleApp(ConsoleDisplay):
         self._session.stop()
 
     def action_stop(self) -> None:
-        """Stop the wheels now."""
-        self._session.stop()
+        """Stop the wheels now, also those of a robot that carries out an order: the order ends."""
+        self._session.halt()
 
     def action_jump(self) -> None:
         """Jump once, if the robot can."""
@@ -106,6 +107,15 @@ class ConsoleApp(ConsoleDisplay):
             stale = "not given: the robot was stopped, freed, granted or lost meanwhile. Press o again."
             dialog = CommandDialog(self._session.model.robot, self._abilities.commands)
             self._open(dialog, self._session.give, stale=stale)
+
+    def action_order(self) -> None:
+        """Choose what this robot, or all that the operator holds, are to do by themselves."""
+        robot, others = self._session.model.robot, self._session.robots_held()
+        if not robot:
+            self.notify("which robot? take one first", severity="warning")
+            return
+        stale = "not ordered: the robot was stopped, freed, granted or lost meanwhile. Press O again."
+        self._open(OrderDialog(robot, others), self._session.order_group, stale=stale)
 
     @property
     def _abilities(self) -> ArcAbilities | None:
@@ -205,6 +215,14 @@ class ConsoleApp(ConsoleDisplay):
         robots = self._view.robots if self._view is not None else []
         if number <= len(robots):
             self._begin(partial(self._session.switch, robots[number - 1].robot))
+
+    def action_next_robot(self) -> None:
+        """Go to the robot after this one in the list, from the last to the first."""
+        robots = [robot.robot for robot in self._view.robots] if self._view is not None else []
+        here = self._session.model.robot
+        if robots:
+            following = robots[(robots.index(here) + 1) % len(robots)] if here in robots else robots[0]
+            self._begin(partial(self._session.switch, following))
 
     def action_pick(self) -> None:
         """Pick a robot from the list."""

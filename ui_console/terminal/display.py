@@ -234,7 +234,7 @@ class ConsoleDisplay(EndingApp):
         placed = (dialog, _subject_of(panel.placed), _subject_of(robots.placed))
         shown = _subject_of(panel.row)
         return {
-            "held": model.robot if model.held is not None else "",
+            "held": model.mine,
             "placed": next((robot for robot in placed if robot in names), ""),
             "wanted": model.robot,
             "shown": shown if shown in names else names[0] if len(names) == 1 else "",

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from rich.text import Text
 
 from backbone.spoken import counted
+from ui_console.model.orders import OrderState
 from ui_console.model.profile import Profile
 from ui_console.model.views import ConsoleView, HealthView, LostView, VideoView
 from ui_console.terminal.keys import has
@@ -22,6 +23,7 @@ ALARMING, ASKING = "bold white on red", "bold yellow"
 WITHOUT_LINK = "x and X reach no robot now: stop at another console, or at the robot itself. What is shown is old."
 TAKE_KEYS = {Profile.TERMINAL: "t", Profile.PENDANT: "enter"}
 LATE_PICTURE_S = 0.25  # chosen: a few pictures at the usual rate; beyond it a person begins to notice
+ORDER_STYLES = {OrderState.FAILED: "bold red", OrderState.WAITING: "yellow", OrderState.DONE: "bold green"}
 HEALTH_STYLES = {"ok": "green", "degraded": "bold yellow", "failed": "bold red"}
 
 
@@ -111,6 +113,7 @@ def _says(view: ConsoleView, profile: Profile) -> Iterator[Text]:
         yield Text(own.asked, ASKING)
     if own.is_asked:  # the first line of a console that only watches has that already
         yield from (Text(screen, "bold") for screen in own.other_screens)
+    yield from (Text(order.line, ORDER_STYLES.get(order.state, "")) for order in own.orders if order.line != own.status)
     if own.must_let_go:
         yield Text("let go, then press anew", ASKING)
     if own.away_since_s >= 0:

@@ -38,6 +38,8 @@ KEYS = [
     Binding("r", "release", "give the robot back and go on watching"),
     Binding("p", "pick", "pick a robot from a list, and take it"),
     *(Binding(str(n), f"choose_robot({n})", "take the robot of this number") for n in range(1, MOST_PICKED_BY_KEY + 1)),
+    Binding("N", "next_robot", "go to the next robot; the order of this one goes on"),
+    Binding("O", "order", "tell this robot, or all you hold, to do something by itself, from a list"),
     Binding("m", "ask_consent", "ask the operator who holds the robot for it"),
     Binding("M", "ask_consent_because", "the same, with a reason you type"),
     Binding("g", "decide(True)", "say yes to the operator who asks for the robot, or to lift your stop"),
@@ -79,6 +81,8 @@ DRIVES = frozenset(
         "take_or_release",
         "pick",
         "choose_robot",
+        "next_robot",
+        "order",
         "bare",
         "ask_consent",
         "ask_consent_because",
@@ -194,8 +198,15 @@ def _hands(view: ConsoleView, profile: Profile) -> Iterator[Hint]:
             yield Hint("m", "may I?", "ask_consent", 6)
         yield Hint("r", "give back" if own.is_held else "ask no more", "release", 6)
     else:
+        if any(order.robot == own.robot and not order.state.is_final for order in own.orders):
+            yield Hint("space", "end order", "stop", 6)
+            yield Hint("r", "give back", "release", 6)
         yield Hint("t", "take it again" if own.lost is not None else "take", "take", 6)
     yield Hint("p", "pick robot", "pick", 3)
+    if own.orders:
+        yield Hint("N", "next robot", "next_robot", 4)
+    if own.is_held or own.orders:
+        yield Hint("O", "order", "order", 4)
     if own.is_held:
         yield Hint("+ -", "speed", "", 2)
         can = view.abilities

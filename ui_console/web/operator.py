@@ -16,7 +16,7 @@ from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import STICK_LASTS_S, GiveWish, HaltWish, move_by_stick
-from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, OrderChanged, PictureSeen, failed
+from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, PictureSeen, failed
 from ui_console.model.orders import Order
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
@@ -169,10 +169,7 @@ class Operator:
             self.is_there = event.is_there
             self._services.attention_changed()
             return
-        event = printable_all(event)
-        self.model.apply(event)
-        if isinstance(event, OrderChanged):
-            self._ordering.given.take(event)
+        self.model.apply(printable_all(event))
         if not isinstance(event, PictureSeen | CommandApplied):
             self.refresh(self._services.clock.now_s())
 
@@ -192,7 +189,6 @@ class Operator:
         put("abilities", view_json(model.abilities))
         put("robots", _encode(model.robots(now_s)))
         put("links", _encode(model.links(now_s)))
-        put("orders", _encode(self._ordering.given.views(now_s, self._stick)))
         put("alarms", _encode(model.alarm_views()))
         put("drawn", msgspec.json.encode({robot: round(at, 3) for robot, at in sorted(self._latency_s.items())}))
         self.news.set()
@@ -224,11 +220,6 @@ class Operator:
             self._begin(intent)
         else:
             self._answer({"refused": "no order was given: the robot's state has changed; tap again"})
-
-    @property
-    def _stick(self) -> str:
-        """The robot that the stick is at; empty: none."""
-        return self._console.parameters.robot or self.model.robot if self._console is not None else ""
 
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)
@@ -346,9 +337,9 @@ class Operator:
         console = self._console
         if console is None or not console.is_ready:
             return
-        if self._stick in robots:
+        if self.model.robot in robots:
             console.interrupt()
-        others = [robot for robot in robots if robot != self._stick]
+        others = [robot for robot in robots if robot != self.model.robot]
         await asyncio.gather(*map(console.end_order, others))
 
     @property

@@ -1,23 +1,21 @@
-"""Ordering: from what a person taps on a page to orders for robots, and the orders as that page shows them."""
+"""Ordering: from what a person taps on a page to orders for robots."""
 
 from __future__ import annotations
 
-from ui_console.model.order_views import OrderList, inside
+from ui_console.model.order_places import inside
 from ui_console.model.orders import Order, OrderKind, group
 from ui_console.model.team import TeamModel
 from ui_console.web.protocol import OrderRequest, PictureOrder
 
 
 class Ordering:
-    """The orders of one person.
+    """The taps of one person.
 
     Args:
         team: Model of the mission.
     """
 
     def __init__(self, team: TeamModel) -> None:
-        self.given = OrderList()
-        """The orders, as the page shows them."""
         self._team = team
         self._captured_s: dict[str, float] = {}
 

@@ -14,10 +14,12 @@ from ui_console.model.driving import (
     GiveWish,
     HaltWish,
     MoveWish,
+    OrderWish,
     StopAll,
     StopRobot,
     Wish,
 )
+from ui_console.model.orders import Order, OrderKind
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript, read_script
 
 EXAMPLE = '{"at_s":0.5,"left_rad_s":4,"right_rad_s":4}\n{"at_s":3,"release":true}\n'
@@ -115,6 +117,13 @@ def test_a_streamed_script_waits_for_its_next_line_and_repeats_the_last_meanwhil
         ('{"left_rad_s":1,"right_rad_s":1}', "at_s"),
         ('{"at_s":0}', "exactly one"),
         ('{"at_s":0,"halt":true,"jump":true}', "exactly one"),
+        ('{"at_s":0,"halt":true,"order":"return_home"}', "exactly one"),
+        ('{"at_s":0,"order":"dance"}', "Invalid enum value"),
+        ('{"at_s":0,"order":"go_to","x_m":1}', "both of them"),
+        ('{"at_s":0,"order":"return_home","x_m":1,"y_m":1}', "both of them"),
+        ('{"at_s":0,"order":"follow"}', "a target belongs to follow"),
+        ('{"at_s":0,"order":"return_home","target":"anna"}', "a target belongs to follow"),
+        ('{"at_s":0,"halt":true,"until_done":true}', "belong to an order"),
         ('{"at_s":0,"left_rad_s":1}', "belong together"),
         ('{"at_s":0,"left_rad_s":1e999,"right_rad_s":1}', ""),
         ('{"at_s":0,"forward_m_s":1,"left_rad_s":1,"right_rad_s":1}', "exactly one"),
@@ -199,3 +208,26 @@ def test_any_bytes_are_a_step_or_a_refusal(raw: bytes) -> None:
         read_script(raw.decode(errors="replace"))
     except WrongScript as refusal:
         json.dumps(refusal.facts["line"])
+
+
+def test_what_follows_an_order_waits_until_it_is_over() -> None:
+    order = OrderWish(Order(OrderKind.GO_TO, "", 2.0, 1.0), until_done=True)
+    lines = [
+        '{"at_s":0,"forward_m_s":0.1}',
+        '{"at_s":1,"order":"go_to","x_m":2,"y_m":1,"until_done":true}',
+        '{"at_s":2,"halt":true}',
+    ]
+    player = ScriptPlayer(read_script("\n".join(lines)))
+    assert player.due(0.0) == [MoveWish(0.1, 0.0)]
+    assert player.due(1.0) == [order], "the drive before is over"
+    assert (player.due(60.0), player.next_s, player.waits) == ([], None, True)
+    player.order_over()
+    assert player.due(60.0) == [HaltWish(), GiveBack()]
+
+
+def test_an_order_that_is_not_waited_for_goes_on_beside_the_script() -> None:
+    player = ScriptPlayer(
+        read_script('{"at_s":0,"order":"follow","target":"anna","robot":"scout2"}\n{"at_s":1,"halt":true}')
+    )
+    assert player.due(0.0) == [OrderWish(Order(OrderKind.FOLLOW, "scout2", target="anna"))]
+    assert player.due(1.0) == [HaltWish(), GiveBack()]

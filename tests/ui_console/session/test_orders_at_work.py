@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -25,6 +26,8 @@ from resource_pool.arc_client import lift_stop, stop_robot
 from ui_console.model.driving import MoveWish
 from ui_console.model.events import CommandApplied, ConsoleEvent, GivenBack, OrderChanged, TurnedTo
 from ui_console.model.orders import Order, OrderKind, OrderState, group
+from ui_console.model.script import read_script
+from ui_console.session.scripted import ScriptDriver
 from ui_console.session.teleoperation import Teleoperation
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
@@ -105,6 +108,11 @@ class Operator:
 
     def behaviors(self) -> list[str]:
         return [one for one in (f"{CONSOLE}-order-{number}" for number in range(1, 9)) if self.running.hosts.knows(one)]
+
+
+async def until_over(running: RunningMission, name: str) -> None:
+    while running.hosts.knows(name):
+        await running.clock.sleep_s(0.05)
 
 
 Scene = Callable[[Operator], Awaitable[None]]
@@ -376,3 +384,47 @@ def test_an_impossible_order_fails_with_a_remedy_and_the_stick_keeps_its_robot(o
         assert anna.console.orders == {}
 
     play(scene)
+
+
+def run_script(lines: list[str]) -> tuple[int, list[dict[str, Any]]]:
+    """Return exit code and answers of a script that drives scout1 in the mission."""
+    told: list[dict[str, Any]] = []
+    made: list[Teleoperation] = []
+    driver = ScriptDriver(lambda line: told.append(json.loads(line)), read_script("\n".join(lines)))
+
+    def console(launch: Launch, bus: Bus, clock: Clock) -> Teleoperation:
+        made.append(Teleoperation(launch, bus, clock, show=driver.show, work=driver.drive, watches=False))
+        return made[-1]
+
+    async def main() -> None:
+        async with mission_in_one_process(patrols(), consoles={"console": console}) as running:
+            await running.start(Start("console", CONSOLE, {"robot": "scout1", "priority": 100}))
+            await asyncio.wait_for(until_over(running, CONSOLE), 60.0)
+
+    run_virtual(main())
+    return driver.exit_code(made[0]), told
+
+
+def test_a_script_waits_for_the_end_of_its_order_then_drives_on_and_gives_the_robot_back() -> None:
+    code, told = run_script(
+        [
+            '{"at_s":0,"order":"go_to","x_m":4,"y_m":1,"until_done":true}',
+            '{"at_s":0.5,"forward_m_s":0.1}',
+            '{"at_s":12,"release":true}',
+        ]
+    )
+    assert code == 0, told
+    words = [one["event"] for one in told if one["event"] in ("granted", "order", "applied", "released")]
+    done = [at for at, one in enumerate(told) if one["event"] == "order" and one["state"] == "done"]
+    assert len(done) == 1
+    assert "applied" not in [one["event"] for one in told[: done[0]]]
+    assert told[done[0] + 1]["event"] == "granted"
+    assert "applied" in [one["event"] for one in told[done[0] :]]
+    assert words[-1] == "released"
+    assert told[done[0]]["line"] == "scout1: go to 4, 1 (done: scout1 is there)"
+
+
+def test_a_script_whose_order_fails_ends_with_a_refusal() -> None:
+    code, told = run_script(['{"at_s":0,"order":"follow","target":"anna","until_done":true}'])
+    assert code == 5, told
+    assert [one["state"] for one in told if one["event"] == "order"] == ["starting", "failed"]

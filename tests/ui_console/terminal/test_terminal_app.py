@@ -61,6 +61,8 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("escape", ["stop"]),
     ("j", [GiveWish("jump")]),
     ("o", []),
+    ("N", [("switch", "scout1")]),
+    ("O", []),
     ("r", ["release"]),
     ("t", ["take"]),
     ("m", [("may I", "")]),

@@ -30,6 +30,8 @@ CONSOLE_SCREENS: dict[str, list[str]] = {
     "parameter": [*["tab"] * 6, "e"],
     "lift": ["c"],
     "search": ["slash"],
+    "orders": ["O"],
+    "order fields": ["O", "enter"],
 }
 
 

@@ -6,7 +6,7 @@ import { lasting, set } from "./text.js";
 
 /** @import { Commands } from "./commands.js" */
 /** @import { Driving } from "./driving.js" */
-/** @import { ArcAbilities, OrderView, OwnView } from "./messages.d.ts" */
+/** @import { ArcAbilities, OwnView } from "./messages.d.ts" */
 /** @import { Act } from "./types.d.ts" */
 
 const MEMORY = "held";
@@ -80,17 +80,6 @@ export class Hand {
     if (this.own !== null) this.driving.turn(this.stick !== "" && this.canMove);
   }
 
-  /**
-   * Take in the orders of this operator's robots.
-   *
-   * @param {OrderView[]} orders
-   */
-  heed(orders) {
-    this.ordered = atStick(orders);
-    document.body.dataset.ordered = this.ordered;
-    if (this.own !== null) this.showHold(this.own);
-  }
-
   get canMove() {
     return this.abilities === null || this.abilities.reach !== null;
   }
@@ -125,6 +114,8 @@ export class Hand {
   show(own, now_s) {
     const before = this.own;
     this.own = own;
+    this.ordered = atStick(own.orders, own.robot);
+    document.body.dataset.ordered = this.ordered;
     this.now_s = now_s;
     if (isOther(before, own))
       this.driving.letGo(own.is_held); // a held control was meant for an earlier moment

@@ -111,14 +111,11 @@ function heard(message) {
   if (changes.abilities !== undefined) hand.know(changes.abilities);
   if (changes.own) {
     hand.show(changes.own, view.now_s ?? 0);
+    orders.show(changes.own.orders);
     const down_s = changes.own.link_down_s;
     blindness.hub(down_s < 0 ? -1 : 1000 * Math.max(0, (view.now_s ?? down_s) - down_s));
   }
-  if (changes.orders) {
-    orders.show(changes.orders);
-    hand.heed(changes.orders);
-  }
-  if (changes.floor !== undefined || changes.bodies || changes.orders || changes.own) map.show(view, changes);
+  if (changes.floor !== undefined || changes.bodies || changes.own) map.show(view, changes);
   if (changes.robots) stopping.heard(changes.robots);
   if (changes.robots || changes.own) {
     cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});

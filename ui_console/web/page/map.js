@@ -3,6 +3,7 @@
 import { find, keepingFocus, make, makeButton } from "./dom.js";
 import { age, drawBody, drawCross, drawFloor, drawGoal } from "./map_draw.js";
 import { listed, meantBy, Plan, stepped } from "./map_plan.js";
+import { isOver } from "./orders.js";
 import { drawn } from "./svg.js";
 import { set } from "./text.js";
 
@@ -74,7 +75,7 @@ export class RobotMap {
    */
   show(view, changed) {
     this.bodies = view.bodies ?? [];
-    this.orders = view.orders ?? [];
+    this.orders = (view.own?.orders ?? []).filter((order) => !isOver(order));
     const names = this.bodies.filter((body) => body.is_robot).map((body) => body.name);
     for (const name of this.selected) if (!names.includes(name)) this.selected.delete(name);
     const isNew = this.root.hidden && view.floor != null;
@@ -124,7 +125,7 @@ export class RobotMap {
     const parts = this.bodies.map((body) =>
       drawBody(body, this.plan, { isMine: body.name === inHand, isSelected: this.selected.has(body.name) }),
     );
-    const goals = this.orders.filter((order) => order.kind === "go_to" && !order.is_over);
+    const goals = this.orders.filter((order) => order.kind === "go_to");
     for (const order of goals) {
       const body = this.bodies.find((one) => one.name === order.robot);
       parts.push(...drawGoal(order, body, this.plan));
@@ -169,7 +170,7 @@ export class RobotMap {
 
   drawButtons() {
     const meant = this.meant;
-    const has = (/** @type {string} */ robot) => this.orders.some((one) => one.robot === robot && !one.is_over);
+    const has = (/** @type {string} */ robot) => this.orders.some((one) => one.robot === robot);
     for (const id of ["map-go", "map-watch", "map-return", "map-follow"]) {
       find(id, HTMLButtonElement).disabled = meant.length === 0;
     }
@@ -244,7 +245,7 @@ export class RobotMap {
 
   /** @param {string[]} robots */
   end(robots) {
-    const ordered = robots.filter((robot) => this.orders.some((one) => one.robot === robot && !one.is_over));
+    const ordered = robots.filter((robot) => this.orders.some((one) => one.robot === robot));
     if (!ordered.length) return;
     set(this.told, `${listed(ordered)}: the order is stopped`);
     this.act("end_orders", "", { robots: ordered });

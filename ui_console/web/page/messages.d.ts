@@ -241,14 +241,26 @@ export type OrderKind =
   | "return_home"
   | "watch_for_motion";
 
+export type OrderState =
+  | "done"
+  | "ended"
+  | "failed"
+  | "running"
+  | "starting"
+  | "waiting";
+
 export interface OrderView {
   robot: string;
   kind: OrderKind;
+  number: number;
+  words: string;
+  state: OrderState;
+  why: string;
+  by: string;
+  line: string;
   x_m: number;
   y_m: number;
-  line: string;
-  is_over: boolean;
-  has_stick: boolean;
+  target: string;
 }
 
 export interface OwnView {
@@ -271,6 +283,7 @@ export interface OwnView {
   lost: LostView | null;
   link_down_s: number;
   moment: number;
+  orders: OrderView[];
 }
 
 export interface ParameterView {
@@ -445,7 +458,6 @@ export interface View {
   log: LoggedEvent[];
   floor: FloorView | null;
   bodies: BodyView[];
-  orders: OrderView[];
   now_s: number;
   beat: number;
 }

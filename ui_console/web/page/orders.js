@@ -25,10 +25,10 @@ export class Orders {
 
   /** @param {OrderView} order */
   row(order) {
-    const row = make("li", order.is_over ? "is-over" : "");
+    const row = make("li", isOver(order) ? "is-over" : "");
     row.dataset.order = order.robot;
     row.append(make("span", "", order.line));
-    if (order.is_over) return row;
+    if (isOver(order)) return row;
     const end = makeButton("Stop order", () => this.act("end_orders", "", { robots: [order.robot] }));
     end.dataset.key = `end:${order.robot}`;
     end.setAttribute("aria-label", `Stop the order of ${order.robot}`);
@@ -38,10 +38,20 @@ export class Orders {
 }
 
 /**
+ * Is nothing more to come of the order?
+ *
+ * @param {OrderView} order
+ */
+export function isOver(order) {
+  return order.state === "done" || order.state === "failed" || order.state === "ended";
+}
+
+/**
  * The robot whose order the stick takes back; empty: none.
  *
  * @param {OrderView[]} orders
+ * @param {string} robot The one that the stick is at.
  */
-export function atStick(orders) {
-  return orders.find((order) => order.has_stick)?.robot ?? "";
+export function atStick(orders, robot) {
+  return orders.find((order) => order.robot === robot && !isOver(order))?.robot ?? "";
 }

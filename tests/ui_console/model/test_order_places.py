@@ -1,4 +1,4 @@
-"""An operator's orders on the screen: the newest of each robot; a group's places lie on the floor."""
+"""The places of a group lie on the floor, as far from each other as they were."""
 
 from __future__ import annotations
 
@@ -10,30 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from resource_pool.arc_client import FloorPlan
-from ui_console.model.events import OrderChanged
-from ui_console.model.order_views import EDGE_M, OVER_SHOWN_S, OrderList, inside
-from ui_console.model.orders import GivenOrder, Order, OrderKind, OrderState, group
+from ui_console.model.order_places import EDGE_M, inside
+from ui_console.model.orders import Order, OrderKind, group
 
 GO = Order(OrderKind.GO_TO, "scout1", 2.0, 1.0)
-
-
-def changed(at_s: float, number: int, state: OrderState, order: Order = GO, why: str = "") -> OrderChanged:
-    return OrderChanged(at_s, GivenOrder(order, number, state, why))
-
-
-def test_the_newest_order_of_a_robot_is_shown_and_its_end_for_a_moment() -> None:
-    orders = OrderList()
-    orders.take(changed(1.0, 1, OrderState.RUNNING))
-    orders.take(changed(2.0, 2, OrderState.STARTING, Order(OrderKind.RETURN, "scout1")))
-    orders.take(changed(2.1, 1, OrderState.ENDED))
-    [shown] = orders.views(3.0, "scout1")
-    assert (shown.kind, shown.is_over, shown.has_stick) == (OrderKind.RETURN, False, True)
-    assert not orders.views(3.0, "scout2")[0].has_stick
-    orders.take(changed(4.0, 2, OrderState.FAILED, Order(OrderKind.RETURN, "scout1"), "no way there"))
-    [over] = orders.views(5.0, "scout1")
-    assert (over.is_over, over.has_stick) == (True, False)
-    assert "no way there" in over.line
-    assert orders.views(4.0 + OVER_SHOWN_S, "scout1") == []
 
 
 @given(st.floats(-1, 9), st.floats(-1, 6), st.integers(2, 6))

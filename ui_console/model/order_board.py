@@ -1,0 +1,49 @@
+"""Order board: the orders of one operator, as a screen shows them. Pure."""
+
+from __future__ import annotations
+
+from ui_console.model.events import OrderChanged
+from ui_console.model.orders import GivenOrder
+from ui_console.model.views import OrderView
+
+SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
+
+
+class OrderBoard:
+    """The newest order of each robot."""
+
+    def __init__(self) -> None:
+        self._newest: dict[str, OrderChanged] = {}
+
+    def take(self, changed: OrderChanged) -> None:
+        """Take a change in; an earlier order of the robot is forgotten, and its later end is no news."""
+        robot, given = changed.given.order.robot, changed.given
+        known = self._newest.get(robot)
+        if known is None or known.given.number <= given.number:
+            self._newest[robot] = changed
+
+    def of(self, robot: str) -> GivenOrder | None:
+        """Return the order of this robot that goes on; None: there is none."""
+        known = self._newest.get(robot)
+        return known.given if known is not None and not known.given.state.is_final else None
+
+    def views(self, now_s: float) -> list[OrderView]:
+        """Return the orders that go on, and those that were over a moment ago, by robot."""
+        return [
+            OrderView(
+                robot=robot,
+                kind=given.order.kind,
+                number=given.number,
+                words=given.order.sentence,
+                state=given.state,
+                why=given.why,
+                by=given.by,
+                line=given.line,
+                x_m=given.order.x_m,
+                y_m=given.order.y_m,
+                target=given.order.target,
+            )
+            for robot, changed in sorted(self._newest.items())
+            for given in [changed.given]
+            if not given.state.is_final or now_s - changed.at_s <= SHOWN_S
+        ]
