@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import itertools
 import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -11,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from axe import serious_findings
+from fake_resource_pool import FakeArc
 from map_stage import PLAN, Floor, floor_on
 from msgspec.structs import replace
 from web_browser import Finger, assert_no_sideways_scroll, keep_picture
@@ -35,6 +38,7 @@ async def floor(stage: Stage, beside: Any) -> AsyncIterator[Floor]:
 async def map_at(floor: Floor, size: str = "desktop", **options: Any) -> AsyncIterator[Any]:
     """Open the page; the three robots are on its map."""
     async with page_at(floor.stage, size, **options) as page:
+        await page.wait_for_selector("#map-plan .furniture")
         await page.wait_for_selector("#map-plan [data-body=scout3]")
         yield page
 
@@ -61,6 +65,24 @@ async def wait_sent(floor: Floor, robot: str, kind: str, x_m: float = 0.0, y_m: 
         await wait_until(is_sent, f"{robot} gets its order")
     except pytest.fail.Exception:
         pytest.fail(f"{robot} never got {kind} {x_m} {y_m}, but: {floor.ordered}")
+
+
+@asynccontextmanager
+async def publishing(arc: FakeArc) -> AsyncIterator[None]:
+    """Have the ARC publish pictures until the block ends."""
+    picture = np.full((240, 320), 90, np.uint8).tobytes()
+
+    async def publish() -> None:
+        for number in itertools.count():
+            arc.publish(picture, 320, 240, number)
+            await asyncio.sleep(0.1)
+
+    task = asyncio.create_task(publish(), name="pictures")
+    try:
+        yield
+    finally:
+        task.cancel()
+        await asyncio.wait({task})
 
 
 async def test_robots_are_on_the_map_with_name_source_spread_and_trail_and_an_old_place_is_marked(floor: Floor) -> None:
@@ -146,29 +168,24 @@ async def test_a_tap_in_the_picture_sends_the_robot_to_that_place_on_the_floor(f
     floor.eye.place("scout1", 2.0, 2.0, 0.5)
     async with map_at(floor) as page:
         await take(page)
-        picture = np.full((240, 320), 90, np.uint8)
         [arc] = floor.stage.placer.arcs.values()
         floor.stage.publish_schedule(scout1=arc.name, scout2="", scout3="")
 
         async def tap_picture(column: float, row: float) -> None:
-            """Tap a fresh picture there, shares of its width and height."""
-            canvas = page.locator(".robot.is-large[data-robot=scout1] canvas")
-            before = await canvas.get_attribute("data-number")
-            for number in range(50):
-                arc.publish(picture.tobytes(), 320, 240, number)
-                await page.wait_for_timeout(40)
-                if await canvas.get_attribute("data-number") != before:
-                    break
+            """Tap there, shares of its width and height."""
+            canvas = page.locator(".robot.is-large[data-robot=scout1]:not(.is-stale) canvas")
+            await canvas.wait_for()
             box = await canvas.bounding_box()
             await page.mouse.click(box["x"] + column * box["width"], box["y"] + row * box["height"])
 
-        await tap_picture(0.5, 0.2)
-        await page.locator("#notices", has_text="above the horizon").wait_for()
-        assert "scout1" not in floor.ordered
-        await tap_picture(0.25, 0.9)
-        assert Scout.camera is not None
-        seen = floor_place(79.5, 215.5, (320, 240), Scout.camera, Stand(2.0, 2.0, 0.5))
-        await wait_sent(floor, "scout1", "go_to", *seen)
+        async with publishing(arc):
+            await tap_picture(0.5, 0.2)
+            await page.locator("#notices", has_text="above the horizon").wait_for()
+            assert "scout1" not in floor.ordered
+            await tap_picture(0.25, 0.9)
+            assert Scout.camera is not None
+            seen = floor_place(79.5, 215.5, (320, 240), Scout.camera, Stand(2.0, 2.0, 0.5))
+            await wait_sent(floor, "scout1", "go_to", *seen)
 
 
 async def test_by_keyboard_alone_a_robot_is_selected_the_cross_moved_and_the_robot_sent_there(floor: Floor) -> None:
