@@ -153,6 +153,17 @@ async def test_a_program_drives_a_robot_and_when_it_vanishes_the_wheels_stop_and
         await driving
 
 
+async def test_where_no_localizer_is_the_map_has_the_places_of_the_simulator_and_says_so(served: Served) -> None:
+    async with served.mission.bus() as bus, program(served, "mapper") as one:
+        await one.wait(lambda: len(one.view.get("bodies", [])) == 3, "all robots on the map")
+        shown = {body["name"]: body for body in one.view["bodies"]}
+        truth = await pose(bus, "scout3")
+        assert math.hypot(shown["scout3"]["x_m"] - truth.x_m, shown["scout3"]["y_m"] - truth.y_m) < 0.05
+        assert {body["source"] for body in one.view["bodies"]} == {"from the simulator"}
+        assert not any(body["is_stale"] for body in one.view["bodies"])
+        await one.wait(lambda: one.view["floor"] is not None, "a floor")
+
+
 async def test_of_two_operators_the_higher_has_the_robot_and_the_other_is_told_who_and_why(served: Served) -> None:
     async with program(served, "anna", 100) as anna, program(served, "ben", 50) as ben:
         await ben.say(do="take", robot="scout1")

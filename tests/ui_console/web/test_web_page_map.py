@@ -133,14 +133,15 @@ async def test_one_person_holds_two_robots_and_the_order_of_the_other_goes_on(fl
         assert await page.locator("body").get_attribute("data-held") == "scout2"
 
 
-async def test_the_stick_takes_the_robot_back_from_its_order(floor: Floor) -> None:
+@pytest.mark.parametrize("key", ["ArrowUp", "Space"])
+async def test_stick_and_space_take_the_robot_back_from_its_order(floor: Floor, key: str) -> None:
     async with map_at(floor) as page:
         await take(page)
         await page.locator("#map-watch").click()
         await wait_sent(floor, "scout1", "watch_for_motion")
         await page.wait_for_selector("body[data-ordered=scout1][data-held='']")
-        await page.keyboard.down("ArrowUp")
-        await page.keyboard.up("ArrowUp")
+        await page.keyboard.down(key)
+        await page.keyboard.up(key)
         [arc] = floor.stage.placer.arcs.values()
         await wait_until(lambda: not arc.is_idle, "the stick wants it")
         await arc.grant()
