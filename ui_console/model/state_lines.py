@@ -25,6 +25,7 @@ def state_lines(view: ConsoleView) -> Iterator[str]:
         yield f"NOT SURE that {', '.join(unsure)} stopped"
     if own.lost is not None:
         yield f"you lost {own.lost.robot}: {own.lost.why}{' (start takes it again)' if own.lost.may_retake else ''}"
+    yield from (order.line for order in own.orders if order.line != own.status)
     if own.must_let_go:
         yield "let go, then press anew"
     if own.away_since_s >= 0:

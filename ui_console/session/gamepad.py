@@ -27,7 +27,7 @@ except ImportError:  # an extra that few machines have
 log = logging.getLogger(__name__)
 
 EV_KEY, EV_ABS = 1, 3  # Linux, input-event-codes.h
-ABS_X, ABS_Y = 0, 1
+ABS_X, ABS_Y, ABS_HAT0X, ABS_HAT0Y = 0, 1, 16, 17
 BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_TL, BTN_TR, BTN_SELECT, BTN_START = 304, 305, 307, 310, 311, 314, 315
 DEAD_MAN = frozenset({BTN_TL, BTN_TR})
 STILL_ZONE = 0.12  # chosen: sticks that are let go rest within a tenth of their middle
@@ -42,6 +42,9 @@ class PadWish(StrEnum):
     RELEASE = "release"
     STOP_ROBOT = "stop_robot"
     STOP_ALL = "stop_all"
+    NEXT_ROBOT = "next_robot"
+    WATCH = "watch by itself"
+    RETURN = "return by itself"
 
 
 BUTTONS = {
@@ -51,6 +54,12 @@ BUTTONS = {
     BTN_EAST: PadWish.STOP_ROBOT,
     BTN_NORTH: PadWish.STOP_ALL,
 }
+CROSS = {
+    (ABS_HAT0X, 1): PadWish.NEXT_ROBOT,
+    (ABS_HAT0Y, -1): PadWish.WATCH,
+    (ABS_HAT0Y, 1): PadWish.RETURN,
+}
+"""Axis of the cross and its value when it is pressed → action."""
 
 
 class NoGamepad(Refusal):
@@ -90,7 +99,9 @@ class Stick:
         self._held: set[int] = set()
 
     def feel(self, event: GamepadEvent) -> PadWish | None:
-        """Take in one event; return the action of a button that was just pressed."""
+        """Take in one event; return the action of a button, or of the cross, that was just pressed."""
+        if event.type == EV_ABS and (event.code, event.value) in CROSS:
+            return CROSS[event.code, event.value]
         if event.type == EV_ABS and event.code in self._at and event.code in self._ranges:
             least, most = self._ranges[event.code]
             share = 2 * (event.value - least) / max(1, most - least) - 1
@@ -182,4 +193,5 @@ def buttons_help() -> list[str]:
     return [
         "shoulder button held: the left stick drives",
         *(f"{names[code]}: {wish}" for code, wish in BUTTONS.items()),
+        *(f"cross {way}: {wish}" for way, wish in zip(("right", "up", "down"), CROSS.values(), strict=True)),
     ]

@@ -14,6 +14,7 @@ from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent
+from ui_console.model.orders import Order, OrderKind
 from ui_console.model.state_lines import news, state_lines
 from ui_console.model.team import TeamModel
 from ui_console.session.gamepad import Gamepad, NoGamepad, PadWish, Stick, buttons_help, find_gamepad, play_gamepad
@@ -118,6 +119,12 @@ class GamepadSession(Session):
                 self.release()
             case PadWish.STOP_ROBOT | PadWish.STOP_ALL:
                 self._begin_stop(is_for_all=wish is PadWish.STOP_ALL)
+            case PadWish.NEXT_ROBOT:
+                self.begin_next_robot()
+            case PadWish.WATCH:
+                self.order(Order(OrderKind.WATCH, ""))
+            case PadWish.RETURN:
+                self.order(Order(OrderKind.RETURN, ""))
             case _:
                 assert_never(wish)
 

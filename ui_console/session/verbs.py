@@ -118,6 +118,16 @@ class Session:
         if isinstance(self._console, Teleoperation) and self._console.is_ready:
             await self._console.switch(robot)
 
+    async def next_robot(self) -> None:
+        """Turn to the robot after this one in the list, from the last to the first; this one's order goes on."""
+        robots, here = self.model.team.robots.names(), self.model.robot
+        if robots:
+            await self.switch(robots[(robots.index(here) + 1) % len(robots)] if here in robots else robots[0])
+
+    def begin_next_robot(self) -> None:
+        """Turn to the next robot, without waiting for it."""
+        self._with_robot(lambda console: console.start_task(self.next_robot(), "next robot"))
+
     def touch(self) -> None:
         """Note that the operator is there."""
         self._with_robot(Teleoperation.touch)

@@ -217,12 +217,8 @@ class ConsoleApp(ConsoleDisplay):
             self._begin(partial(self._session.switch, robots[number - 1].robot))
 
     def action_next_robot(self) -> None:
-        """Go to the robot after this one in the list, from the last to the first."""
-        robots = [robot.robot for robot in self._view.robots] if self._view is not None else []
-        here = self._session.model.robot
-        if robots:
-            following = robots[(robots.index(here) + 1) % len(robots)] if here in robots else robots[0]
-            self._begin(partial(self._session.switch, following))
+        """Go to the next robot; the order of this one goes on."""
+        self._begin(self._session.next_robot)
 
     def action_pick(self) -> None:
         """Pick a robot from the list."""

@@ -202,11 +202,11 @@ def _hands(view: ConsoleView, profile: Profile) -> Iterator[Hint]:
             yield Hint("space", "end order", "stop", 6)
             yield Hint("r", "give back", "release", 6)
         yield Hint("t", "take it again" if own.lost is not None else "take", "take", 6)
-    yield Hint("p", "pick robot", "pick", 3)
-    if own.orders:
-        yield Hint("N", "next robot", "next_robot", 4)
     if own.is_held or own.orders:
-        yield Hint("O", "order", "order", 4)
+        yield Hint("O", "order", "order", 3)
+    if own.orders:
+        yield Hint("N", "next robot", "next_robot", 3)
+    yield Hint("p", "pick robot", "pick", 3)
     if own.is_held:
         yield Hint("+ -", "speed", "", 2)
         can = view.abilities

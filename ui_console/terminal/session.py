@@ -14,6 +14,7 @@ from backbone.launcher.endings import ExitCode
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent
+from ui_console.model.orders import Order, OrderKind
 from ui_console.model.profile import Profile
 from ui_console.model.team import TeamModel
 from ui_console.session.gamepad import Gamepad, PadWish, Stick, play_gamepad
@@ -129,6 +130,12 @@ class TerminalSession(Session):
                 screen.action_stop_robot()
             case PadWish.STOP_ALL:
                 screen.action_stop_all()
+            case PadWish.NEXT_ROBOT:
+                self.begin_next_robot()
+            case PadWish.WATCH:
+                self.order(Order(OrderKind.WATCH, ""))
+            case PadWish.RETURN:
+                self.order(Order(OrderKind.RETURN, ""))
             case _:
                 assert_never(wish)
 

@@ -25,6 +25,7 @@ from ui_console.session.gamepad import (
     BTN_TL,
     BTN_TR,
     BUTTONS,
+    CROSS,
     EV_ABS,
     EV_KEY,
     NoGamepad,
@@ -77,6 +78,13 @@ def test_without_the_dead_man_button_nothing_drives_and_with_it_no_stick_exceeds
 def test_a_button_asks_once_when_it_is_pressed(code: int, wish: PadWish) -> None:
     stick = Stick(RANGES)
     assert [stick.feel(Said(EV_KEY, code, value)) for value in (1, 2, 0)] == [wish, None, None]
+
+
+@pytest.mark.parametrize(("pressed", "wish"), CROSS.items())
+def test_the_cross_asks_once_when_it_is_pressed(pressed: tuple[int, int], wish: PadWish) -> None:
+    stick = Stick(RANGES)
+    axis, value = pressed
+    assert [stick.feel(Said(EV_ABS, axis, at)) for at in (value, 0)] == [wish, None]
 
 
 def test_a_stick_that_rests_beside_its_middle_stands_still() -> None:
@@ -205,4 +213,4 @@ def test_without_a_gamepad_or_the_extra_it_is_said_what_to_do(installed: bool, m
 
 
 def test_the_help_names_every_button() -> None:
-    assert len(buttons_help()) == 1 + len(BUTTONS)
+    assert len(buttons_help()) == 1 + len(BUTTONS) + len(CROSS)
