@@ -4,7 +4,8 @@ Rules of this file: no bus, no clock. Events and mission time go in, beliefs com
 
 * A motion lasts until the next one, at most ``COMMAND_TIMEOUT_S``, as robots end it. Where a robot counts its way by
   itself, its count replaces the commanded way.
-* The spread grows with way and turns, and never shrinks but by a sighting of a landmark, which replaces the belief.
+* The spread grows with way and turns, and never shrinks but by a sighting of a landmark, which replaces the belief. On
+  a way back the error may get smaller, if errors are as ``doubt`` has them; the spread that is told does not.
 * Numbers that no robot can have change nothing; time never runs backwards.
 
 Source: Borenstein, Everett and Feng, "Where am I?", 1996, chapter 1: odometry "is fundamentally the integration of
@@ -15,16 +16,17 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from resource_pool.doubt import Doubt
 from resource_pool.localization import PoseSource
 from resource_pool.messages import COMMAND_TIMEOUT_S
 
-WAY_SHARE = 0.03  # chosen: twice the way that a Scout in the simulated room was found to lack at start and end
-TURN_SHARE = 0.05  # chosen: a Scout in the simulated room was measured to lack 3 to 6 % of a turn
-HEADING_RAD_PER_M = 0.02  # chosen: a wheel that is 1 mm larger than the other turns a Scout about that much
+LEAST_SHARE = 0.01  # chosen: of the way; so much the spread grows at least, also on a way back
 JUMP_M = 0.5  # chosen: longer than a Scout's jump over 30 cm carries it
 JUMP_RAD = math.pi / 2  # chosen: it lands on its wheels, but turned
+ROUND_M = 0.01  # chosen: resolution of a count
+ROUND_RAD = 0.02  # chosen: same
 FASTEST_M_S = 5.0  # chosen: faster than any robot of a room; an odometer that says more has begun anew
 MOST_RAD_S = 50.0  # chosen: faster than any robot of a room turns
 FARTHEST_M = 1e6  # the limit of ``Meters``
@@ -99,10 +101,12 @@ class DeadReckoning:
 
     def __init__(self, begin: Belief) -> None:
         self._belief = begin
+        self._doubt = Doubt.of(begin.spread_m, begin.spread_rad)
         self._moves = (0.0, 0.0)
         self._until_s = begin.at_s
         self._count: tuple[float, float, float] | None = None  # its own count of way and turn at the last reading, when
-        self._counted_from = begin
+        self._counted_from = (begin, self._doubt)
+        self._commanded: tuple[float, float] | None = (0.0, 0.0)  # way and turn until the first count
         self._sighted_s = -math.inf
         self._past = deque([(begin.at_s, begin.pose)], maxlen=REMEMBERED)
 
@@ -131,26 +135,28 @@ class DeadReckoning:
     def counts(self, way_m: float, turned_rad: float, at_s: float) -> None:
         """Take the robot's own count of its way and turn since it was switched on, in place of the commanded ones.
 
-        The first count, the first after a sighting, and one that no robot can have reached, begin a new series.
+        The first count, the first after a sighting, and one that no robot can have reached, begin a new series. But a
+        first count of no more than was commanded since the begin has counted since the begin.
         """
         if not _are_sane(FARTHEST_M, way_m, turned_rad):
             return
         self._advance(at_s)
-        now, before, from_there = self._belief, self._count, self._counted_from
+        now, before = self._belief, self._count
+        if self._commanded is not None:
+            way, turn = self._commanded
+            if abs(way_m) <= way + ROUND_M and abs(turned_rad) <= turn + ROUND_RAD:
+                before = (0.0, 0.0, self._counted_from[0].at_s)
+            self._commanded = None
         if before is not None:
             way_m_since, turned_since, passed_s = way_m - before[0], turned_rad - before[1], now.at_s - before[2]
             may_s = passed_s + COMMAND_TIMEOUT_S
             if abs(way_m_since) <= FASTEST_M_S * may_s and abs(turned_since) <= MOST_RAD_S * may_s:
-                grown = _grown(from_there, way_m_since, turned_since, now.at_s)
-                self._belief = Belief(
-                    grown.pose,
-                    now.at_s,
-                    max(grown.spread_m, now.spread_m),
-                    max(grown.spread_rad, now.spread_rad),
-                    now.source,
-                )
+                self._belief, self._doubt = self._counted_from
+                self._go(way_m_since, turned_since, now.at_s)
+                self._widen(now.spread_m, now.spread_rad)
+                self._belief = replace(self._belief, source=now.source)
                 self._remember()
-        self._count, self._counted_from = (way_m, turned_rad, now.at_s), self._belief
+        self._count, self._counted_from = (way_m, turned_rad, now.at_s), (self._belief, self._doubt)
 
     def sighted(self, pose: FloorPose, spread_m: float, spread_rad: float, at_s: float) -> None:
         """Take the pose that a landmark showed, and add the motion since ``at_s``.
@@ -165,21 +171,36 @@ class DeadReckoning:
         now, then = self._belief, self._at(at_s)
         seen = pose.after(then, now.pose)
         self._belief = Belief(seen, now.at_s, spread_m, min(math.pi, spread_rad), PoseSource.LANDMARK)
-        self._count, self._sighted_s = None, now.at_s
+        self._doubt = Doubt.of(self._belief.spread_m, self._belief.spread_rad)
+        self._count, self._commanded, self._sighted_s = None, None, now.at_s
         self._past.clear()
         self._remember()
 
     def _loses(self, spread_m: float, spread_rad: float) -> None:
-        now = self._belief
-        self._belief = Belief(
-            now.pose,
-            now.at_s,
-            min(FARTHEST_M, now.spread_m + spread_m),
-            min(math.pi, now.spread_rad + spread_rad),
-            now.source,
-        )
+        self._doubt = self._doubt.larger(spread_m, spread_rad)
+        self._widen(math.hypot(self._belief.spread_m, spread_m), math.hypot(self._belief.spread_rad, spread_rad))
+        self._commanded = None
         if self._count is not None:
-            self._counted_from = self._belief
+            self._counted_from = (self._belief, self._doubt)
+
+    def _go(self, way_m: float, turned_rad: float, at_s: float) -> None:
+        """Add a way along an arc."""
+        before = self._belief
+        pose, way, turn = before.pose.moved(way_m, turned_rad), abs(way_m), abs(turned_rad)
+        doubted_rad2 = self._doubt.hh
+        self._doubt = self._doubt.moved(pose.x_m - before.pose.x_m, pose.y_m - before.pose.y_m, way, turn)
+        self._belief = replace(before, pose=pose, at_s=at_s)
+        spread_m = max(before.spread_m + LEAST_SHARE * way, self._doubt.spread_m)
+        self._widen(spread_m, math.sqrt(before.spread_rad**2 + self._doubt.hh - doubted_rad2))
+
+    def _widen(self, spread_m: float, spread_rad: float) -> None:
+        """Be at least as unsure as this."""
+        now = self._belief
+        self._belief = replace(
+            now,
+            spread_m=min(FARTHEST_M, max(now.spread_m, spread_m)),
+            spread_rad=min(math.pi, max(now.spread_rad, spread_rad)),
+        )
 
     def _advance(self, now_s: float) -> None:
         before = self._belief
@@ -187,9 +208,12 @@ class DeadReckoning:
             return
         lasted_s = max(0.0, min(now_s, self._until_s) - before.at_s)
         forward_m_s, turn_rad_s = self._moves
-        self._belief = _grown(before, forward_m_s * lasted_s, turn_rad_s * lasted_s, now_s)
+        way_m, turned_rad = forward_m_s * lasted_s, turn_rad_s * lasted_s
+        self._go(way_m, turned_rad, now_s)
+        if self._commanded is not None:
+            self._commanded = (self._commanded[0] + abs(way_m), self._commanded[1] + abs(turned_rad))
         if now_s - self._sighted_s > SIGHT_LASTS_S and any(self._moves) and lasted_s:
-            self._belief = _by_reckoning(self._belief)
+            self._belief = replace(self._belief, source=PoseSource.DEAD_RECKONING)
         if now_s >= self._until_s:
             self._moves = (0.0, 0.0)
         self._remember()
@@ -216,18 +240,6 @@ class DeadReckoning:
                 )
             before_s, before = after_s, after
         return before
-
-
-def _grown(before: Belief, way_m: float, turned_rad: float, at_s: float) -> Belief:
-    """Return the belief after this way and turn: an error of the heading becomes one of the place on the way."""
-    way, turn = abs(way_m), abs(turned_rad)
-    spread_rad = min(math.pi, before.spread_rad + TURN_SHARE * turn + HEADING_RAD_PER_M * way)
-    spread_m = min(FARTHEST_M, before.spread_m + (WAY_SHARE + min(1.0, spread_rad)) * way)
-    return Belief(before.pose.moved(way_m, turned_rad), at_s, spread_m, spread_rad, before.source)
-
-
-def _by_reckoning(belief: Belief) -> Belief:
-    return Belief(belief.pose, belief.at_s, belief.spread_m, belief.spread_rad)
 
 
 def _are_sane(most: float, *numbers: float) -> bool:

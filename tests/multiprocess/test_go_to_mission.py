@@ -1,4 +1,4 @@
-"""A Scout goes to a place and home by dead reckoning, in processes of their own; the simulated world tells the truth."""
+"""A Scout goes out and home by dead reckoning, in processes of their own; the simulated world tells the truth."""
 
 from __future__ import annotations
 

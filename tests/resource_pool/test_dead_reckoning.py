@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from resource_pool.begin_places import read_begins
 from resource_pool.dead_reckoning import REMEMBERED_S, Belief, DeadReckoning, FloorPose
+from resource_pool.doubt import Doubt
 from resource_pool.floor_plans import before_board, board, sighted_from
 from resource_pool.localization import FloorPlan, LandmarkSighting, Pose, PoseSource
 from resource_pool.messages import COMMAND_TIMEOUT_S
@@ -195,6 +196,17 @@ def test_a_robots_own_count_replaces_the_commanded_way(
     assert are_near(robot.believe(at_s).pose, expected)
 
 
+def test_a_first_count_of_less_than_was_commanded_has_counted_since_the_begin() -> None:
+    """A robot that starts slowly, and whose first answer comes late."""
+    slow, other = DeadReckoning(BEGIN), DeadReckoning(BEGIN)
+    for robot in (slow, other):
+        robot.moves(0.2, 0.4, 0.0)
+    slow.counts(0.03, 0.1, 0.5)
+    assert are_near(slow.believe(0.5).pose, HERE.moved(0.03, 0.1))
+    other.counts(7.03, 0.1, 0.5)
+    assert are_near(other.believe(0.5).pose, HERE.moved(0.1, 0.2))
+
+
 def test_a_count_that_begins_anew_moves_nothing() -> None:
     robot = DeadReckoning(BEGIN)
     robot.counts(500.0, 3.0, 1.0)
@@ -222,6 +234,32 @@ def test_time_never_runs_backwards(events: list[tuple[float, Event]]) -> None:
         event(robot, at_s)
         newest_s = max(newest_s, at_s)
         assert robot.believe(-9.0).at_s == newest_s
+
+
+# ---------------------------------------------------------------------- doubt
+def test_an_error_of_the_heading_becomes_one_of_the_place_and_goes_on_the_way_back() -> None:
+    begin = Doubt.of(0.0, 0.1)
+    away = begin.moved(3.0, 4.0, 0.0, 0.0)
+    assert away.spread_m == pytest.approx(5.0 * 0.1)
+    assert away.moved(-3.0, -4.0, 0.0, 0.0).spread_m == pytest.approx(0.0, abs=1e-6)
+
+
+@given(
+    st.floats(0, 1),
+    st.floats(0, 1),
+    st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(0, 3)), max_size=10),
+)
+def test_a_doubt_stays_one_of_places_and_directions(
+    spread_m: float, spread_rad: float, ways: list[tuple[float, float, float]]
+) -> None:
+    doubt = Doubt.of(spread_m, spread_rad)
+    for x_m, y_m, turned_rad in ways:
+        before, doubt = doubt, doubt.moved(x_m, y_m, math.hypot(x_m, y_m), turned_rad)
+        assert doubt.spread_rad >= before.spread_rad
+        assert doubt.xx >= -1e-9
+        assert doubt.yy >= -1e-9
+        assert doubt.xy**2 <= doubt.xx * doubt.yy + 1e-6
+        assert doubt.larger(0.5, 0.1).spread_m > doubt.spread_m
 
 
 # ---------------------------------------------------------------------- landmarks

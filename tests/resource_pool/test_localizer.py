@@ -210,7 +210,7 @@ def test_a_jump_makes_the_spread_larger() -> None:
         async with up(mission()) as running:
             applied(running, "jump")
             await running.clock.sleep_s(0.1)
-            assert (await believed(running)).spread_m == pytest.approx(PLACED_M + JUMP_M)
+            assert (await believed(running)).spread_m == pytest.approx(math.hypot(PLACED_M, JUMP_M))
 
     run_virtual(scene())
 

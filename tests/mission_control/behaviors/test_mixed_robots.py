@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from behaviors_at_work import EXAMPLES, at_work, hear, pose, wait_until
+from errands import errand
 
 from backbone.bus.clock import run_virtual
 from backbone.mission.reader import read_mission
@@ -30,6 +31,10 @@ def test_one_behavior_patrols_with_a_rover_and_with_a_scout_on_one_radio() -> No
             assert world["packets_for_no_robot"] == world["stale_packets"] == 0
 
     run_virtual(main())
+
+
+def test_a_rover_goes_out_and_home_by_dead_reckoning() -> None:
+    run_virtual(errand(MIXED, "rover1", "rover", (6.0, 4.0)))
 
 
 @pytest.mark.processes

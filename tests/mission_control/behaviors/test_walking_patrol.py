@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from behaviors_at_work import EXAMPLES, at_work, hear, pose, wait_until
+from errands import errand
 
 from backbone.bus.clock import run_virtual
 from backbone.mission.reader import read_mission
@@ -39,6 +40,10 @@ def patrols(rounds: int) -> None:
 
 def test_one_behavior_patrols_with_a_walker_and_with_a_scout_on_one_radio() -> None:
     patrols(1)
+
+
+def test_the_walker_goes_out_and_home_by_dead_reckoning() -> None:
+    run_virtual(errand(WALKER, "walker1", "walker", (4.0, 3.0)))
 
 
 @pytest.mark.slow
