@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import msgspec
@@ -69,6 +70,7 @@ class BodyView(msgspec.Struct, frozen=True):
         trail: Where it was, oldest first: x and y in turn.
         sees_rad: Angle of view of its camera while its holder gets pictures; 0: nobody sees through it.
         link: How its commands go over the radio, for people; empty: not known.
+        does: What its holder does with it, for people: an order of any operator too; empty: nobody has it.
     """
 
     name: str
@@ -83,6 +85,7 @@ class BodyView(msgspec.Struct, frozen=True):
     trail: list[float]
     sees_rad: float
     link: str
+    does: str
 
 
 @dataclass(slots=True)
@@ -155,8 +158,12 @@ class MapBoard:
 
     def views(self, now_s: float) -> list[BodyView]:
         """Return the bodies, sorted by name."""
-        robots = {rc.rc: rc for rc in (self._picture.schedule.rcs if self._picture.schedule else []) if rc.is_robot}
-        return [self._body(track, robots.get(name), now_s) for name, track in sorted(self._tracks.items())]
+        schedule = self._picture.schedule
+        if schedule is None or not self._tracks:
+            return [self._body(track, None, {}, now_s) for _, track in sorted(self._tracks.items())]
+        robots = {rc.rc: rc for rc in schedule.rcs if rc.is_robot}
+        owners = {request.arc: request.owner for request in schedule.requests}
+        return [self._body(track, robots.get(name), owners, now_s) for name, track in sorted(self._tracks.items())]
 
     def where(self, body: str, at_s: float) -> Stand | None:
         """Return where a body was at a time not long ago, by the pose nearest in time; None: it has no place."""
@@ -206,7 +213,7 @@ class MapBoard:
         if floor != self._floor:
             self._floor = floor
 
-    def _body(self, track: _Track, robot: RcView | None, now_s: float) -> BodyView:
+    def _body(self, track: _Track, robot: RcView | None, owners: Mapping[str, str], now_s: float) -> BodyView:
         pose = track.now
         age_s = max(0.0, now_s - pose.at_s)
         is_stale = age_s > STALE_S
@@ -223,6 +230,7 @@ class MapBoard:
             trail=[round(one, 2) for point in track.trail for one in point],
             sees_rad=self._sees_rad(robot) if robot is not None else 0.0,
             link=self._link(robot) if robot is not None else "",
+            does=self._does(robot, owners) if robot is not None else "",
         )
 
     def _sees_rad(self, robot: RcView) -> float:
@@ -238,6 +246,12 @@ class MapBoard:
         at = [address(Subsystem.RESOURCE_POOL, holder.arc) for holder in robot.holders]
         arcs = [self._picture.components[arc] for arc in at if arc in self._picture.components]
         return any(arc.type in self._types and self._types[arc.type].abilities.gives_pictures for arc in arcs)
+
+    def _does(self, robot: RcView, owners: Mapping[str, str]) -> str:
+        """Return the activity of the decision process that holds the robot, in its own words."""
+        components = self._picture.components
+        there = [components.get(owners.get(holder.arc, "")) for holder in robot.holders]
+        return ", ".join(filter(None, (self._picture.people.doing(one) for one in there if one is not None)))
 
     def _link(self, robot: RcView) -> str:
         return self._links.radio_line(robot.holders[0].arc) if robot.holders else ""

@@ -83,6 +83,14 @@ def test_what_its_radio_loses_stands_with_the_robot() -> None:
     assert body(made, 8.0).link == "radio: 2 packets late or lost"
 
 
+def test_what_the_holder_of_a_robot_does_stands_with_the_robot_whoever_ordered_it() -> None:
+    made = team(pose(8.0, 1.0), pose(8.0, 1.0, body="scout2"))
+    assert body(made, 8.0).does == ""
+    made.apply(Heard(8.0, component("mission_control/watch1", "go_to", feedback="goes to 3, 2: 1.4 m left")))
+    assert body(made, 8.0).does == "goes to 3, 2: 1.4 m left"
+    assert body(made, 8.0, "scout2").does == "", "nobody holds it"
+
+
 def test_without_a_plan_the_floor_holds_every_body_and_a_plan_takes_its_place() -> None:
     assert team().map.floor is None
     made = team(pose(8.0, 3.4, 0.2))

@@ -154,7 +154,7 @@ export class RobotMap {
       const body = robots[number];
       chip.setAttribute("aria-pressed", String(this.selected.has(body.name)));
       const spread = body.spread_m > 0 ? `±${body.spread_m.toFixed(2)} m` : "";
-      const about = [body.source, spread, age(body), body.link].filter(Boolean).join(", ");
+      const about = [body.source, spread, age(body), body.link, body.does].filter(Boolean).join(", ");
       if (chip.lastElementChild) set(chip.lastElementChild, about);
     }
   }

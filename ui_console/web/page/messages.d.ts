@@ -66,6 +66,7 @@ export interface BodyView {
   trail: number[];
   sees_rad: number;
   link: string;
+  does: string;
 }
 
 export type Certainty =
