@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from backbone.component.abilities import UNITS, unit_of
 
 AS_SPEED = {"rad/s": "+.1f", "m/s": "+.2f"}  # chosen: a tenth of a turn of a wheel, a centimeter; signs are directions
+SLICE_TOLD_S = 1.0  # chosen: a rest below a second is not worth a number
 
 
 def command_line(word: str, values: Mapping[str, float]) -> str:
@@ -49,3 +50,11 @@ def words_of(name: str) -> str:
     """
     suffix = next((one for one in UNITS if name.endswith(f"_{one}")), "")
     return (name.removesuffix(f"_{suffix}") if suffix else name).replace("_", " ")
+
+
+def slice_end_line(until_s: float, now_s: float) -> str:
+    """Return the remaining seconds of a slice, for people; empty: it has no end, or ends now."""
+    left_s = until_s - now_s
+    if until_s < 0 or abs(left_s) < SLICE_TOLD_S:
+        return ""
+    return f", slice {left_s:.0f} s" if left_s > 0 else ", beyond its slice"

@@ -20,7 +20,7 @@ from backbone.scheduling.views import Why
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop, Suspended
 from ui_console.model import events, views
 from ui_console.model.alarms import AlarmBook
-from ui_console.model.applied import command_line
+from ui_console.model.applied import command_line, slice_end_line
 from ui_console.model.arc_abilities import SLOW, ArcAbilities, Reach
 from ui_console.model.consent import Settled, Sought, Topic
 from ui_console.model.lifting import question_line
@@ -30,7 +30,6 @@ from ui_console.model.team import TeamModel
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
-SLICE_TOLD_S = 1.0  # chosen: a rest below a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 
@@ -173,7 +172,7 @@ class ConsoleModel:
             until_s=held.until_s if held is not None else views.NONE_S,
             taken_because=self._why_lost(self.lost) if self.lost is not None else "",
             applied=command_line(self.applied.command, self.applied.values) if self.applied is not None else "",
-            stop=self.team.robots.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
+            stop=self.team.robots.stop_view(self.robot, now_s, self.user, self._address) if self.mine else None,
             away_since_s=self.team.alarms.away_since_s,
             consent=self.consent(now_s),
             asked=self.asked_line(now_s),
@@ -260,11 +259,10 @@ class ConsoleModel:
         if down_s >= 0:
             mine = f"; {self.robot} is given back there by itself" if self.held is not None else ""
             return f"NO LINK to the mission for {now_s - down_s:.0f} s: nothing can be stopped from here{mine}"
+        if self.mine and (stop := self.team.robots.stop_of(self.robot)) is not None:
+            return f"{self.robot} is STOPPED by {stop.by}{f': {stop.reason}' if stop.reason else ''}"
         if self.held is not None:
-            stop = self.team.robots.stop_of(self.robot)
-            if stop is not None:
-                return f"{self.robot} is STOPPED by {stop.by}{f': {stop.reason}' if stop.reason else ''}"
-            slice_end = _slice_end(self.held.until_s, now_s)
+            slice_end = slice_end_line(self.held.until_s, now_s)
             return f"you hold {self.robot or 'no robot'}{slice_end}"
         if self.asked is None:
             if (given := self.orders.of(self.robot)) is not None:
@@ -389,14 +387,6 @@ def _video(robot: str, seen: deque[events.PictureSeen], now_s: float) -> views.V
     span_s = newest.at_s - seen[0].at_s
     rate_hz = (len(seen) - 1) / span_s if span_s > 0 else 0.0
     return views.VideoView(robot, age_s, rate_hz, max(0.0, newest.at_s - newest.captured_s), age_s > STALE_S)
-
-
-def _slice_end(until_s: float, now_s: float) -> str:
-    """Return the remaining seconds of a slice, for people; empty: it has no end, or ends now."""
-    left_s = until_s - now_s
-    if until_s < 0 or abs(left_s) < SLICE_TOLD_S:
-        return ""
-    return f", slice {left_s:.0f} s" if left_s > 0 else ", beyond its slice"
 
 
 def _question_line(sought: Sought) -> str:

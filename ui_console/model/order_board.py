@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ui_console.model.events import OrderChanged
+from ui_console.model.order_view import OrderView
 from ui_console.model.orders import GivenOrder
-from ui_console.model.views import OrderView
 
 SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 

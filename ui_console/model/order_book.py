@@ -3,8 +3,8 @@
 Laws:
 
 * A robot has at most one order that goes on; a newer one, a touch of the stick and the return of the robot end it.
-* A behavior is removed only when the stick or the behavior of a newer order has the robot, or when nobody wants it any
-  more; so a robot is never free between stick and order.
+* A behavior is removed only when the stick has the robot, when the behavior of a newer order has it or waits for it
+  next, or when nobody wants it any more; so a robot is never free between stick and order.
 * Every behavior that was begun is removed, and removed once.
 * Each order has at most one final state.
 
@@ -135,18 +135,22 @@ class OrderBook:
         return [] if given is None or given.state.is_final else self._become(replace(given, by=by))
 
     def queued(self, number: int) -> list[Instruction]:
-        """Take in that the behavior of this order waits for its robot at the RC manager."""
+        """Take in that the behavior of this order waits for its robot next: stick and earlier orders yield."""
         given = self._given.get(number)
         if given is None or given.state is not OrderState.STARTING:
             return []
-        return [*self._become(replace(given, state=OrderState.WAITING)), Yield(number, given.order)]
+        return [
+            *self._become(replace(given, state=OrderState.WAITING)),
+            Yield(number, given.order),
+            *self._older(given),
+        ]
 
     def runs(self, number: int) -> list[Instruction]:
         """Take in that the behavior has the robot: earlier ones let it go."""
         given = self._given.get(number)
         if given is None or number in self._removing:
             return []
-        older = [self._remove(one.number) for one in self._of(given.order.robot) if one.number < number]
+        older = self._older(given)
         is_new = not given.state.is_final and given.state is not OrderState.RUNNING
         return [*older, *(self._become(replace(given, state=OrderState.RUNNING, why="")) if is_new else [])]
 
@@ -191,6 +195,9 @@ class OrderBook:
     # ------------------------------------------------------------------ within
     def _of(self, robot: str) -> list[GivenOrder]:
         return [one for number, one in self._given.items() if one.order.robot == robot and number not in self._removing]
+
+    def _older(self, given: GivenOrder) -> list[Remove]:
+        return [self._remove(one.number) for one in self._of(given.order.robot) if one.number < given.number]
 
     def _after(self, given: GivenOrder, *, in_front: bool) -> list[Instruction]:
         if given.order.then_release:

@@ -18,6 +18,7 @@ from ui_console.model.orders import Order, OrderKind
 from ui_console.model.profile import Sight
 
 LOCALIZER, SIMULATED_WORLD = "localizer", "simulated_world"
+EQUAL = 1  # chosen: the orders of a console are equals among each other
 NEEDS_PLACES = frozenset({OrderKind.GO_TO, OrderKind.RETURN, OrderKind.FOLLOW})
 
 
@@ -108,8 +109,8 @@ def start_of(
 ) -> Start:
     """Return what starts the behavior of an order.
 
-    Its path is the console's own with one node more: the stick goes before it, the newer of two orders before the
-    older, and both before whatever the console's priority outranks.
+    Its path is the console's own with one node more: the stick goes before it, it goes before whatever the console's
+    priority outranks, and the orders of a console are equals, which have what they share in turns.
 
     Args:
         number: Of the order.
@@ -126,5 +127,5 @@ def start_of(
     elif order.kind is OrderKind.FOLLOW:
         own |= {"target": order.target}
     arc = {"kind": kind, "minimum_runtime_s": runtime_s, "wish": {ROBOT: order.robot}}
-    path = [[component_of(console), priority], [name, number]]
+    path = [[component_of(console), priority], [name, EQUAL]]
     return Start(order.kind.value, name, {**own, "path": path, "arc": arc, "children": [], "keeper": console})

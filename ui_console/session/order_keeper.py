@@ -312,5 +312,11 @@ class OrderKeeper:
 
 
 def _told(payload: Mapping[str, object]) -> str:
-    """Return for people why a behavior finished, as its payload tells."""
-    return str(payload.get("detail") or payload.get("why") or "")
+    """Return for people why a behavior failed, or where it arrived, as its payload tells; empty: it does not."""
+    match payload:
+        case {"detail": str(detail)}:
+            return detail
+        case {"x_m": float(x_m), "y_m": float(y_m)}:
+            return f"at {x_m:.2f}, {y_m:.2f}"
+        case _:
+            return ""

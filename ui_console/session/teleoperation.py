@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable
 from typing import ClassVar
 
 import msgspec
@@ -28,15 +28,14 @@ from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, GiveWish, HaltWish, Motion
 from ui_console.model.lifting import AskLift
-from ui_console.model.orders import GivenOrder, Order
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
 from ui_console.session.controls import Controls
 from ui_console.session.hand_over import AskHandOver, HandOver
 from ui_console.session.kind_finder import KindFinder
-from ui_console.session.observer import Observer
 from ui_console.session.order_keeper import OrderKeeper
+from ui_console.session.order_verbs import OrderVerbs
 from ui_console.session.presence import Presence
 from ui_console.session.stop_ear import StopEar
 from ui_console.session.waiting import Waiting
@@ -44,7 +43,7 @@ from ui_console.session.waiting import Waiting
 log = logging.getLogger(__name__)
 
 
-class Teleoperation(Observer[TeleoperationParameters]):
+class Teleoperation(OrderVerbs):
     """One console.
 
     Args:
@@ -125,42 +124,6 @@ class Teleoperation(Observer[TeleoperationParameters]):
     def is_ready(self) -> bool:
         """True while verbs can be called."""
         return self.state is LifeState.READY
-
-    @property
-    def orders(self) -> Mapping[str, GivenOrder]:
-        """Robot → its order; one that is done, failed or ended keeps its robot for the operator until it is taken."""
-        return self._orders.orders
-
-    def order(self, order: Order) -> int:
-        """Tell a robot to do something by itself; return the order's number; see ``order_group``."""
-        return self.order_group([order])[0]
-
-    def order_group(self, orders: Sequence[Order]) -> list[int]:
-        """Tell robots to do something by themselves, all at once; ``OrderChanged`` shows what becomes of each.
-
-        An order claims its robot with this console's priority, whether the stick holds it or not; a robot in hand stays
-        with the stick until the order's behavior can have it. An earlier order of the robot ends. A held control moves
-        nothing before it was let go; a new press, ``take`` and ``interrupt`` end the order of the robot at the stick.
-
-        Args:
-            orders: One for each robot; without a robot it is for the one at the stick.
-
-        Returns:
-            The number of each order, from 1, unique at this console.
-        """
-        self.touch()
-        self.require_let_go()
-        return self._orders.give(orders)
-
-    def interrupt(self) -> None:
-        """Take the robot at the stick from its order, if one goes on; it comes to rest."""
-        if self._orders.goes_on(self._robot):
-            self._orders.touched(self._robot)
-
-    async def end_order(self, robot: str) -> None:
-        """Give this robot back to the mission, if it has an order; return when its behavior has let it go."""
-        if await self._orders.give_back(robot, f"{self.user} gave it back"):
-            self.acted(OperatorAction.RELEASE, robot, "its order was ended")
 
     def take(self) -> None:
         """Claim the robot unless it is claimed; if its release is under way, right afterwards; its order ends."""
@@ -320,7 +283,6 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     @property
     def _robot(self) -> str:
-        """The robot that the stick is at; empty: any, or none."""
         return self.parameters.robot or self._holding
 
     async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool, wanted: bool) -> None:

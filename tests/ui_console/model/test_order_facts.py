@@ -87,7 +87,7 @@ def test_the_behavior_is_below_its_console_and_wishes_exactly_its_robot() -> Non
         "localizer": "resource_pool/tracker",
         "x_m": 2.0,
         "y_m": 1.5,
-        "path": [["console-7", 100], ["console-7-order-3", 3]],
+        "path": [["console-7", 100], ["console-7-order-3", 1]],
         "arc": {"kind": "drive", "minimum_runtime_s": 5.0, "wish": {"robot": "scout1"}},
         "children": [],
         "keeper": CONSOLE,

@@ -40,10 +40,10 @@ class Operated(RuleBasedStateMachine):
 
     # ------------------------------------------------------------------ the world
     def holder(self, robot: str) -> str | int:
-        """The holder by rank: stick, the newest order, the mission."""
+        """The holder by rank: stick, of equal orders the one that has it already, the mission."""
         if self.has_stick and self.front == robot:
             return STICK
-        return max((number for number, of in self.queued.items() if of == robot), default=MISSION)
+        return min((number for number, of in self.queued.items() if of == robot), default=MISSION)
 
     def do(self, steps: list[Instruction]) -> None:
         for step in steps:

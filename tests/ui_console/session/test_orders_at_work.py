@@ -6,6 +6,7 @@ import asyncio
 import json
 import math
 from collections.abc import Awaitable, Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
 from backbone.placer.messages import Start
 from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
-from resource_pool.arc_client import lift_stop, stop_robot
+from resource_pool.arc_client import AskPose, Pose, lift_stop, stop_robot
 from ui_console.model.driving import MoveWish
 from ui_console.model.events import CommandApplied, ConsoleEvent, GivenBack, OrderChanged, TurnedTo
 from ui_console.model.orders import Order, OrderKind, OrderState, group
@@ -37,9 +38,12 @@ STARTING, RUNNING, WAITING = OrderState.STARTING, OrderState.RUNNING, OrderState
 DONE, FAILED, ENDED = OrderState.DONE, OrderState.FAILED, OrderState.ENDED
 
 
-def patrols() -> MissionDescription:
-    """Return a mission with a patrol of scout1, and a behavior to order under the name of go_to."""
+def patrols(*, is_real: bool = False) -> MissionDescription:
+    """Return a mission with a patrol of scout1, and a behavior to order under the name of go_to, or the real one."""
     mission = read_mission(EXAMPLES / "behaviors.xml")
+    if is_real:
+        behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
+        return mission.model_copy(update={"behaviors": behaviors})
     ahead = ComponentType("go_to", "ordered_behaviors:Ahead", Subsystem.MISSION_CONTROL)
     types = (*(one for one in mission.types if one.name != "go_to"), ahead)
     behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
@@ -118,7 +122,7 @@ async def until_over(running: RunningMission, name: str) -> None:
 Scene = Callable[[Operator], Awaitable[None]]
 
 
-def play(scene: Scene, **parameters: Any) -> None:
+def play(scene: Scene, *, is_real: bool = False, **parameters: Any) -> None:
     async def main() -> None:
         made: list[Teleoperation] = []
         shown: list[ConsoleEvent] = []
@@ -127,7 +131,7 @@ def play(scene: Scene, **parameters: Any) -> None:
             made.append(Teleoperation(launch, bus, clock, show=shown.append, keeps_arc=True, user="anna"))
             return made[-1]
 
-        async with mission_in_one_process(patrols(), consoles={"console": console}) as running:
+        async with mission_in_one_process(patrols(is_real=is_real), consoles={"console": console}) as running:
             operator = Operator(running, made, shown)
             given = {"robot": "scout1", "priority": 100, "minimum_runtime_s": 1.0, **parameters}
             await running.start(Start("console", CONSOLE, given))
@@ -247,7 +251,7 @@ def test_a_newer_order_has_the_robot_right_after_the_older() -> None:
         await anna.until(lambda: anna.console.is_held)
         arcs = [f"{CONSOLE}-{what}" for what in ("order-1-drive", "order-2-drive", "capture")]
         assert anna.grants(since_s=since_s) == arcs
-        assert anna.states() == [STARTING, WAITING, RUNNING, ENDED, STARTING, RUNNING, DONE]
+        assert anna.states() == [STARTING, WAITING, RUNNING, ENDED, STARTING, WAITING, RUNNING, DONE]
 
     play(scene)
 
@@ -384,6 +388,23 @@ def test_an_impossible_order_fails_with_a_remedy_and_the_stick_keeps_its_robot(o
         assert anna.console.orders == {}
 
     play(scene)
+
+
+@pytest.mark.skipif(find_spec("mission_control.behaviors.go_to") is None, reason="no behavior goes to places yet")
+def test_a_robot_is_sent_to_a_place_and_its_order_says_where_it_arrived() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        begin = await anna.running.bus.ask("resource_pool/world", AskPose("scout1"), Pose, within_s=1.0)
+        anna.console.order(Order(OrderKind.GO_TO, "scout1", 2.0, 1.5))
+        await anna.until(lambda: anna.states()[-1] is DONE, within_s=60.0)
+        there = await anna.running.bus.ask("resource_pool/world", AskPose("scout1"), Pose, within_s=1.0)
+        assert math.hypot(there.x_m - 2.0, there.y_m - 1.5) < 0.15, (begin, there)
+        await anna.until(lambda: anna.console.is_held)
+        done = [one.given for one in anna.shown if isinstance(one, OrderChanged) and one.given.state is DONE]
+        assert done[0].why.startswith("at ")
+        assert "simulator" in done[0].by
+
+    play(scene, is_real=True)
 
 
 def run_script(lines: list[str]) -> tuple[int, list[dict[str, Any]]]:
