@@ -3,8 +3,8 @@
 It begins with the places at which the mission file says that the robots stand, listens to what their RCs have them do
 and to what they count themselves, and corrects itself when a behavior sees a landmark. The rules are in
 ``dead_reckoning``; this file has the loop. It keeps its beliefs in a file: a restarted localizer continues from there,
-less sure by the way that a robot can have gone meanwhile, and without the file it is sure of no robot that was
-commanded before.
+less sure by what a robot can have done by the commands that it missed, and without the file it is sure of no robot that
+was commanded before.
 
 In mission.xml: a resource of type ``localizer``, named by behaviors as ``localizer``. Nobody claims it.
 """
@@ -14,7 +14,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections import Counter
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -23,6 +22,7 @@ import msgspec
 from backbone.atomic_file import replace_file
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -41,7 +41,7 @@ from resource_pool.localization import (
     Pose,
     UnknownPlace,
 )
-from resource_pool.messages import Applied, Readings
+from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, Readings
 from resource_pool.rc_readings import watch_readings
 from resource_pool.resource_controller import RcParameters, ResourceController
 from scout_model.description import WorldDescription
@@ -103,16 +103,29 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
         )
 
 
+class Known(msgspec.Struct, frozen=True):
+    """What is known of a robot.
+
+    Attributes:
+        number: Number of commands that its RC had applied.
+        is_moving: A motion was in force.
+    """
+
+    belief: Belief
+    number: int
+    is_moving: bool
+
+
 class Memory(msgspec.Struct, frozen=True):
     """What a localizer keeps for its next life.
 
     Attributes:
         at_s: Mission time.
-        beliefs: Robot → belief.
+        robots: Robot → what is known of it.
     """
 
     at_s: float
-    beliefs: dict[str, Belief]
+    robots: dict[str, Known]
 
 
 class Localizer(ResourceController[LocalizerParameters]):
@@ -127,15 +140,14 @@ class Localizer(ResourceController[LocalizerParameters]):
         self._plan = self.parameters.plan()
         self._homes = self.parameters.begins()
         self._file = Path(launch.run_directory) / "localizers" / self.name if launch.run_directory else None
-        kept = _read(self._file)
-        self._is_first_life = kept is None
-        self._robots = {name: DeadReckoning(self._first(name, kept)) for name in self._homes}
+        self._before = _read(self._file)
+        self._robots: dict[str, DeadReckoning] = {}
+        self._numbers = dict.fromkeys(self._homes, 0)
         self._published: dict[str, Pose] = {}
         self._news = asyncio.Event()
         self._kept_s = -math.inf
         self._is_kept = True
-        self._heard: Counter[str] = Counter()
-        self._sightings = self._poses = 0
+        self._heard = self._sightings = self._poses = 0
 
     async def connect(self) -> None:
         """Listen to robots' RCs and to behaviors that see landmarks."""
@@ -145,6 +157,7 @@ class Localizer(ResourceController[LocalizerParameters]):
         watch_readings(self.bus, self._counted)
         sights = f"{Subsystem.MISSION_CONTROL}/*"
         self.bus.subscribe(sights, Conversation.SIGHTINGS, LandmarkSighting, self._sighted)
+        await asyncio.gather(*map(self._begin, self._homes))
 
     async def serve(self) -> None:
         """Publish each pose that changes, and keep the beliefs."""
@@ -165,7 +178,7 @@ class Localizer(ResourceController[LocalizerParameters]):
 
     def statistics(self) -> dict[str, float]:
         """Count what was heard and published, too."""
-        own = {"motions_heard": self._heard.total(), "sightings_taken": self._sightings, "poses_published": self._poses}
+        own = {"motions_heard": self._heard, "sightings_taken": self._sightings, "poses_published": self._poses}
         return {**super().statistics(), **own, "robots_known": len(self._robots)}
 
     # ------------------------------------------------------------------ what it hears
@@ -173,7 +186,7 @@ class Localizer(ResourceController[LocalizerParameters]):
         told, robot = envelope.body, self._robots.get(envelope.body.rc)
         if robot is None or envelope.source != address(Subsystem.RESOURCE_POOL, told.rc):
             return
-        self._heard[told.rc] += 1
+        self._heard, self._numbers[told.rc] = self._heard + 1, told.number
         at_s = self._plausible_s(told.at_s)
         if told.command == Halt.word():
             robot.moves(0.0, 0.0, at_s)
@@ -225,7 +238,6 @@ class Localizer(ResourceController[LocalizerParameters]):
         return UnknownPlace(f"{self.name} knows no place of {body!r}; the robots that it knows: {known}")
 
     async def _publish_when_changed(self) -> None:
-        await self._doubt_what_was_missed()
         while True:
             await self._news.wait()
             self._news.clear()
@@ -247,40 +259,52 @@ class Localizer(ResourceController[LocalizerParameters]):
             self._keep(now_s)
 
     # ------------------------------------------------------------------ from life to life
-    def _first(self, name: str, kept: Memory | None) -> Belief:
-        """Return the first belief about a robot: where it is put, or what an earlier life kept, less sure by now."""
-        now_s = self.clock.now_s()
-        if kept is None:
-            return Belief(self._homes[name], now_s, PLACED_M, PLACED_RAD)
-        if name not in kept.beliefs:
-            return Belief(self._homes[name], now_s, LOST_M, math.pi)
-        was, passed_s = kept.beliefs[name], max(0.0, now_s - kept.at_s)
-        spread_m, spread_rad = was.spread_m + UNSEEN_M_S * passed_s, was.spread_rad + UNSEEN_RAD_S * passed_s
-        return Belief(was.pose, now_s, min(LOST_M, spread_m), min(math.pi, spread_rad))
+    async def _begin(self, name: str) -> None:
+        """Begin with a robot, after a look at how much its RC has applied without this life of the localizer."""
+        try:
+            rc = address(Subsystem.RESOURCE_POOL, name)
+            applied: int | None = (await self.bus.ask(rc, AskRc(), RcState, within_s=FIRST_REPLY_S)).applied
+        except (LinkError, Refusal):  # it does not run: at the begin of a mission it has applied nothing
+            applied = None
+        first = self._first(name, applied)
+        self._robots[name], self._numbers[name] = DeadReckoning(first), applied or 0
+        if first.spread_m >= LOST_M:
+            self.publish_event(name, f"is at a place that {self.name} does not know", LogLevel.WARNING)
 
-    async def _doubt_what_was_missed(self) -> None:
-        """Without a memory, be sure of no robot whose RC has applied commands before."""
-        if not self._is_first_life:
-            return
-        for name in self._homes:
-            try:
-                rc = address(Subsystem.RESOURCE_POOL, name)
-                state = await self.bus.ask(rc, AskRc(), RcState, within_s=FIRST_REPLY_S)
-            except (LinkError, Refusal):  # it does not run yet, so it has applied nothing
-                continue
-            if state.applied > self._heard[name]:
-                lost = Belief(self._homes[name], self.clock.now_s(), LOST_M, math.pi)
-                self._robots[name] = DeadReckoning(lost)
-                self.publish_event(name, "is at an unknown place: it was moved before this localizer began")
+    def _first(self, name: str, applied: int | None) -> Belief:
+        """Return the first belief: where the robot is put, or what an earlier life kept, less sure by what it missed.
+
+        Args:
+            name: The robot.
+            applied: Number of commands that its RC has applied; None: it does not run.
+        """
+        now_s, before = self.clock.now_s(), self._before
+        if before is None and not applied:
+            return Belief(self._homes[name], now_s, PLACED_M, PLACED_RAD)
+        if before is None or name not in before.robots:
+            return Belief(self._homes[name], now_s, LOST_M, math.pi)
+        was, missed_s = before.robots[name], max(0.0, now_s - before.at_s)
+        if applied is not None and applied >= was.number:
+            missed_s = min(missed_s, (applied - was.number + was.is_moving) * COMMAND_TIMEOUT_S)
+        spread_m, spread_rad = was.belief.spread_m, was.belief.spread_rad
+        return Belief(
+            was.belief.pose,
+            now_s,
+            min(LOST_M, spread_m + UNSEEN_M_S * missed_s),
+            min(math.pi, spread_rad + UNSEEN_RAD_S * missed_s),
+        )
 
     def _keep(self, now_s: float) -> None:
         self._kept_s, self._is_kept = now_s, True
         if self._file is None:
             return
-        memory = Memory(now_s, {name: robot.believe(now_s) for name, robot in self._robots.items()})
+        robots = {
+            name: Known(robot.believe(now_s), self._numbers[name], robot.is_moving)
+            for name, robot in self._robots.items()
+        }
         try:
             self._file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            replace_file(self._file, msgspec.msgpack.encode(memory), is_lasting=False)
+            replace_file(self._file, msgspec.msgpack.encode(Memory(now_s, robots)), is_lasting=False)
         except OSError as error:
             log.warning("%s: the beliefs are not kept: %s", self._file, error)
 

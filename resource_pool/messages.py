@@ -118,6 +118,7 @@ class Applied(Message, frozen=True):
         at_s: Mission time.
         command: The command's ``word``.
         values: Applied values, clipped to the hardware's limits, with units in their names.
+        number: Number of commands that the RC has applied until then; only in publications.
     """
 
     rc: Mention
@@ -125,6 +126,7 @@ class Applied(Message, frozen=True):
     at_s: Instant
     command: Mention
     values: Annotated[dict[Mention, Measure], FEW] = {}
+    number: Count = 0
 
 
 ArcQuestion = GiveCommand | WantIdle | WantRuntime | WantLonger | Release | AskArc

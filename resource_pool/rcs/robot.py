@@ -152,7 +152,8 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Publish what was applied, too, with the motion that it makes."""
         done = await super().command(asked)
         if isinstance(done, Applied):
-            told = msgspec.structs.replace(done, values={**done.values, **self.motion_of(done.values)})
+            values = {**done.values, **self.motion_of(done.values)}
+            told = msgspec.structs.replace(done, values=values, number=self.applied)
             self.bus.publish(self.address, Conversation.MOTIONS, told)
         return done
 
@@ -272,7 +273,7 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     def _tell_halted(self, hold: Hold) -> None:
         """Publish that the robot was halted without a command."""
-        halted = Applied(self.name, hold.epoch, self.clock.now_s(), Halt.word())
+        halted = Applied(self.name, hold.epoch, self.clock.now_s(), Halt.word(), number=self.applied)
         self.bus.publish(self.address, Conversation.MOTIONS, halted)
 
     def _publish_stop(self) -> None:

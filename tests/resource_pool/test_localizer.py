@@ -33,8 +33,8 @@ from resource_pool.localization import (
     ShapeKind,
     UnknownPlace,
 )
-from resource_pool.localizer import LOST_M, PLACED_M, Localizer, LocalizerParameters
-from resource_pool.messages import Applied, Readings
+from resource_pool.localizer import LOST_M, PLACED_M, UNSEEN_M_S, Localizer, LocalizerParameters
+from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, Readings
 
 LOCALIZER, WORLD, SCOUT = "resource_pool/localizer", "resource_pool/world", "resource_pool/scout1"
 
@@ -259,7 +259,10 @@ def test_without_a_memory_a_restarted_localizer_is_sure_of_no_robot_that_was_mov
     run_virtual(scene())
 
 
-def test_a_restarted_localizer_continues_from_what_it_kept_less_sure_by_the_time_between(tmp_path: Path) -> None:
+@pytest.mark.parametrize("missed", [0, 3, 1000])
+def test_a_restarted_localizer_continues_from_what_it_kept_less_sure_by_what_it_missed(
+    tmp_path: Path, missed: int
+) -> None:
     async def scene() -> None:
         async with up(mission()) as running:
             async with another(running, tmp_path) as other:
@@ -270,12 +273,15 @@ def test_a_restarted_localizer_continues_from_what_it_kept_less_sure_by_the_time
                 await running.clock.sleep_s(2.0)
                 before = await ask(running, AskPose("scout1"), Pose, other)
                 assert before.y_m == pytest.approx(1.2)
+            scout: Any = running.component("scout1")
+            scout.applied += missed
             await running.clock.sleep_s(3.0)
             async with another(running, tmp_path) as other:
                 after = await ask(running, AskPose("scout1"), Pose, other)
                 assert error_m(before, after) == 0
-                assert after.spread_m > before.spread_m + 3.0 * 0.5
-                assert after.spread_rad > before.spread_rad
+                can_be_s = min(after.at_s - before.at_s, missed * COMMAND_TIMEOUT_S)
+                assert after.spread_m == pytest.approx(before.spread_m + UNSEEN_M_S * can_be_s, abs=0.6)
+                assert (after.spread_m > before.spread_m) == (after.spread_rad > before.spread_rad) == (missed > 0)
                 home = await ask(running, AskHome("scout1"), Pose, other)
                 assert (home.x_m, home.y_m) == (1, 1)
 
