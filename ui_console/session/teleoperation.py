@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import ClassVar
 
 import msgspec
@@ -28,6 +28,7 @@ from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, GiveWish, HaltWish, Motion
 from ui_console.model.lifting import AskLift
+from ui_console.model.orders import Order
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
