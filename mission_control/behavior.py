@@ -88,6 +88,13 @@ class NotAChild(Refusal):
     remedy = "Report to the behavior named before you in your path."
 
 
+class NotYourOrder(Refusal):
+    """The sender is not the console that ordered this behavior."""
+
+    code = "behavior.not_your_order"
+    remedy = "Take the robot at a console; behaviors of the mission are stopped by 'scout-backbone stop'."
+
+
 B = TypeVar("B", bound=BehaviorParameters)
 
 
@@ -227,6 +234,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             case AskBehavior():
                 return self.behavior_state()
             case BreakOff():
+                if asked.source != self.parameters.keeper:
+                    raise NotYourOrder(f"{asked.source} did not order {self.name}", behavior=self.name)
                 self.finish(BehaviorStatus.FAILURE, {"detail": "broken off by its operator"})
                 return BrokenOff()
             case body if isinstance(body, ArcNotice):

@@ -16,7 +16,9 @@ from backbone.bus.clock import run_virtual
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component_database.messages import ComponentType
+from backbone.errors import Refusal, code_of
 from backbone.keys import Conversation
+from backbone.mission.behavior_reports import BreakOff, BrokenOff
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.mission_log.operators import OperatorActed, OperatorAction
@@ -39,13 +41,13 @@ DONE, FAILED, ENDED = OrderState.DONE, OrderState.FAILED, OrderState.ENDED
 
 
 def patrols(*, is_real: bool = False) -> MissionDescription:
-    """Return a mission with a patrol of scout1, and a behavior to order under the name of go_to, or the real one."""
+    """Return a mission with a patrol of scout1; unless it is real, another behavior is go_to, and none is follow."""
     mission = read_mission(EXAMPLES / "behaviors.xml")
     if is_real:
         behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
         return mission.model_copy(update={"behaviors": behaviors})
     ahead = ComponentType("go_to", "ordered_behaviors:Ahead", Subsystem.MISSION_CONTROL)
-    types = (*(one for one in mission.types if one.name != "go_to"), ahead)
+    types = (*(one for one in mission.types if one.name not in ("go_to", "follow")), ahead)
     behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
     return mission.model_copy(update={"behaviors": behaviors, "types": types})
 
@@ -366,6 +368,20 @@ def test_a_console_that_answers_nothing_loses_its_orders() -> None:
     play(scene)
 
 
+def test_only_the_console_of_an_order_can_break_it_off() -> None:
+    async def scene(anna: Operator) -> None:
+        await anna.holds()
+        await anna.ordered()
+        for behavior in (f"{CONSOLE}-order-1", "patrol-scout1"):
+            with pytest.raises(Refusal) as refused:
+                await anna.running.bus.ask(f"mission_control/{behavior}", BreakOff(), BrokenOff, within_s=1.0)
+            assert code_of(refused.value) == "behavior.not_your_order"
+        await anna.running.clock.sleep_s(1.0)
+        assert anna.state() is RUNNING
+
+    play(scene)
+
+
 async def never(_asked: Any) -> Any:
     await asyncio.Event().wait()
 
@@ -382,7 +398,8 @@ def test_an_impossible_order_fails_with_a_remedy_and_the_stick_keeps_its_robot(o
         await anna.holds()
         anna.console.order(order)
         await anna.state_becomes(FAILED, order.robot)
-        assert why in anna.shown[-1].given.why if isinstance(anna.shown[-1], OrderChanged) else True
+        [failed] = [one.given for one in anna.shown if isinstance(one, OrderChanged) and one.given.state is FAILED]
+        assert why in failed.why
         await anna.running.clock.sleep_s(1.0)
         assert anna.console.is_held
         assert anna.console.orders == {}
