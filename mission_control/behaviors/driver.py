@@ -8,10 +8,21 @@ from typing import ClassVar, TypeVar
 
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.naming import Subsystem, address
+from backbone.wire import UnknownMessage
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.behaviors.motion import FloorPoint, Motion, Position
 from mission_control.messages import BehaviorStatus
-from resource_pool.arc_client import ArcClient, AskHome, AskPose, EmergencyStopped, NoSuchAction, Pose, SwappedOut
+from resource_pool.arc_client import (
+    ArcClient,
+    AskFloorPlan,
+    AskHome,
+    AskPose,
+    EmergencyStopped,
+    FloorPlan,
+    NoSuchAction,
+    Pose,
+    SwappedOut,
+)
 
 log = logging.getLogger(__name__)
 
@@ -97,9 +108,15 @@ class Driver(Behavior[D]):
         home = await self._ask_localizer(localizer, AskHome(robot))
         return FloorPoint(home.x_m, home.y_m)
 
+    async def room(self, localizer: str) -> FloorPlan | None:
+        """Return the plan of the floor; None: the localizer has none; raises ``LinkError`` as ``locate``."""
+        try:
+            return await self.bus.ask(_tracker(localizer), AskFloorPlan(), FloorPlan, within_s=LOCALIZE_WITHIN_S)
+        except UnknownMessage:
+            return None
+
     async def _ask_localizer(self, localizer: str, question: AskPose | AskHome) -> Pose:
-        tracker = localizer if "/" in localizer else address(Subsystem.RESOURCE_POOL, localizer)
-        return await self.bus.ask(tracker, question, Pose, within_s=LOCALIZE_WITHIN_S)
+        return await self.bus.ask(_tracker(localizer), question, Pose, within_s=LOCALIZE_WITHIN_S)
 
     async def start(self) -> None:
         """Fail at once without an ARC; see ``BehaviorHooks.start``."""
@@ -135,3 +152,7 @@ class Driver(Behavior[D]):
         why: dict[str, object] = {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}
         self.report(f"gives up: {refusal.detail}")
         self.finish(BehaviorStatus.FAILURE, why)
+
+
+def _tracker(localizer: str) -> str:
+    return localizer if "/" in localizer else address(Subsystem.RESOURCE_POOL, localizer)

@@ -31,6 +31,13 @@ class NotThere(Refusal):
     remedy = "See that the straight way is free, give it more time, or go there in several legs."
 
 
+class OutsideRoom(Refusal):
+    """The place is outside the room."""
+
+    code = "go_to.outside"
+    remedy = "Choose a place inside the room."
+
+
 class WayParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of behaviors that go to a place.
 
@@ -81,7 +88,7 @@ W = TypeVar("W", bound=WayParameters)
 class Goer(Driver[W]):
     """Base class of behaviors that go to a place: derive and override ``place``."""
 
-    never = Driver.never | {Lost.code}
+    never = Driver.never | {Lost.code, OutsideRoom.code}
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -137,8 +144,19 @@ class GoTo(Goer[GoToParameters]):
     parameters_type = GoToParameters
 
     async def place(self, robot: str) -> FloorPoint:  # noqa: ARG002  the same for all
-        """Return the place of the parameters; see ``Goer``."""
-        return FloorPoint(self.parameters.x_m, self.parameters.y_m)
+        """Return the place of the parameters; see ``Goer``.
+
+        Raises:
+            OutsideRoom: The localizer has a plan of the floor, and the place is not on it.
+        """
+        place = FloorPoint(self.parameters.x_m, self.parameters.y_m)
+        room = await self.room(self.parameters.localizer)
+        if room is not None and room.width_m > 0 and room.depth_m > 0:
+            is_inside = 0 <= place.x_m <= room.width_m and 0 <= place.y_m <= room.depth_m
+            if not is_inside:
+                detail = f"{_spoken(place)} is outside the room of {room.width_m:g} by {room.depth_m:g} m"
+                raise OutsideRoom(detail)
+        return place
 
 
 def _spoken(place: FloorPoint) -> str:

@@ -18,6 +18,7 @@ from ui_console.model.orders import Order, OrderKind
 from ui_console.model.profile import Sight
 
 LOCALIZER, SIMULATED_WORLD = "localizer", "simulated_world"
+FARTHEST_M = 1000.0  # chosen: the largest room
 EQUAL = 1  # chosen: the orders of a console are equals among each other
 NEEDS_PLACES = frozenset({OrderKind.GO_TO, OrderKind.RETURN, OrderKind.FOLLOW})
 
@@ -71,7 +72,8 @@ def kind_for(order: Order, types: Sequence[ComponentType], resources: Collection
     """Return the kind of ARC that the order's behavior claims: one with pictures to watch, else one that drives.
 
     Raises:
-        CannotOrder: No robot is named, it cannot, or the mission knows no such behavior.
+        CannotOrder: No robot is named, it cannot with this hardware, the place is none, or the mission knows no such
+            behavior.
         NoArcKind: No robot has this name.
     """
     if not order.robot:
@@ -79,6 +81,9 @@ def kind_for(order: Order, types: Sequence[ComponentType], resources: Collection
     names = [one.name for one in types]
     if order.kind not in names:
         raise CannotOrder(f"this mission has no behavior {order.kind}{did_you_mean(order.kind, names)}")
+    if not max(abs(order.x_m), abs(order.y_m)) <= FARTHEST_M:
+        place = f"{order.x_m:g}, {order.y_m:g}"
+        raise CannotOrder(f"{place} is no place in a room", remedy=f"Give meters, at most {FARTHEST_M:g}.")
     watches = order.kind is OrderKind.WATCH
     arc_kind(order.robot, Sight.NOTHING, types, resources)  # a wrong name is refused by its own sentence
     able = [
@@ -86,6 +91,7 @@ def kind_for(order: Order, types: Sequence[ComponentType], resources: Collection
         for one in types
         if (can := arc_abilities(one.name, types)) is not None
         and (can.gives_pictures if watches else can.reach is not None)
+        and {resource.type for resource in resources}.issuperset(one.needs.values())
     ]
     bodies = {resource.type for resource in resources if resource.name == order.robot}
     if not any(one.needs.get(one.abilities.body, "") in bodies for one in able):

@@ -133,13 +133,23 @@ def test_taken_over_at_many_more_moments_it_gets_there_too(disturbances: Disturb
     play(disturbances)
 
 
-def test_a_robot_before_a_wall_fails_with_the_reason() -> None:
+def test_a_robot_before_a_shelf_fails_with_the_reason() -> None:
     async def scene() -> None:
-        async with at_work(only(GO, localizer="world", x_m=3.0, y_m=9.0)) as running:
+        async with at_work(only(GO, localizer="world", x_m=5.2, y_m=3.8)) as running:
             behavior = await finished(running, GO)
             assert behavior.status is BehaviorStatus.FAILURE
             assert behavior.payload["code"] == "go_to.not_there"
             assert "m are left" in behavior.payload["detail"]
+
+    run_virtual(scene())
+
+
+def test_a_place_outside_the_room_is_refused_before_the_robot_moves() -> None:
+    async def scene() -> None:
+        async with at_work(only(GO, x_m=100.0)) as running:
+            go = await finished(running, GO, 10.0)
+            assert (go.status, go.payload["code"]) == (BehaviorStatus.FAILURE, "go_to.outside")
+            assert away_m(await pose(running, ROBOT), BEGIN) < 0.01
 
     run_virtual(scene())
 

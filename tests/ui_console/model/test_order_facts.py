@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
 from backbone.component.abilities import Abilities, CommandForm
@@ -70,6 +71,20 @@ def test_the_kind_of_arc_drives_or_gives_pictures_as_the_order_needs(kind: Order
 def test_a_robot_that_cannot_is_named_in_the_refusal(order: Order, why: str) -> None:
     with pytest.raises(CannotOrder, match=why):
         kind_for(order, TYPES, ROBOTS)
+
+
+@pytest.mark.parametrize("x_m", [1e300, float("nan"), -1000.5])
+def test_a_place_that_no_room_has_is_refused(x_m: float) -> None:
+    with pytest.raises(CannotOrder, match="no place in a room"):
+        kind_for(Order(OrderKind.GO_TO, "scout1", x_m, 1.0), TYPES, ROBOTS)
+
+
+def test_without_a_framegrabber_nothing_can_be_watched() -> None:
+    types = [
+        msgspec.structs.replace(one, needs={**one.needs, "grabber": "grabber"}) for one in TYPES if one.name == "look"
+    ]
+    with pytest.raises(CannotOrder, match="gives no pictures"):
+        kind_for(Order(OrderKind.WATCH, "scout1"), [*types, *map(behavior, OrderKind)], ROBOTS)
 
 
 def test_a_wrong_name_and_a_mission_without_the_behavior_are_refused() -> None:
