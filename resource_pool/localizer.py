@@ -12,6 +12,7 @@ In mission.xml: a resource of type ``localizer``, named by behaviors as ``locali
 from __future__ import annotations
 
 import asyncio
+import base64
 import logging
 import math
 from pathlib import Path
@@ -72,6 +73,8 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
         landmarks: Boards besides those of the world, in the same form; each faces along its heading.
         width_m: Extent of the room along x, meters; 0: that of the world.
         depth_m: Extent of the room along y, meters; 0: that of the world.
+        floor_plan: PNG or JPEG picture that covers the whole floor, for maps: in the mission file the name of its file,
+            relative to the mission file; here what that holds, in base64.
         room: The world of the mission file.
     """
 
@@ -79,6 +82,7 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
     landmarks: str = ""
     width_m: Size = 0.0
     depth_m: Size = 0.0
+    floor_plan: str = ""
     room: WorldDescription | None = None
 
     def __post_init__(self) -> None:
@@ -91,7 +95,11 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
         return {one.name: FloorPose(one.x_m, one.y_m, one.heading_rad) for one in robots} | read_begins(self.starts)
 
     def plan(self) -> FloorPlan:
-        """Return the plan of the floor."""
+        """Return the plan of the floor.
+
+        Raises:
+            ValueError: ``floor_plan`` is no base64.
+        """
         of_world = FloorPlan(0.0, 0.0) if self.room is None else plan_of(self.room)
         own = [board(name, at) for name, at in read_begins(self.landmarks).items()]
         return msgspec.structs.replace(
@@ -99,6 +107,7 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
             width_m=self.width_m or of_world.width_m,
             depth_m=self.depth_m or of_world.depth_m,
             shapes=[*of_world.shapes, *own],
+            image=base64.b64decode(self.floor_plan, validate=True),
         )
 
 

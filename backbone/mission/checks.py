@@ -26,9 +26,11 @@ from backbone.mission.parameter_checks import (
 )
 from backbone.mission.process_checks import check_processes
 from backbone.mission.report import Place, Report, listed, quoted
+from backbone.mission.room_files import check_floor_plan
 from backbone.mission.tables import (
     CORE_SERVICES,
     NETWORK_ID,
+    ROOM,
     SIMULATED,
     WORLD,
     Tables,
@@ -259,6 +261,8 @@ def _check_resources(tables: Tables, report: Report) -> None:
         check_class_parameters(resource, SET_BY_RESOURCE, tables, report)
         _check_uses(resource, tables, report)
         _check_driver(resource, tables, report)
+        if (facts := tables.facts_of(resource.text("type"))) is not None and ROOM in facts.given:
+            check_floor_plan(resource, report)
         _check_network_id(resource, ids, report)
         capacity = resource.number("capacity")
         if capacity is not None and 0 < capacity < 1 and resource.flag("sharable") is False:

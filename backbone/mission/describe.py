@@ -29,8 +29,8 @@ from backbone.mission.model import (
     LastBranchDescription,
     MissionDescription,
 )
-from backbone.mission.room_files import room_text
-from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, ROOM, SIMULATED, WORLD, parameter_value
+from backbone.mission.room_files import floor_plan_text, room_text
+from backbone.mission.tables import CORE_SERVICES, FLOOR_PLAN, NETWORK_ID, ROOM, SIMULATED, WORLD, parameter_value
 
 NOTHING_KNOWN = ClassFacts()
 
@@ -55,7 +55,7 @@ def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFa
         hosts=hosts,
         core=_core(mission, [host.name for host in hosts]),
         types=types,
-        resources=tuple(_resource(resource, world, host_of_process, robots, in_rooms) for resource in resources),
+        resources=tuple(_resource(one, world, host_of_process, robots, in_rooms, source) for one in resources),
         components=() if world is None else (_world(world, resources, source, host_of_process, types),),
         behaviors=tuple(map(_behavior, tree.behavior)),
         source=source,
@@ -100,18 +100,24 @@ def _resource(
     host_of_process: Mapping[str, str],
     robots: Collection[str],
     in_rooms: Collection[str],
+    source: str,
 ) -> Resource:
     links: dict[str, list[str]] = {}
     for used in declared.uses:
         links.setdefault(used.type, []).append(used.name)
     played_by = {WORLD: world.name} if world is not None and declared.driver == SIMULATED else {}
-    room = {ROOM: _room(world)} if world is not None and declared.type in in_rooms else {}
+    given = _parameters(declared.parameter)
+    room: dict[str, object] = {}
+    if declared.type in in_rooms:
+        room = {} if world is None else {ROOM: _room(world)}
+        if name := given.get(FLOOR_PLAN):
+            given[FLOOR_PLAN] = floor_plan_text(source, str(name))
     values = declared.model_dump(exclude={"uses", "parameter", "features", "host"})
     return Resource(
         **values,
         host=declared.host or host_of_process.get(declared.process, ""),
         features=list(declared.features),
-        parameters={**played_by, **room, **_parameters(declared.parameter)},
+        parameters={**played_by, **room, **given},
         links=links,
         is_robot=declared.type in robots,
     )

@@ -1,21 +1,26 @@
-"""A room of the user's own that a mission file names: MJCF, read when the mission is.
+"""Files of a room that a mission file names, read when the mission is: a room of one's own as MJCF, a drawn floor plan.
 
-The mission carries the room's text, so that the machine that plays the world need not have the file.
+The mission carries what they hold, so that the machine that uses it need not have the file.
 Whether MuJoCo can build it is found out by the world; here is looked at what needs no MuJoCo.
 """
 
 from __future__ import annotations
 
+import base64
 from pathlib import Path
 
 from backbone.mission.document import Element, parse
 from backbone.mission.report import Report, quoted
+from backbone.mission.tables import FLOOR_PLAN
 
 MAX_BYTES = 1024 * 1024  # chosen: as a mission file's; a room of ten thousand boxes fits
+MAX_PLAN_BYTES = 384 * 1024  # in base64 512 KiB, the longest value of a parameter
+PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
+"""How PNG and JPEG files begin."""
 
 
 class RoomInvalid(Exception):
-    """A room's file cannot be used: what is wrong, and the remedy."""
+    """A file of a room cannot be used: what is wrong, and the remedy."""
 
 
 def room_text(mission_file: str, name: str) -> str:
@@ -28,15 +33,7 @@ def room_text(mission_file: str, name: str) -> str:
     Raises:
         RoomInvalid: The file cannot be read, is too large, no MJCF, or needs further files.
     """
-    path = Path(mission_file).parent / name
-    try:
-        if path.exists() and not path.is_file():
-            raise RoomInvalid("is no file", "Name an MJCF file")
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise RoomInvalid(f"cannot be read: {reason}", "Name an MJCF file, relative to the mission file") from error
+    data = _content(mission_file, name, "an MJCF file")
     if len(data) > MAX_BYTES:
         raise RoomInvalid(f"is larger than {MAX_BYTES} bytes", "Simplify the room")
     try:
@@ -59,6 +56,49 @@ def room_text(mission_file: str, name: str) -> str:
                 "Write what is in that file into the room's file; only this one travels with the mission",
             )
     return text
+
+
+def floor_plan_text(mission_file: str, name: str) -> str:
+    """Return what the picture of a floor plan holds, in base64.
+
+    Args:
+        mission_file: As for ``room_text``.
+        name: As for ``room_text``.
+
+    Raises:
+        RoomInvalid: The file cannot be read, is too large, or is neither PNG nor JPEG.
+    """
+    data = _content(mission_file, name, "a picture")
+    if len(data) > MAX_PLAN_BYTES:
+        raise RoomInvalid(f"is larger than {MAX_PLAN_BYTES} bytes", "Scale the picture down, or save it as JPEG")
+    if not data.startswith(PICTURES):
+        raise RoomInvalid("is neither PNG nor JPEG", "Save the picture as one of them")
+    return base64.b64encode(data).decode()
+
+
+def _content(mission_file: str, name: str, what: str) -> bytes:
+    """Return the first bytes of a file, one more than any may have."""
+    path = Path(mission_file).parent / name
+    try:
+        if path.exists() and not path.is_file():
+            raise RoomInvalid("is no file", f"Name {what}")
+        with path.open("rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise RoomInvalid(f"cannot be read: {reason}", f"Name {what}, relative to the mission file") from error
+
+
+def check_floor_plan(localizer: Element, report: Report) -> None:
+    """Report what is wrong with the picture that a localizer names, if it names one."""
+    for given in localizer.all("parameter"):
+        name = given.text("value")
+        if given.text("name") == FLOOR_PLAN and name:
+            try:
+                floor_plan_text(report.file, name)
+            except RoomInvalid as invalid:
+                message, remedy = invalid.args
+                report.fault(given.place_of("value"), f"floor plan {quoted(name)} {message}", remedy)
 
 
 def check_room_file(room: Element, report: Report) -> None:

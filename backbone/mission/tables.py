@@ -19,6 +19,7 @@ SIMULATED = "simulated"  # the driver whose hardware is played by the mission's 
 SIMULATED_WORLD = "simulated_world"  # the shipped type that plays it
 WORLD = "world"  # the parameter that names it, and the world's own
 ROOM = "room"  # the parameter with the room, for classes that have it
+FLOOR_PLAN = "floor_plan"  # their parameter with a picture of the floor: a file in the mission file, then what it holds
 NETWORK_ID = "network_id"  # the parameter by which the radio distinguishes robots
 
 

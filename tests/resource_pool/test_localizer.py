@@ -155,6 +155,34 @@ def test_a_place_that_means_nothing_is_a_fault_of_the_mission_file() -> None:
         mission(starts="scout1")
 
 
+def drawn(folder: Path, content: bytes) -> MissionDescription:
+    """Return the mission with this picture of its floor."""
+    (folder / "plan.png").write_bytes(content)
+    text = MISSION % ('<parameter name="floor_plan" value="plan.png"/>', "")
+    return read_mission_bytes(text.encode(), str(folder / "places.xml"))
+
+
+def test_a_picture_of_the_floor_travels_with_the_mission(tmp_path: Path) -> None:
+    picture = b"\x89PNG\r\n\x1a\n" + bytes(300_000)
+
+    async def scene() -> None:
+        async with mission_in_one_process(drawn(tmp_path, picture)) as running:
+            (tmp_path / "plan.png").unlink()
+            plan = await running.bus.ask(LOCALIZER, AskFloorPlan(), FloorPlan, within_s=1.0)
+            assert (plan.image, plan.width_m) == (picture, 6.0)
+
+    run_virtual(scene())
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [(b"<svg/>", "neither PNG nor JPEG"), (b"\xff\xd8\xff" + bytes(400_000), "larger than 393216 bytes")],
+)
+def test_a_picture_that_cannot_be_used_is_a_fault_of_the_mission_file(content: bytes, why: str, tmp_path: Path) -> None:
+    with pytest.raises(MissionInvalid, match=f":8:78: floor plan 'plan.png' is {why}"):
+        drawn(tmp_path, content)
+
+
 def test_without_a_world_it_needs_its_own_places_only() -> None:
     given = msgspec.convert({"starts": "scout1:1,2", "width_m": 5, "depth_m": 4}, LocalizerParameters)
     assert list(given.begins()) == ["scout1"]
