@@ -126,6 +126,7 @@ class TeamModel:
                 self.robots.take_readings(said, at_s)
             case Types():
                 self.robots.take_types(said)
+                self.map.take_types(said)
             case Statistics():
                 self.links.take_counts(component_of(source), said.values, at_s)
             case MissionTime():
@@ -140,8 +141,6 @@ class TeamModel:
                 self.map.take_pose(said)
             case FloorPlan():
                 self.map.take_plan(said)
-            case Types():
-                self.map.take_types(said)
             case Why() | Suspended():
                 """A question for one console, which keeps it."""
             case _:

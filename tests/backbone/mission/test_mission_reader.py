@@ -392,6 +392,7 @@ def test_the_projects_mission_is_that_of_iros_2001_figure_2() -> None:
         "video_frequency": ["video1"],
         "framegrabber": ["grabber"],
         "scout": ["scout1", "scout2", "scout3"],
+        "localizer": ["localizer"],
     }
     [surveillance] = mission.behaviors
     assert surveillance.priority == 5

@@ -27,12 +27,11 @@ PLACE = '<parameter name="x_m" value="{}"/><parameter name="y_m" value="{}"/>'
 TREE = """
 <behaviors><behavior type="sequence" name="errand" priority="1">{out}{home}</behavior></behaviors></mission>
 """
-LOCALIZER = '<resource type="localizer" name="localizer"/></resources>'
 
 
 def with_errand(file: Path, robot: str, kind: str, place: tuple[float, float]) -> MissionDescription:
-    """Return the example's mission with a localizer, and this errand in place of its behaviors."""
-    hardware = file.read_text(encoding="utf-8").partition("<behaviors>")[0].replace("</resources>", LOCALIZER)
+    """Return the example's mission with this errand in place of its behaviors."""
+    hardware = file.read_text(encoding="utf-8").partition("<behaviors>")[0]
     out = STEP.format(type="go_to", name="go-out", place=PLACE.format(*place), kind=kind, robot=robot)
     home = STEP.format(type="return_home", name="go-home", place="", kind=kind, robot=robot)
     return read_mission_bytes((hardware + TREE.format(out=out, home=home)).encode(), str(file))
