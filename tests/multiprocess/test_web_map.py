@@ -20,13 +20,12 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
 WITHIN_S = 60.0
 ROOM_M = (9.0, 6.0)
-LOCALIZER = '<resource type="localizer" name="localizer" process="hardware"/>\n  </resources>'
 NEAR_M = 0.4  # as the test of go_to itself: dead reckoning
 
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    with mission_up(change={"</resources>": LOCALIZER}) as mission, serving(mission) as made:
+    with mission_up() as mission, serving(mission) as made:
         yield made
         made.process.terminate()
         assert made.process.wait(20) == 0

@@ -128,7 +128,7 @@ export function meantBy(selected, inHand) {
 }
 
 /**
- * Names for people: "scout1", "scout1 and scout2", "scout1, scout2 and rover1".
+ * Names for people: "scout1", "scout1 and scout2", "scout1, scout2 and scout3".
  *
  * @param {string[]} names
  */
