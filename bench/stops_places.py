@@ -75,6 +75,10 @@ READING = (
     Place("dialog of keys", "action_keys", "?", "these keys|EMERGENCY STOP of all", "Escape"),
     Place("dialog of reasons", "_why", "y", r"why scout\d\?", "Escape"),
 )
+LOOKING = (
+    Place("dialog of views", "_look", "b", "what the behaviors see", "Escape"),
+    Place("view of a behavior", "_look", "b Enter", "escape leaves", "Escape"),
+)
 LIFTING = (Place("dialog to lift", "action_lift", "c", "lift the stop of", "Escape", "stopped", OTHERS[1]),)
 WRITING = (
     Place("field of the log's search", "action_search", "/", "search the log", "Escape"),
@@ -88,8 +92,8 @@ DRIVING = (
     Place("dialog of robots", "action_pick", "p Up", "which robot", "Escape", meant=OTHERS[1]),
     Place("field of a reason", "action_ask_consent_because", "M", "may I have it", "Escape"),
 )
-TERMINAL = (*PANELS, *DRIVING, *READING, *WRITING, *LIFTING)
-MONITOR = (*PANELS, *READING, *WRITING, *LIFTING)
+TERMINAL = (*PANELS, *DRIVING, *READING, *LOOKING, *WRITING, *LIFTING)
+MONITOR = (*PANELS, *READING, *LOOKING, *WRITING, *LIFTING)
 PENDANT = (Place("the screen", "screen"), READING[0], *LIFTING)
 HEADLESS = (Place("no screen", "headless"),)
 SCRIPT = (Place("a drive runs", "drive"), Place("nothing is due", "pause"))
@@ -132,11 +136,18 @@ CARD = {
     "lift": ".lift",
 }
 CONTROLS = ("theme", "stop-all", "pad", "stop-mine", "halt", "take", "may-i", "release", "speed", "panel")
+SEEN = "document.getElementById('seen-panel').open = true; "
+MAP = ("go", "watch", "return", "end", "follow", "target")
 CLOSE = "document.getElementById('reading').close()"
 PAGE = (
     Place("nothing has the focus", "body"),
     *map(_tab, TABLES),
     *(_focus(f"#{control}") for control in CONTROLS),
+    *(_focus(f"#map-{control}") for control in MAP),
+    *(
+        _focus(f"#seen-{control}", "document.getElementById('seen-panel').open = true; ")
+        for control in ("behavior", "view")
+    ),
     *(_revealed("login", selector) for selector in ("#login-token", "#login-user", "#login [type=submit]")),
     *(_revealed("lost", selector) for selector in ("#retake", "#dismiss")),
     *(replace(_focus(selector), needs="asked") for selector in ("#consent-yes", "#consent-no")),

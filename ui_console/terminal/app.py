@@ -334,10 +334,10 @@ class ConsoleApp(ConsoleDisplay):
 
     def action_look(self) -> None:
         """Choose a debug view of a behavior, and look at it live."""
-        self._list_views()
+        self._look()
 
     @work(group="look", exclusive=True)
-    async def _list_views(self) -> None:
+    async def _look(self) -> None:
         try:
             views = await self._session.debug_views()
         except LinkError as error:
@@ -346,12 +346,12 @@ class ConsoleApp(ConsoleDisplay):
         if not views:
             self.notify("no behavior shows anything yet", severity="warning")
             return
-        self._open(ViewPicker(views), lambda chosen: self._look(*chosen))
+        self._open(ViewPicker(views), lambda chosen: self._open(self._view_dialog(*chosen)))
 
-    def _look(self, behavior: str, view: str) -> None:
+    def _view_dialog(self, behavior: str, view: str) -> ViewDialog:
         keep_looking = partial(self._session.keep_looking, behavior, view)
         has_pixels = self._has_pixels and self.profile is Profile.MONITOR  # the terminal keeps one picture
-        self._open(ViewDialog(f"{component_of(behavior)}: {view}", keep_looking, has_pixels=has_pixels))
+        return ViewDialog(f"{component_of(behavior)}: {view}", keep_looking, has_pixels=has_pixels)
 
     def action_bare(self) -> None:
         """Show the picture alone, or everything again."""
