@@ -144,10 +144,7 @@ PAGE = (
     *map(_tab, TABLES),
     *(_focus(f"#{control}") for control in CONTROLS),
     *(_focus(f"#map-{control}") for control in MAP),
-    *(
-        _focus(f"#seen-{control}", "document.getElementById('seen-panel').open = true; ")
-        for control in ("behavior", "view")
-    ),
+    *(_focus(f"#seen-{control}", SEEN) for control in ("behavior", "view")),
     *(_revealed("login", selector) for selector in ("#login-token", "#login-user", "#login [type=submit]")),
     *(_revealed("lost", selector) for selector in ("#retake", "#dismiss")),
     *(replace(_focus(selector), needs="asked") for selector in ("#consent-yes", "#consent-no")),
