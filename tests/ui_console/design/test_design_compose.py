@@ -21,7 +21,6 @@ async def test_a_mouse_alone_composes_the_tree_of_the_example(tmp_path: Path) ->
     with served(file) as address:
         async with web_browser.page_at("desktop", address, shows=".element", expects=()) as page:
             await build_by_tutorial(Mouse(page), tutorial=TUTORIAL)
-            await web_browser.keep_picture(page, "design-tree")
     assert file.read_text() == EXAMPLE.read_text()
 
 
