@@ -1,0 +1,79 @@
+"""The mixed team driven from a page in a real browser: a robot on wheels, one on legs, and a camera that pans."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import web_browser
+from running_mission import mission_up
+from served_page import Served, serving
+
+from backbone.bus.interface import Bus
+from resource_pool.localization import AskPose, Pose
+
+pytest.importorskip("mink", reason="the walker's legs need the extra 'walker'")
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
+
+TEAM = Path(__file__).parents[2] / "docs" / "examples" / "team.xml"
+WITHIN_S = 30.0
+AHEAD_M = 0.1
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    with mission_up(mission_xml=TEAM) as mission, serving(mission) as made:
+        yield made
+        made.process.terminate()
+        assert made.process.wait(20) == 0
+
+
+async def pose_of(bus: Bus, body: str) -> Pose:
+    return await bus.ask("resource_pool/world", AskPose(body), Pose, within_s=5.0)
+
+
+async def wait_until(is_so: Callable[[], Awaitable[bool]], what: str) -> None:
+    try:
+        async with asyncio.timeout(WITHIN_S):
+            while not await is_so():  # noqa: ASYNC110  what another process does gives no event here
+                await asyncio.sleep(0.2)
+    except TimeoutError:
+        pytest.fail(f"never: {what}")
+
+
+async def take(page: Any, robot: str) -> None:
+    await page.locator(f".robot[data-robot={robot}]").get_by_role("button", name="Take over").click()
+    await page.wait_for_selector(f"body[data-held={robot}]")
+
+
+async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Served) -> None:
+    address = f"http://127.0.0.1:{served.port}/#token={served.token}"
+    async with (
+        served.mission.bus() as bus,
+        web_browser.page_at("desktop", address, shows=".robot[data-robot=walker1]") as page,
+    ):
+        for robot in ("rover1", "walker1", "scout1"):
+            await take(page, robot)
+            before = await pose_of(bus, robot)
+
+            async def is_ahead(robot: str = robot, before: Pose = before) -> bool:
+                now = await pose_of(bus, robot)
+                return math.dist((now.x_m, now.y_m), (before.x_m, before.y_m)) > AHEAD_M
+
+            await page.keyboard.down("ArrowUp")
+            await wait_until(is_ahead, f"{robot} moves while the key is down")
+            await page.keyboard.up("ArrowUp")
+
+        await take(page, "rover1")
+        await page.get_by_role("slider", name="closed").fill("1")
+        await page.get_by_role("button", name="Grip").click()
+        await page.locator("#applied", has_text="grip closed 1").wait_for()
+
+        await take(page, "wall-camera")
+        await page.get_by_role("slider", name="pan").fill("-0.28")
+        await page.get_by_role("button", name="Look").click()
+        await page.locator("#applied", has_text="look pan -0.28 rad").wait_for()
