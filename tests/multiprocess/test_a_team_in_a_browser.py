@@ -14,7 +14,9 @@ from running_mission import mission_up
 from served_page import Served, serving
 
 from backbone.bus.interface import Bus
+from backbone.keys import Conversation
 from resource_pool.localization import AskPose, Pose
+from resource_pool.messages import Applied
 
 pytest.importorskip("mink", reason="the walker's legs need the extra 'walker'")
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
@@ -56,6 +58,17 @@ async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Ser
         served.mission.bus() as bus,
         web_browser.page_at("desktop", address, shows=".robot[data-robot=walker1]") as page,
     ):
+        applied: list[Applied] = []
+        for robot in ("rover1", "wall-camera"):
+            at = f"resource_pool/{robot}"
+            bus.subscribe(at, Conversation.MOTIONS, Applied, lambda heard: applied.append(heard.body))
+
+        def is_applied(word: str, **values: float) -> Callable[[], Awaitable[bool]]:
+            async def is_so() -> bool:
+                return any(one.command == word and values.items() <= one.values.items() for one in applied)
+
+            return is_so
+
         for robot in ("rover1", "walker1", "scout1"):
             await take(page, robot)
             before = await pose_of(bus, robot)
@@ -71,9 +84,9 @@ async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Ser
         await take(page, "rover1")
         await page.get_by_role("slider", name="closed").fill("1")
         await page.get_by_role("button", name="Grip").click()
-        await page.locator("#applied", has_text="grip closed 1").wait_for()
+        await wait_until(is_applied("grip", closed=1.0), "the gripper closes")
 
         await take(page, "wall-camera")
         await page.get_by_role("slider", name="pan").fill("-0.28")
         await page.get_by_role("button", name="Look").click()
-        await page.locator("#applied", has_text="look pan -0.28 rad").wait_for()
+        await wait_until(is_applied("look", pan_rad=-0.28), "the camera pans")
