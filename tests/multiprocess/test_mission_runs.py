@@ -15,7 +15,7 @@ from resource_pool.localization import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
-RCS = {"scout1", "scout2", "scout3", "radio", "video1", "grabber"}
+RCS = {"scout1", "scout2", "scout3", "radio", "video1", "grabber", "localizer"}
 CORE_ORDER = ["nameserver", "component_database", "placer", "creator-base", "dependency_database", "rc_manager"]
 
 

@@ -33,6 +33,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 WITHIN_S = 30.0
 STOPPED_WITHIN_S = 3.0  # of which 0.3 s are the rule; the rest is a machine that also runs other tests
 WORLD = "resource_pool/world"
+LOCALIZER = '<resource type="localizer" name="localizer" process="hardware"/>'
 SECOND_WATCHER = re.search(
     r'<behavior type="watch_for_motion" name="watch-scout2".*?</behavior>', MISSION_XML.read_text(), re.DOTALL
 )
@@ -42,7 +43,7 @@ SECOND_WATCHER = re.search(
 def served() -> Iterator[Served]:
     assert SECOND_WATCHER is not None
     with (
-        mission_up(name="iros2001", change={SECOND_WATCHER.group(): ""}) as mission,
+        mission_up(name="iros2001", change={SECOND_WATCHER.group(): "", LOCALIZER: ""}) as mission,
         serving(mission) as made,
     ):
         yield made
