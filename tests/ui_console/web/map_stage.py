@@ -181,7 +181,8 @@ async def floor_on(stage: Stage, beside: Any, plan: FloorPlan = PLAN) -> AsyncIt
             return Types([TypeCount(one, 1) for one in types])
 
     async def resources(_asked: Envelope[Any]) -> Message:
-        return Resources([*robots, Resource("lamp1", "lamp")])
+        shared = [Resource(kind, kind) for kind in ("command_radio", "video_frequency", "framegrabber", "lamp")]
+        return Resources([*robots, *shared])
 
     async def schedule(_asked: Envelope[Any]) -> Message:
         behaviors = [f"{Subsystem.MISSION_CONTROL}/{name}" for name in stage.placer.components]
