@@ -106,6 +106,13 @@ class OversizedMessage(Refusal):
     remedy = f"Keep messages under {MAX_MESSAGE_BYTES} bytes; send large data as frames."
 
 
+class UnwritableMessage(Refusal):
+    """The message has a whole number of more than 64 bits, which no bytes of the wire can say."""
+
+    code = "wire.unwritable"
+    remedy = "Give a smaller number."
+
+
 class UnknownMessage(Refusal):
     """The component does not answer messages of this schema."""
 
@@ -136,8 +143,12 @@ def write(envelope: Envelope[Message]) -> bytes:
 
     Raises:
         OversizedMessage: The message is longer than ``MAX_MESSAGE_BYTES``.
+        UnwritableMessage: A whole number in it has more than 64 bits.
     """
-    raw = _encoder.encode(envelope)
+    try:
+        raw = _encoder.encode(envelope)
+    except OverflowError as error:
+        raise UnwritableMessage(f"{type(envelope.body).__name__} has a whole number of more than 64 bits") from error
     if len(raw) > MAX_MESSAGE_BYTES:
         raise OversizedMessage(f"{type(envelope.body).__name__} of {len(raw)} bytes", bytes=len(raw))
     return raw

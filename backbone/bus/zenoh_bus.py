@@ -35,6 +35,7 @@ from backbone.wire import (
     OversizedMessage,
     Reader,
     Refused,
+    UnwritableMessage,
     refuse_oversized,
     write,
 )
@@ -250,7 +251,7 @@ class ZenohBus(BusBase):
     def _write_reply(self, envelope: Envelope[Message]) -> bytes:
         try:
             return write(envelope)
-        except OversizedMessage as refusal:
+        except (OversizedMessage, UnwritableMessage) as refusal:
             return write(self.envelope(Refused.of(refusal)))
 
     # ------------------------------------------------------------------ publications

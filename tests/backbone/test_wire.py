@@ -22,6 +22,7 @@ from backbone.wire import (
     Reader,
     Refused,
     UnknownMessage,
+    UnwritableMessage,
     WrongVersion,
     kinds_of,
     schema_of,
@@ -29,6 +30,13 @@ from backbone.wire import (
 )
 
 FOUR_REFUSALS = (MalformedMessage, OversizedMessage, UnknownMessage, WrongVersion)
+
+
+@pytest.mark.parametrize("number", [10**20, -(10**20)])
+def test_a_number_that_no_message_can_say_is_refused_with_a_remedy(number: int) -> None:
+    with pytest.raises(UnwritableMessage, match="SetParameter has a whole number") as refused:
+        write(Envelope(WIRE_VERSION, SOURCE, 1, 0.0, "", SetParameter("rounds", number, "a test")))
+    assert refused.value.remedy
 
 
 class Sighting(Message, frozen=True, tag="Sighting/3"):
