@@ -1,8 +1,8 @@
-"""What debug views cost: a watcher's pictures a second with nobody looking, beside the same code without views.
+"""What debug views cost: pictures a second of a watcher without a console that looks, and without views.
 
 One watcher sees noisy pictures of a room with something that moves, as ``see`` gets them; the two take turns, picture
 by picture. Times are of the process, one core. Prints one JSON line; ``ratio`` is pictures a second with views and
-nobody looking over those without views, ``ratio_looked_at`` the same while every view of it is looked at.
+no console that looks over those without views, ``ratio_looked_at`` the same while every view of it is looked at.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ Rules of this file:
 
 * The change is made in the text of the mission file, which is then read and checked as any other; so a tree that
   changed while it ran is always one that could have been brought up so.
-* A behavior *stays* if it has the same parent as before and its parent stays. What stays is told of its new place and
-  keeps its process; all else that runs is ended, and begins as what it is now.
+* A behavior *stays* if it has the same parent as before and its parent stays. The launcher sends it its new
+  place, and it keeps its process. Every other running behavior ends, and starts as the file now has it.
 """
 
 from __future__ import annotations

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
 from running_mission import BIN, RunningMission
+
+from backbone.bus.interface import Bus
+from resource_pool.localization import AskPose, Pose
 
 
 @dataclass
@@ -53,3 +58,18 @@ def serving(mission: RunningMission, port: int = 0) -> Iterator[Served]:
         process.wait(10)
         assert process.stdout is not None
         process.stdout.close()
+
+
+async def truth(bus: Bus, robot: str) -> Pose:
+    """Return where the robot stands, as the simulated world has it."""
+    return await bus.ask("resource_pool/world", AskPose(robot), Pose, within_s=5.0)
+
+
+async def wait_until(is_so: Callable[[], Awaitable[bool]], what: str, within_s: float) -> None:
+    """Return when this is so; what another process does gives no event here."""
+    try:
+        async with asyncio.timeout(within_s):
+            while not await is_so():  # noqa: ASYNC110
+                await asyncio.sleep(0.2)
+    except TimeoutError:
+        pytest.fail(f"never: {what}")

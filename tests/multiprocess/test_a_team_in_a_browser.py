@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
@@ -11,11 +10,10 @@ from typing import Any
 import pytest
 import web_browser
 from running_mission import mission_up
-from served_page import Served, serving
+from served_page import Served, serving, truth, wait_until
 
-from backbone.bus.interface import Bus
 from backbone.keys import Conversation
-from resource_pool.localization import AskPose, Pose
+from resource_pool.localization import Pose
 from resource_pool.messages import Applied
 
 pytest.importorskip("mink", reason="the walker's legs need the extra 'walker'")
@@ -32,19 +30,6 @@ def served() -> Iterator[Served]:
         yield made
         made.process.terminate()
         assert made.process.wait(20) == 0
-
-
-async def pose_of(bus: Bus, body: str) -> Pose:
-    return await bus.ask("resource_pool/world", AskPose(body), Pose, within_s=5.0)
-
-
-async def wait_until(is_so: Callable[[], Awaitable[bool]], what: str) -> None:
-    try:
-        async with asyncio.timeout(WITHIN_S):
-            while not await is_so():  # noqa: ASYNC110  what another process does gives no event here
-                await asyncio.sleep(0.2)
-    except TimeoutError:
-        pytest.fail(f"never: {what}")
 
 
 async def take(page: Any, robot: str) -> None:
@@ -71,22 +56,22 @@ async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Ser
 
         for robot in ("rover1", "walker1", "scout1"):
             await take(page, robot)
-            before = await pose_of(bus, robot)
+            before = await truth(bus, robot)
 
             async def is_ahead(robot: str = robot, before: Pose = before) -> bool:
-                now = await pose_of(bus, robot)
+                now = await truth(bus, robot)
                 return math.dist((now.x_m, now.y_m), (before.x_m, before.y_m)) > AHEAD_M
 
             await page.keyboard.down("ArrowUp")
-            await wait_until(is_ahead, f"{robot} moves while the key is down")
+            await wait_until(is_ahead, f"{robot} moves while the key is down", WITHIN_S)
             await page.keyboard.up("ArrowUp")
 
         await take(page, "rover1")
         await page.get_by_role("slider", name="closed").fill("1")
         await page.get_by_role("button", name="Grip").click()
-        await wait_until(is_applied("grip", closed=1.0), "the gripper closes")
+        await wait_until(is_applied("grip", closed=1.0), "the gripper closes", WITHIN_S)
 
         await take(page, "wall-camera")
         await page.get_by_role("slider", name="pan").fill("-0.28")
         await page.get_by_role("button", name="Look").click()
-        await wait_until(is_applied("look", pan_rad=-0.28), "the camera pans")
+        await wait_until(is_applied("look", pan_rad=-0.28), "the camera pans", WITHIN_S)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 import web_browser
 from running_mission import mission_up
-from served_page import Served, serving
+from served_page import Served, serving, truth, wait_until
 
 from backbone.bus.interface import Bus
-from resource_pool.localization import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
@@ -31,19 +29,6 @@ def served() -> Iterator[Served]:
         assert made.process.wait(20) == 0
 
 
-async def truth(bus: Bus, robot: str) -> Pose:
-    return await bus.ask("resource_pool/world", AskPose(robot), Pose, within_s=5.0)
-
-
-async def wait_until(is_so: Callable[[], Awaitable[bool]], what: str) -> None:
-    try:
-        async with asyncio.timeout(WITHIN_S):
-            while not await is_so():  # noqa: ASYNC110  what another process does gives no event here
-                await asyncio.sleep(0.2)
-    except TimeoutError:
-        pytest.fail(f"never: {what}")
-
-
 async def wait_there(page: Any, bus: Bus, robot: str, x_m: float, y_m: float) -> None:
     """Return when the robot is at the place in truth."""
 
@@ -52,7 +37,7 @@ async def wait_there(page: Any, bus: Bus, robot: str, x_m: float, y_m: float) ->
         return math.dist((pose.x_m, pose.y_m), (x_m, y_m)) < NEAR_M
 
     try:
-        await wait_until(is_there, f"{robot} at {x_m}, {y_m}")
+        await wait_until(is_there, f"{robot} at {x_m}, {y_m}", WITHIN_S)
     except pytest.fail.Exception:
         told = await page.locator("#orders").text_content()
         pytest.fail(f"{robot} is at {await truth(bus, robot)}, not at {x_m}, {y_m}; orders: {told}")
@@ -129,7 +114,7 @@ async def test_a_group_goes_to_places_side_by_side_and_an_order_is_stopped(serve
             now = await truth(bus, "scout1")
             return math.dist((now.x_m, now.y_m), (places[0].x_m, places[0].y_m)) > 0.3
 
-        await wait_until(has_moved, "scout1 goes")
+        await wait_until(has_moved, "scout1 goes", WITHIN_S)
         await page.locator("#map-end").click()
         for robot in ("scout1", "scout2"):
             await page.wait_for_selector(f"#orders .is-over[data-order={robot}]")

@@ -94,18 +94,18 @@ class OrderKeeper:
 
     def _give(self, order: Order) -> int:
         self._console.acted(OperatorAction.ORDER, order.robot or ANY_ROBOT, order.sentence)
-        self._do(self._book.give(order))
+        self._carry_out(self._book.give(order))
         return self._book.last
 
     def touched(self, robot: str) -> bool:
         """End the order of this robot, because its operator wants it by the stick; return whether it had one."""
         todo = self._book.touched(robot)
-        self._do(todo)
+        self._carry_out(todo)
         return bool(todo)
 
     def taken(self, robot: str) -> None:
         """Note that the stick has the robot."""
-        self._do(self._book.taken(robot))
+        self._carry_out(self._book.taken(robot))
 
     async def wait_begun(self, robot: str) -> None:
         """Return when no order of this robot is starting: its behavior waits for the robot, or it came to nothing."""
@@ -115,14 +115,14 @@ class OrderKeeper:
     async def give_back(self, robot: str, why: str) -> bool:
         """End the order of this robot; return, once its behavior has let the robot go, whether it had one."""
         todo = self._book.given_back(robot, why)
-        self._do(todo)
+        self._carry_out(todo)
         ends = [self._removals[step.number] for step in todo if isinstance(step, EndBehavior)]
         await asyncio.gather(*ends, return_exceptions=True)
         return bool(todo)
 
     def away(self, why: str) -> None:
         """Note that the operator is away: each robot goes back to the mission when its order is over."""
-        self._do(self._book.away(why))
+        self._carry_out(self._book.away(why))
 
     # ------------------------------------------------------------------ the behaviors
     def reported(self, source: str, report: ChildReport) -> ReportNoted:
@@ -135,13 +135,13 @@ class OrderKeeper:
         if number is None or component_of(source) != report.child:
             raise UnknownOrder(f"{source} carries out no order of {self._console.name}", child=report.child)
         if report.status.is_final:
-            is_done, said = report.status is BehaviorStatus.SUCCESS, _told(report.payload)
+            is_done, said = report.status is BehaviorStatus.SUCCESS, _outcome(report.payload)
             front = self._is_in_front(number)
-            self._do(self._book.finished(number, is_done=is_done, why=said, in_front=front))
+            self._carry_out(self._book.finished(number, is_done=is_done, why=said, in_front=front))
         elif report.suspended_because:
-            self._do(self._book.waits(number, report.suspended_because))
+            self._carry_out(self._book.waits(number, report.suspended_because))
         else:
-            self._do(self._book.runs(number))
+            self._carry_out(self._book.runs(number))
         return ReportNoted()
 
     async def drain(self) -> None:
@@ -158,7 +158,7 @@ class OrderKeeper:
             log.warning("%s leaves before its orders have ended", self._console.name)
 
     # ------------------------------------------------------------------ within
-    def _do(self, steps: Sequence[Instruction]) -> None:
+    def _carry_out(self, steps: Sequence[Instruction]) -> None:
         start_task = self._console.start_task
         for step in steps:
             match step:
@@ -223,7 +223,7 @@ class OrderKeeper:
         self._lost(number, "its behavior is gone")
 
     def _lost(self, number: int, why: str) -> None:
-        self._do(self._book.lost(number, why, in_front=self._is_in_front(number)))
+        self._carry_out(self._book.lost(number, why, in_front=self._is_in_front(number)))
 
     async def _start_of(self, number: int) -> Start:
         """Return what starts the behavior; show what its positions come from."""
@@ -238,7 +238,7 @@ class OrderKeeper:
         kind = kind_for(order, [one.component_type for one in types.types], hardware.resources)
         localizer = localizer_of(there.components) if order.kind in NEEDS_PLACES else None
         if localizer is not None:
-            self._do(self._book.based_on(number, localizer.words))
+            self._carry_out(self._book.based_on(number, localizer.words))
         wished = console.parameters
         return start_of(
             order,
@@ -270,7 +270,7 @@ class OrderKeeper:
             await is_queued.wait()
         finally:
             hearing.close()
-        self._do(self._book.queued(number))
+        self._carry_out(self._book.queued(number))
 
     async def _rest(self, number: int) -> None:
         """Ask the behavior to bring its robot to rest, until it answers or is gone."""
@@ -311,7 +311,7 @@ class OrderKeeper:
         return await ask_until_answered(bus, clock, of, question, reply, each_s=REPLY_TIME_S, within_s=FACTS_WITHIN_S)
 
 
-def _told(payload: Mapping[str, object]) -> str:
+def _outcome(payload: Mapping[str, object]) -> str:
     """Return for people why a behavior failed, or where it arrived, as its payload tells; empty: it does not."""
     match payload:
         case {"detail": str(detail)}:
