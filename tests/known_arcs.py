@@ -1,13 +1,14 @@
-"""A component database that knows kinds of ARC, so that consoles know what their operators can do with these."""
+"""Databases that know kinds of ARC and hardware, so that consoles know what their operators can do with these."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from backbone.addresses import COMPONENT_DATABASE
+from backbone.addresses import COMPONENT_DATABASE, DEPENDENCY_DATABASE
 from backbone.bus.interface import Bus
 from backbone.component.component import Component
 from backbone.component_database.messages import ComponentType, ListTypes, TypeCount, Types
+from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.naming import Subsystem
 from backbone.wire import Envelope, Message
 from resource_pool.arcs.skeleton import LitDriveArc
@@ -29,10 +30,20 @@ def lit_types(name: str) -> list[ComponentType]:
 
 
 def serve_types(bus: Bus, types: Sequence[ComponentType]) -> None:
-    """Answer as the component database on this bus."""
+    """Answer on this bus as the component database."""
 
     async def answer(_asked: Envelope[Message]) -> Message:
         return Types([TypeCount(one, 1) for one in types])
 
     bus.serve(COMPONENT_DATABASE, ListTypes, answer)
     bus.declare_alive(COMPONENT_DATABASE)
+
+
+def serve_resources(bus: Bus, resources: Sequence[Resource]) -> None:
+    """Answer on this bus as the dependency database."""
+
+    async def answer(_asked: Envelope[Message]) -> Message:
+        return Resources(list(resources))
+
+    bus.serve(DEPENDENCY_DATABASE, AskResources, answer)
+    bus.declare_alive(DEPENDENCY_DATABASE)

@@ -6,12 +6,14 @@ obey them; the limits of each field are those of the RC.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import msgspec
 
 from backbone.component.abilities import CommandForm, FieldForm, ValueKind
 from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
+from ui_console.model.arc_kinds import kinds_beside
 from ui_console.model.fields import label_of
 
 MOVE, HALT = "move", "halt"
@@ -50,6 +52,18 @@ class RoleCommand(msgspec.Struct, frozen=True):
     labels: list[str]
 
 
+class KindChoice(msgspec.Struct, frozen=True):
+    """A kind of ARC that an operator can choose.
+
+    Attributes:
+        kind: Its name.
+        title: For people: its name and the roles of its RCs, which come with it.
+    """
+
+    kind: str
+    title: str
+
+
 class ArcAbilities(msgspec.Struct, frozen=True):
     """What an operator can do with an ARC.
 
@@ -58,12 +72,14 @@ class ArcAbilities(msgspec.Struct, frozen=True):
         can_halt: True if it takes a command to halt.
         commands: Commands that a person can give, without those of the stick, in the order of their declaration.
         gives_pictures: True if pictures of its robot come to consoles.
+        kinds: The kinds of ARC with such a body, that of this ARC first; empty: there is no choice.
     """
 
     reach: Reach | None
     can_halt: bool
     commands: list[RoleCommand]
     gives_pictures: bool = False
+    kinds: list[KindChoice] = []
 
     def takes(self, word: str) -> bool:
         """Return whether a person can give this command."""
@@ -75,8 +91,15 @@ class ArcAbilities(msgspec.Struct, frozen=True):
         return not forms or any(form.moves for form in forms)
 
 
-def arc_abilities(kind: str, types: Sequence[ComponentType]) -> ArcAbilities | None:
+def arc_abilities(
+    kind: str, types: Sequence[ComponentType], resources: Collection[Resource] = ()
+) -> ArcAbilities | None:
     """Return what an operator can do with this kind of ARC; None: the mission has no such kind.
+
+    Args:
+        kind: Its name.
+        types: Component types of the mission.
+        resources: Hardware of the mission; without it there is no choice of kinds.
 
     Example:
         >>> arc_abilities("drive", []) is None
@@ -94,7 +117,14 @@ def arc_abilities(kind: str, types: Sequence[ComponentType]) -> ArcAbilities | N
         if form.word not in BY_STICK and not any(_is_odd(field) and field.is_required for field in form.fields)
     ]
     can_halt = any(form.word == HALT for form in declared)
-    return ArcAbilities(_reach(arc, by_name), can_halt, commands, arc.abilities.gives_pictures)
+    others = kinds_beside(arc, types, resources)
+    kinds = [_choice(by_name[name]) for name in (kind, *others)] if others else []
+    return ArcAbilities(_reach(arc, by_name), can_halt, commands, arc.abilities.gives_pictures, kinds)
+
+
+def _choice(kind: ComponentType) -> KindChoice:
+    words = [name.replace("_", " ") for name in (kind.name, *sorted(kind.needs))]
+    return KindChoice(kind.name, f"{words[0]}: {', '.join(words[1:])}")
 
 
 def _asked(role: str, title: str, form: CommandForm) -> RoleCommand:

@@ -37,14 +37,29 @@ def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources
         raise NoArcKind(
             f"no robot is named {robot!r}{did_you_mean(robot, robots)}; there is {others}", remedy=NAME_ONE, robot=robot
         )
-    there = {resource.type for resource in resources}
     of_robot = {resource.type for resource in resources if resource.name == robot or (not robot and resource.is_robot)}
-    drives = [one for one in types if one.needs.get(one.abilities.body, "") in of_robot]
-    complete = [one for one in drives if there.issuperset(one.needs.values())] or drives
+    drives = [one for one in types if _body(one) in of_robot]
+    complete = _complete(drives, resources) or drives
     if not complete:
         kinds = ", ".join(sorted(of_robot))
         raise NoArcKind(f"no kind of ARC has a body of kind {kinds}" if kinds else "there is no robot", robot=robot)
     return min(complete, key=lambda one: _badness(one, sight)).name
+
+
+def kinds_beside(kind: ComponentType, types: Sequence[ComponentType], resources: Collection[Resource]) -> list[str]:
+    """Return the other kinds of ARC with a body of the same type for which this mission has the hardware, by name."""
+    others = [one for one in types if one.name != kind.name and _body(kind) and _body(one) == _body(kind)]
+    return sorted(one.name for one in _complete(others, resources))
+
+
+def _body(kind: ComponentType) -> str:
+    """Return the type of the body of a kind of ARC; empty: it has none."""
+    return kind.needs.get(kind.abilities.body, "")
+
+
+def _complete(kinds: Sequence[ComponentType], resources: Collection[Resource]) -> list[ComponentType]:
+    there = {resource.type for resource in resources}
+    return [one for one in kinds if there.issuperset(one.needs.values())]
 
 
 def _badness(kind: ComponentType, sight: Sight) -> tuple[bool, int, str]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 from backbone.addresses import COMPONENT_DATABASE, DEPENDENCY_DATABASE
 from backbone.component.asking import ask_until_answered
-from backbone.component_database.messages import ListTypes, Types
-from backbone.dependency_database.messages import AskResources, Resources
+from backbone.component_database.messages import ComponentType, ListTypes, Types
+from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import LinkError, Refusal
 from backbone.wire import Message
 from ui_console.model.arc_abilities import ArcAbilities, arc_abilities
@@ -75,15 +75,11 @@ class KindFinder:
 
     async def _find(self, robot: str, sight: Sight) -> str:
         try:
-            types, hardware = await asyncio.gather(
-                self._ask(COMPONENT_DATABASE, ListTypes(), Types),
-                self._ask(DEPENDENCY_DATABASE, AskResources(), Resources),
-            )
+            types, resources = await asyncio.gather(self._ask_types(), self._ask_resources())
         except LinkError as error:
             raise NoArcKind(f"the kinds of ARC are not known: {error}", remedy=ASK_AGAIN) from error
-        known = [one.component_type for one in types.types]
-        kind = arc_kind(robot, sight, known, hardware.resources)
-        self._known, self._is_new = (kind, arc_abilities(kind, known)), True
+        kind = arc_kind(robot, sight, types, resources)
+        self._known, self._is_new = (kind, arc_abilities(kind, types, resources)), True
         return kind
 
     def take(self, kind: str) -> None:
@@ -95,14 +91,23 @@ class KindFinder:
             self._console.start_task(self._ask_again(kind), "abilities")
 
     async def _ask_again(self, kind: str) -> None:
-        try:
-            types = await self._ask(COMPONENT_DATABASE, ListTypes(), Types)
-        except (LinkError, Refusal) as error:
-            log.info("the commands of %s are not known: %s", kind, error)
-            return
-        if kind == self._taken:
-            self._known = (kind, arc_abilities(kind, [one.component_type for one in types.types]))
+        types, resources = await asyncio.gather(self._ask_types(), self._ask_resources(), return_exceptions=True)
+        for refused in (types, resources):
+            if isinstance(refused, LinkError | Refusal):
+                log.info("what %s can do is not wholly known: %s", kind, refused)
+            elif isinstance(refused, BaseException):
+                raise refused
+        if kind == self._taken and not isinstance(types, BaseException):
+            there = () if isinstance(resources, BaseException) else resources
+            self._known = (kind, arc_abilities(kind, types, there))
             self._know(self._known[1])
+
+    async def _ask_types(self) -> list[ComponentType]:
+        answer = await self._ask(COMPONENT_DATABASE, ListTypes(), Types)
+        return [one.component_type for one in answer.types]
+
+    async def _ask_resources(self) -> list[Resource]:
+        return (await self._ask(DEPENDENCY_DATABASE, AskResources(), Resources)).resources
 
     async def _ask(self, of: str, question: Message, reply: type[Reply]) -> Reply:
         bus, clock = self._console.bus, self._console.clock

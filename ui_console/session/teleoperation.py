@@ -92,7 +92,7 @@ class Teleoperation(OrderVerbs):
         self._is_asking = self._takes_next = False
         self._asked_s = 0.0
         self._grants = 0
-        self._finds_kind = not self.parameters.kind
+        self._kind = self.parameters.kind
         self._decided = asyncio.Event()
         self._controls = Controls(self)
         self._kinds = KindFinder(self, self._controls.know)
@@ -103,7 +103,7 @@ class Teleoperation(OrderVerbs):
         self._presence = Presence(self)
         self._orders = OrderKeeper(self, lambda: self._robot, self._hand_to_order, self._take_back)
         self._holding = ""
-        self._next_robot = ""
+        self._next = ("", "")
         self._switching = asyncio.Lock()
         self.refusal: Refusal | None = None
         """Why the claim was refused; None if it was not."""
@@ -163,21 +163,26 @@ class Teleoperation(OrderVerbs):
         self._kinds.take(wished.kind)
         self._keeping = self.start_task(self._keep(arc, rested), "arc")
 
-    async def switch(self, robot: str) -> None:
+    async def switch(self, robot: str, kind: str = "") -> None:
         """Claim another robot in place of the present one, which is stopped and given back first.
 
         An order of the present robot goes on, and so does one of the other robot: then the stick only turns to it. The
         present robot stays with the stick until the behavior of its order can have it.
         After several calls in a row the console claims the last robot.
+
+        Args:
+            robot: Its name.
+            kind: Component type of the ARC; another one than now also gives the robot back and claims it anew. Empty:
+                that of now for the same robot, else that of the console's parameters.
         """
-        self._next_robot = robot
+        wished = self._next = (robot, kind)
         async with self._switching:
             await self._orders.wait_begun(self._robot)
-            if robot != self._next_robot:
+            if wished != self._next:
                 return
-            if robot != self.parameters.robot:
-                kind = "" if self._finds_kind else self.parameters.kind
-                self.parameters = msgspec.structs.replace(self.parameters, robot=robot, kind=kind)
+            now = self.parameters
+            if robot != now.robot or kind not in ("", now.kind):
+                self.parameters = msgspec.structs.replace(now, robot=robot, kind=kind or self._kind)
                 await self._give_back_stick(f"{self.user} takes {robot}", for_good=True)
             if self._orders.goes_on(robot):
                 self.show(events.TurnedTo(self.clock.now_s(), robot))

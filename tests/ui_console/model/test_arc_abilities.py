@@ -6,12 +6,13 @@ import pytest
 
 from backbone.component.abilities import Abilities, CommandForm, FieldForm, ValueKind
 from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
 from backbone.naming import Subsystem
 from resource_pool.arcs.drive import DriveArc
 from resource_pool.arcs.skeleton import LitDriveArc
 from resource_pool.rcs.scout import MOST_M_S, MOST_TURN_RAD_S, Scout
 from resource_pool.rcs.skeleton import Lamp
-from ui_console.model.arc_abilities import SLOW, ArcAbilities, Reach, arc_abilities
+from ui_console.model.arc_abilities import SLOW, ArcAbilities, KindChoice, Reach, arc_abilities
 
 
 def of_class(name: str, cls: type[DriveArc] | type[Scout] | type[Lamp], needs: dict[str, str]) -> ComponentType:
@@ -50,6 +51,17 @@ def test_a_device_beside_the_body_brings_its_command_with_unit_and_limits() -> N
     [field] = shine.form.fields
     assert (field.name, field.least, field.most, field.is_required) == ("brightness", 0.0, 1.0, True)
     assert not made("lit_drive", TYPES).moves("shine")
+
+
+def test_the_kinds_that_an_operator_can_choose_name_what_comes_with_them() -> None:
+    hardware = [Resource(f"{kind}1", kind) for kind in LitDriveArc.kinds().values()]
+    found = arc_abilities("lit_drive", TYPES, hardware)
+    assert found is not None
+    assert found.kinds == [
+        KindChoice("lit_drive", "lit drive: command radio, lamp, scout"),
+        KindChoice("drive", "drive: command radio, scout"),
+    ]
+    assert made("lit_drive", TYPES).kinds == [], "without hardware there is no choice"
 
 
 def test_two_devices_of_one_kind_have_a_command_each_with_the_limits_of_its_rc() -> None:

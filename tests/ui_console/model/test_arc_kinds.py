@@ -10,7 +10,7 @@ from backbone.component.abilities import Abilities
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.naming import Subsystem
-from ui_console.model.arc_kinds import NoArcKind, arc_kind
+from ui_console.model.arc_kinds import NoArcKind, arc_kind, kinds_beside
 from ui_console.model.profile import Sight
 
 
@@ -80,6 +80,16 @@ def test_without_a_kind_for_the_robot_the_claim_is_refused(robot: str, told: str
 def test_a_robot_that_no_kind_drives_is_named_by_its_kind() -> None:
     with pytest.raises(NoArcKind, match="no kind of ARC has a body of kind rover"):
         arc_kind("rover1", Sight.NOTHING, TYPES[:3], HARDWARE)
+
+
+@pytest.mark.parametrize(
+    ("kind", "others"),
+    [("drive", ["capture", "video_drive"]), ("rover_drive", []), ("scout", [])],
+)
+def test_other_kinds_have_a_body_of_the_same_type_and_all_their_hardware_is_there(kind: str, others: list[str]) -> None:
+    [taken] = [one for one in TYPES if one.name == kind]
+    assert kinds_beside(taken, TYPES, HARDWARE) == others
+    assert kinds_beside(taken, TYPES, []) == []
 
 
 @given(st.permutations(TYPES), st.permutations(HARDWARE), st.sampled_from(Sight), st.sampled_from(["scout1", "rover1"]))

@@ -410,6 +410,27 @@ def test_switching_gives_the_first_robot_back_before_the_other_is_asked_for(plac
     placer_world(scene)
 
 
+def test_another_kind_for_the_same_robot_is_claimed_anew_and_stays_with_it(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, lambda event: None)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            [first] = placer.arcs.values()
+            robot = first.parameters["wish"]["robot"]
+            await driven.switch(robot, "lit_drive")
+            assert first.released == f"console-7 takes {robot}"
+            await placer.wait(lambda: driven.is_held)
+            for kind in ("lit_drive", ""):
+                await driven.switch(robot, kind)
+                assert list(placer.arcs) == ["console-7-lit_drive"]
+            await driven.give_back()
+            driven.take()
+            await placer.wait(lambda: driven.is_held)
+            assert list(placer.arcs) == ["console-7-lit_drive"]
+
+    placer_world(scene)
+
+
 def test_of_several_robots_asked_for_in_a_row_the_last_is_taken(placer_world: Any, beside: Any) -> None:
     async def scene(placer: FakePlacer) -> None:
         placer.on_arc = grant_at_once
