@@ -1,4 +1,4 @@
-"""The mixed team driven from a page in a real browser: a robot on wheels, one on legs, and a camera that pans."""
+"""The mixed team driven from a page in a real browser: on wheels, on legs, a camera that pans, a lamp."""
 
 from __future__ import annotations
 
@@ -65,6 +65,12 @@ async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Ser
             await page.keyboard.down("ArrowUp")
             await wait_until(is_ahead, f"{robot} moves while the key is down", WITHIN_S)
             await page.keyboard.up("ArrowUp")
+
+        await page.get_by_role("combobox", name="Taken with").select_option("lit_drive")
+        await page.get_by_role("button", name="Take anew").click()
+        await page.get_by_role("slider", name="brightness").fill("0.8")
+        await page.get_by_role("button", name="Shine").click()
+        await page.locator("#applied", has_text="shine brightness 0.8").wait_for()
 
         await take(page, "rover1")
         await page.get_by_role("slider", name="closed").fill("1")

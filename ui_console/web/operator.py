@@ -287,9 +287,9 @@ class Operator:
     async def _do(self, intent: AtWork) -> None:
         observer, user = self._services.observer, self.welcome.user
         match intent:
-            case protocol.TakeOver(robot):
+            case protocol.TakeOver(robot, kind):
                 async with self._claiming:
-                    await self._take(robot)
+                    await self._take(robot, kind)
             case protocol.OrderRequest() | protocol.PictureOrder():
                 async with self._claiming:
                     await self._order(intent)
@@ -374,11 +374,11 @@ class Operator:
     def _has_console(self) -> bool:
         return self._console is not None and self._life is not None and not self._life.done()
 
-    async def _take(self, robot: str) -> None:
+    async def _take(self, robot: str, kind: str) -> None:
         if not self._has_console:
             await self._open(robot)
         elif self._console is not None and self._console.is_ready:
-            await self._console.switch(robot)
+            await self._console.switch(robot, kind)
 
     async def _open(self, robot: str, orders: Sequence[Order] = ()) -> None:
         try:

@@ -113,9 +113,15 @@ class EndOrders(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fie
 
 
 class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="take"):
-    """Claim a robot; empty: any free one with a camera."""
+    """Claim a robot.
+
+    Attributes:
+        robot: Its name; empty: any free one with a camera.
+        kind: Kind of ARC; empty: that of now for the same robot, else one for the robot.
+    """
 
     robot: ShortText
+    kind: ShortText = ""
 
 
 class MayI(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="may_i"):

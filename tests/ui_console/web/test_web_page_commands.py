@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import pytest
 from axe import serious_findings
+from known_arcs import lit_types
 from web_page import COVERED, Wheels, page_at, take, wait_free, wait_stopped, wait_until
 from web_stage import Stage
 
 from backbone.component.abilities import Abilities, CommandForm, FieldForm, ValueKind
 from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
 from backbone.naming import Subsystem
+from resource_pool.arcs.drive import DriveArc
+from resource_pool.arcs.skeleton import LitDriveArc
 from resource_pool.messages import GiveCommand
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
@@ -72,6 +76,37 @@ async def test_each_kind_of_field_has_its_control_and_an_arc_without_a_body_has_
         await page.keyboard.press("ArrowUp")
         assert await page.locator("#pad").get_attribute("aria-disabled") == "true"
         await wheels.assert_still("it has no body that moves")
+
+
+async def test_another_kind_of_arc_for_the_robot_in_hand_brings_its_commands(stage: Stage) -> None:
+    plain = ComponentType(
+        "capture", "x:Y", Subsystem.RESOURCE_POOL, needs=DriveArc.kinds(), abilities=DriveArc.abilities()
+    )
+    hardware = [Resource(f"{kind}1", kind) for kind in LitDriveArc.kinds().values()]
+    stage.know_commands([plain, *lit_types("lit_drive")], hardware)
+    async with page_at(stage) as page:
+        kind, anew = page.get_by_role("combobox", name="Taken with"), page.get_by_role("button", name="Take anew")
+        assert await kind.is_hidden()
+        await take(page)
+        await kind.locator("option").first.wait_for(state="attached")
+        assert await kind.locator("option").all_text_contents() == [
+            "capture: command radio, scout",
+            "lit drive: command radio, lamp, scout",
+        ]
+        assert await page.get_by_role("button", name="Shine").count() == 0
+        assert await page.evaluate(COVERED) == []
+        assert await serious_findings(page) == []
+        assert await anew.is_disabled(), "it is taken so"
+        await kind.focus()
+        await page.keyboard.press("ArrowDown")
+        await anew.click()
+        await page.get_by_role("button", name="Shine").wait_for()
+        await page.wait_for_selector("body[data-held=scout1]")
+        await page.get_by_role("slider", name="brightness, 0 to 1").fill("0.3")
+        await page.get_by_role("button", name="Shine").click()
+        await wait_until(lambda: given(stage) == [GiveCommand("shine", {"brightness": 0.3}, "lamp")], "dimmed")
+        await take(page, "scout2")
+        assert [name.rpartition("-")[2] for name in stage.placer.arcs] == ["capture"]
 
 
 async def test_commands_count_while_a_robot_is_held_and_the_speed_tells_the_robots_own(stage: Stage) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from fake_resource_pool import FakeArc, FakePlacer
-from known_arcs import lit_types, serve_types
+from known_arcs import lit_types, serve_resources, serve_types
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
@@ -21,6 +21,7 @@ from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
 from backbone.keys import Conversation
 from backbone.mission_log.log import AskLog, AskPeople, MissionLog, PeopleKnown
 from backbone.naming import Subsystem, address
@@ -173,10 +174,11 @@ class Stage:
             self.robots[name] = FakeRobot(bus, self.clock, name, self._stop_changed)
         self.publish_schedule(**dict.fromkeys(names, ""))
 
-    def know_commands(self, types: Sequence[ComponentType] = ()) -> None:
-        """Add a component database with these types; none: each robot is held with a lamp beside it."""
+    def know_commands(self, types: Sequence[ComponentType] = (), resources: Sequence[Resource] = ()) -> None:
+        """Add databases with these types and resources; no types: each robot is held with a lamp beside it."""
         bus = self.network.join(COMPONENT_DATABASE, self.clock)
         serve_types(bus, types or lit_types("capture"))
+        serve_resources(bus, resources)
         self._others.append(bus)
 
     def keep_log(self, events: Iterable[StoryEvent]) -> None:

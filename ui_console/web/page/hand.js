@@ -6,7 +6,7 @@ import { lasting, set } from "./text.js";
 
 /** @import { Commands } from "./commands.js" */
 /** @import { Driving } from "./driving.js" */
-/** @import { ArcAbilities, OwnView } from "./messages.d.ts" */
+/** @import { ArcAbilities, KindChoice, OwnView } from "./messages.d.ts" */
 /** @import { Act } from "./types.d.ts" */
 
 const MEMORY = "held";
@@ -40,6 +40,10 @@ export class Hand {
       this.memory.forget();
       act("dismiss");
       this.showLost();
+    });
+    find("kind").addEventListener("change", () => this.showChoice());
+    find("take-so").addEventListener("click", () => {
+      act("take", this.own?.robot ?? "", { kind: find("kind", HTMLSelectElement).value });
     });
     find("speed").addEventListener("input", () => this.showSpeed());
     this.showSpeed();
@@ -76,8 +80,24 @@ export class Hand {
   know(abilities) {
     this.abilities = abilities;
     this.commands.know(abilities);
+    this.showKinds(abilities?.kinds ?? []);
     this.showSpeed();
     if (this.own !== null) this.driving.turn(this.stick !== "" && this.canMove);
+  }
+
+  /**
+   * Offer the kinds of ARC for the robot in hand, the first of which has it.
+   *
+   * @param {KindChoice[]} kinds
+   */
+  showKinds(kinds) {
+    find("kind").replaceChildren(...kinds.map(({ kind, title }) => new Option(title, kind)));
+    find("kinds").hidden = kinds.length === 0;
+    this.showChoice();
+  }
+
+  showChoice() {
+    find("take-so", HTMLButtonElement).disabled = find("kind", HTMLSelectElement).selectedIndex <= 0;
   }
 
   get canMove() {

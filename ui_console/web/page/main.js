@@ -159,7 +159,7 @@ function answered(answer) {
 // ---------------------------------------------------------------- the operator's actions
 /** @type {Record<string, (name: string, more: More) => Said>} */
 const words = {
-  take: (name) => ({ do: "take", robot: name }),
+  take: (name, { kind = "" }) => ({ do: "take", robot: name, kind }),
   release: () => ({ do: "release" }),
   lift: (name, { number = 0 }) => ({ do: "lift", robot: name, number }),
   may_i: () => ({ do: "may_i" }),

@@ -51,6 +51,7 @@ export interface ArcAbilities {
   can_halt: boolean;
   commands: RoleCommand[];
   gives_pictures: boolean;
+  kinds: KindChoice[];
 }
 
 export interface BodyView {
@@ -160,6 +161,11 @@ export interface GaugeView {
 export interface HealthView {
   word: string;
   lines: string[];
+}
+
+export interface KindChoice {
+  kind: string;
+  title: string;
 }
 
 export type LifeState =
@@ -637,6 +643,7 @@ export interface StopWheels {
 export interface TakeOver {
   do: "take";
   robot: string;
+  kind?: string;
 }
 
 export interface Watch {

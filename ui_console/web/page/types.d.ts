@@ -15,6 +15,7 @@ export interface More {
   value?: unknown;
   values?: Record<string, string | number | boolean>;
   role?: string;
+  kind?: string;
   robots?: string[];
   x_m?: number;
   y_m?: number;
