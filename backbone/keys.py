@@ -58,6 +58,21 @@ def key(mission: str, address: str, conversation: Conversation) -> str:
     return f"{ROOT}/{mission}/{address}/{conversation}"
 
 
+def key_of_all(mission: str, conversation: Conversation) -> str:
+    """Return the key expression of one conversation of all components.
+
+    Example:
+        >>> key_of_all("iros2001", Conversation.TELEMETRY)
+        'scout/iros2001/**/telemetry'
+
+    Raises:
+        IllegalName: The mission cannot be part of a key.
+    """
+    if _SEGMENT.fullmatch(mission) is None:
+        raise IllegalName(f"{mission!r} cannot be part of a key", name=mission)
+    return f"{ROOT}/{mission}/**/{conversation}"
+
+
 def address_of(key_expression: str) -> str:
     """Return the address in a concrete key.
 

@@ -24,6 +24,7 @@ Answer = Callable[[Envelope[Message]], Awaitable[Message]]
 Kind = TypeVar("Kind", bound=Message)
 Listener = Callable[[Envelope[Any]], None]
 """A subscriber's callback. ``Bus.subscribe`` checks that it takes the kinds that it subscribes to."""
+Overhearer = Callable[[str, bytes], None]
 LifeListener = Callable[[str, bool], None]
 LinkListener = Callable[[bool], None]
 
@@ -36,6 +37,14 @@ class Subscription(Protocol):
 
     def close(self) -> None:
         """Withdraw the declaration; messages that have already arrived may still be delivered. Idempotent."""
+
+
+class Overhearing(Subscription, Protocol):
+    """A subscription to whole conversations."""
+
+    @property
+    def dropped(self) -> int:
+        """Number of messages that were dropped because too many waited."""
 
 
 class Clock(Protocol):
@@ -130,6 +139,15 @@ class Bus(Protocol):
         Args:
             latest: Keep only the newest undelivered publication of each address (pictures, states); else all, in
                 the order of each source.
+        """
+
+    def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
+        """Call ``listener(key, bytes)``, in the event loop, with each publication of a conversation, whoever sends it.
+
+        The bytes are not read, so messages of unknown classes and malformed ones come too.
+
+        Args:
+            most_waiting_bytes: Messages that arrive while so many bytes wait for the listener are dropped and counted.
         """
 
     def declare_alive(self, address: str) -> Subscription:

@@ -15,11 +15,21 @@ from collections import defaultdict
 from collections.abc import Callable
 
 from backbone.bus.bus_base import BusBase
-from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply
+from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Overhearer, Reply
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
 from backbone.waiting import settle
-from backbone.wire import Accepts, Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
+from backbone.wire import (
+    Accepts,
+    Envelope,
+    MalformedMessage,
+    Message,
+    Refused,
+    UnknownMessage,
+    kinds_of,
+    schema_of,
+    write,
+)
 
 Answered = Callable[[Envelope[Message] | None], None]
 """Callback with the answer to a question, or None if the component died over it."""
@@ -34,6 +44,7 @@ class LocalNetwork:
         self.listeners: dict[Conversation, list[Listening]] = defaultdict(list)
         self.tokens: dict[str, list[Declaration]] = {}
         self.watchers: list[Watching] = []
+        self.overhearers: list[Overheard] = []
 
     def join(self, source: str, clock: Clock) -> LocalBus:
         """Return a new bus of the component ``source`` on this network."""
@@ -100,6 +111,8 @@ class Neighbor(BusBase):
         for listening in self.network.listeners[conversation]:
             if _matches(listening.pattern, address):
                 self.network.carry_publication(listening, address, envelope)
+        for overheard in self.network.overhearers:
+            overheard.arrived(address, conversation, envelope)
 
     def serve_neighbors(self, address: str, accepts: Accepts, answer: Answer) -> Serving:
         """Answer questions from this process; if several neighbors serve an address, the newest one answers."""
@@ -113,6 +126,14 @@ class Neighbor(BusBase):
         listening = Listening(self, address, conversation, accepts, listener, latest)
         self.network.listeners[conversation].append(listening)
         return listening
+
+    def overhear_neighbors(
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int
+    ) -> Overheard:
+        """Subscribe to a conversation of all components of this process."""
+        overheard = Overheard(self, conversation, listener, most_waiting_bytes)
+        self.network.overhearers.append(overheard)
+        return overheard
 
     def declare_to_neighbors(self, address: str) -> Declaration:
         """Raise a token in this process."""
@@ -216,6 +237,33 @@ class Listening(Declaration):
             self.owner.unreadable += 1
 
 
+class Overheard(Declaration):
+    """A declaration that subscribes to a conversation of all components, as bytes."""
+
+    def __init__(self, owner: Neighbor, conversation: Conversation, listener: Overhearer, most: int) -> None:
+        super().__init__(owner, lambda: owner.network.overhearers.remove(self))
+        self._conversation, self._listener, self._most = conversation, listener, most
+        self._waiting = self.dropped = 0
+
+    def arrived(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
+        """Deliver a publication in a step of its own, unless too many wait."""
+        if conversation is not self._conversation:
+            return
+        raw = write(envelope)
+        if self._waiting + len(raw) > self._most:
+            self.dropped += 1
+            return
+        self._waiting += len(raw)
+        name = key(self.owner.network.mission, address, conversation)
+        asyncio.get_running_loop().call_soon(self._hand_over, name, raw)
+
+    def _hand_over(self, name: str, raw: bytes) -> None:
+        self._waiting -= len(raw)
+        if not self.closed:
+            self.owner.heard += 1
+            self.owner.call("", self._listener, name, raw)
+
+
 class Watching(Declaration):
     """A declaration that watches tokens."""
 
@@ -271,6 +319,11 @@ class LocalBus(Neighbor):
         self.require_open()
         _check(self.mission, address)
         return self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest)
+
+    def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overheard:
+        """Subscribe to a conversation of all components; see ``Bus.overhear``."""
+        self.require_open()
+        return self.overhear_neighbors(conversation, listener, most_waiting_bytes)
 
     def declare_alive(self, address: str) -> Declaration:
         """Raise a liveliness token; see ``Bus.declare_alive``."""

@@ -15,7 +15,16 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from backbone.bus.interface import Answer, Clock, LifeListener, Listener, Reply, Subscription
+from backbone.bus.interface import (
+    Answer,
+    Clock,
+    LifeListener,
+    Listener,
+    Overhearer,
+    Overhearing,
+    Reply,
+    Subscription,
+)
 from backbone.bus.local_bus import LocalNetwork, Neighbor
 from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session, watch_links
 from backbone.keys import Conversation
@@ -78,6 +87,11 @@ class SharedBus(Neighbor, ZenohBus):
         """Subscribe to publications; see ``Bus.subscribe``."""
         elsewhere = super().subscribe(address, conversation, accepts, listener, latest=latest)
         return _Both(self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest), elsewhere)
+
+    def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
+        """Subscribe to a conversation of all components, neighbors too; see ``Bus.overhear``."""
+        elsewhere = super().overhear(conversation, listener, most_waiting_bytes)
+        return _BothHeard(elsewhere, self.overhear_neighbors(conversation, listener, most_waiting_bytes))
 
     def declare_alive(self, address: str) -> Subscription:
         """Raise a liveliness token; see ``Bus.declare_alive``."""
@@ -171,3 +185,15 @@ class _Both:
         """Withdraw both, in order."""
         for declared in self._declared:
             declared.close()
+
+
+class _BothHeard(_Both):
+    """Two subscriptions to whole conversations."""
+
+    def __init__(self, first: Overhearing, second: Overhearing) -> None:
+        super().__init__(first, second)
+        self._heard = (first, second)
+
+    @property
+    def dropped(self) -> int:
+        return sum(heard.dropped for heard in self._heard)

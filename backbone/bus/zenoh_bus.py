@@ -21,11 +21,21 @@ from typing import Any, TypeVar, cast
 import zenoh
 
 from backbone.bus.bus_base import BusBase
-from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
+from backbone.bus.interface import (
+    Answer,
+    Clock,
+    LifeListener,
+    LinkListener,
+    Listener,
+    Overhearer,
+    Overhearing,
+    Reply,
+    Subscription,
+)
 from backbone.bus.sockets import close_without_waiting
 from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
-from backbone.keys import Conversation, address_of, key
+from backbone.keys import Conversation, address_of, key, key_of_all
 from backbone.waiting import settle
 from backbone.wire import (
     Accepts,
@@ -291,6 +301,13 @@ class ZenohBus(BusBase):
         receive = _Latest(self, _reader(accepts), listener) if latest else _Each(self, _reader(accepts), listener)
         return self._declare(self._session.declare_subscriber(pattern, receive))
 
+    def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
+        """Subscribe to whole conversations, unread; see ``Bus.overhear``."""
+        self.require_open()
+        heard = _Overheard(self, listener, most_waiting_bytes)
+        heard.declared = self._declare(self._session.declare_subscriber(key_of_all(self._mission, conversation), heard))
+        return heard
+
     # ------------------------------------------------------------------ life
     def declare_alive(self, address: str) -> Subscription:
         """Raise this component's liveliness token; see ``Bus.declare_alive``."""
@@ -454,6 +471,38 @@ class _Each:
             log.warning("unreadable publication on %s: %s", sample.key_expr, unreadable.detail)
             return
         self._bus.hear(self._listener, envelope)
+
+
+class _Overheard:
+    """Receives every sample of a subscriber, in order, as long as few of them wait."""
+
+    def __init__(self, bus: ZenohBus, listener: Overhearer, most_waiting_bytes: int) -> None:
+        self._bus, self._listener, self._most = bus, listener, most_waiting_bytes
+        self._came = self._went = 0  # bytes; each is written by one thread only
+        self._dropped = 0
+        self.declared: _Declared | None = None
+
+    @property
+    def dropped(self) -> int:
+        return self._dropped
+
+    def __call__(self, sample: zenoh.Sample) -> None:
+        length = len(sample.payload)
+        if self._came - self._went + length > self._most:
+            self._dropped += 1
+            return
+        self._came += length
+        self._bus.push(self._hand_over, sample)
+
+    def _hand_over(self, sample: zenoh.Sample) -> None:
+        raw = sample.payload.to_bytes()
+        self._went += len(raw)
+        self._bus.heard += 1
+        self._bus.call("", self._listener, str(sample.key_expr), raw)
+
+    def close(self) -> None:
+        if self.declared is not None:
+            self.declared.close()
 
 
 class _Latest(_Each):

@@ -25,7 +25,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.errors import NoResponder, Refusal, ReplyTimeout, UnknownRefusal
 from backbone.keys import Conversation
 from backbone.naming import IllegalName
-from backbone.wire import Envelope, MalformedMessage, Message, UnknownMessage
+from backbone.wire import Envelope, MalformedMessage, Message, Reader, UnknownMessage, write
 
 marks = itertools.count()
 DEADLINE_S = 10.0  # of real or virtual time, for anything that must happen; a test fails with a message after it
@@ -562,6 +562,69 @@ def test_only_the_address_and_conversation_subscribed_to_are_heard(on_bus: Runne
         assert exact.numbers() == [1, 5]
         assert subsystem.numbers() == [1, 2, 5]
         assert everything.numbers() == [1, 2, 3, 5]
+
+    on_bus(law)
+
+
+def test_a_conversation_is_overheard_whoever_says_what_in_it(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, other, listener = net.join(SERVER), net.join(THIRD), net.join(ASKER)
+        heard: list[tuple[str, int]] = []
+        came = asyncio.Event()
+
+        def overheard(key: str, raw: bytes) -> None:
+            heard.append((key, Reader(News).read(raw).body.number))
+            came.set()
+
+        subscribed = listener.overhear(Conversation.EVENTS, overheard, 1_000_000)
+        await until_known(listener, source)
+        await until_known(listener, other)
+        source.publish("resource_pool/scout1", Conversation.STATUS, News(0))
+        source.publish("resource_pool/scout1", Conversation.EVENTS, News(1))
+        source.publish("backbone/scout1/claim", Conversation.EVENTS, News(2))
+        other.publish(THIRD, Conversation.EVENTS, News(3))
+
+        async def all_came() -> None:
+            while len(heard) < 3:
+                came.clear()
+                await came.wait()
+
+        await within(all_came(), "all three")
+        assert sorted(heard, key=lambda one: one[1]) == [
+            ("scout/conformance/resource_pool/scout1/events", 1),
+            ("scout/conformance/backbone/scout1/claim/events", 2),
+            (f"scout/conformance/{THIRD}/events", 3),
+        ]
+        assert subscribed.dropped == 0
+        subscribed.close()
+        subscribed.close()
+
+    on_bus(law)
+
+
+def test_who_overhears_too_slowly_loses_messages_and_knows_how_many(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, listener = net.join(SERVER), net.join(ASKER)
+        heard, last = [0], Heard()
+        most = 20 * len(write(Envelope(1, SERVER, 1, 0.0, "", News(1))))
+
+        def overheard(_key: str, _raw: bytes) -> None:
+            heard[0] += 1
+
+        listener.subscribe(SERVER, Conversation.STATUS, News, last)
+        subscribed = listener.overhear(Conversation.EVENTS, overheard, most)
+        await until_known(listener, source)
+        for number in range(500):
+            source.publish(SERVER, Conversation.EVENTS, News(number))
+        await until_known(source, listener)
+        while heard[0] + subscribed.dropped < 500:
+            await net.clock.sleep_s(0.01)
+        source.publish(SERVER, Conversation.EVENTS, News(1))
+        source.publish(SERVER, Conversation.STATUS, News(2))
+        await last.until_count(1)
+        while heard[0] + subscribed.dropped < 501:
+            await net.clock.sleep_s(0.01)
+        assert heard[0] >= 20
 
     on_bus(law)
 
