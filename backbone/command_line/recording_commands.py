@@ -1,0 +1,126 @@
+"""``scout-backbone record`` and ``scout-backbone recording``: make recordings, and look into them.
+
+Rules of this file: as those of ``cli``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from backbone.command_line.options import (
+    AsJson,
+    CommandTable,
+    Endpoint,
+    MissionName,
+    SecretFile,
+    chosen,
+    run,
+)
+
+record = typer.Typer(cls=CommandTable, rich_markup_mode=None, help="Record a mission that is up, until Ctrl-C.")
+recording = typer.Typer(
+    cls=CommandTable,
+    rich_markup_mode=None,
+    no_args_is_help=True,
+    help="Look into a recording; needs no mission.",
+)
+
+File = Annotated[Path, typer.Argument(metavar="FILE.mcap", help="A recording.")]
+Keys = Annotated[
+    list[str] | None,
+    typer.Option("--keys", metavar="GLOB", help="Only keys that match, as 'resource_pool/*/readings'; repeatable."),
+]
+Since = Annotated[float, typer.Option("--since", min=0.0, help="Not before this mission time, seconds.")]
+Until = Annotated[float | None, typer.Option("--until", min=0.0, help="Not after this mission time, seconds.")]
+MOST_LINES = 1_000_000
+LONGEST_S = 1e9
+
+
+@record.callback(invoke_without_command=True)
+def record_mission(
+    context: typer.Context,
+    to: Annotated[
+        Path | None, typer.Option("--to", metavar="FILE.mcap", help="A new file; default: named by mission and time.")
+    ] = None,
+    keys: Keys = None,
+    for_s: Annotated[
+        float | None, typer.Option("--for", min=0.1, max=LONGEST_S, help="End after so many seconds.")
+    ] = None,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Record all publications of a mission that is up, until Ctrl-C; a file that exists is refused."""
+    if context.invoked_subcommand is not None:
+        return
+    from backbone.command_line.recording_work import record_to
+
+    where = chosen(mission, connect, secret_file)
+    run(lambda: record_to(where, to, keys or [], for_s))
+
+
+@record.command()
+def recover(
+    file: Annotated[Path, typer.Argument(metavar="FILE.mcap", help="A recording whose recorder was killed.")],
+    to: Annotated[Path, typer.Argument(metavar="TO.mcap", help="The new file.")],
+) -> None:
+    """Write what is readable of a broken recording to a new file."""
+    from backbone.command_line.recording_work import recover_to
+
+    run(lambda: recover_to(file, to))
+
+
+@recording.command()
+def info(file: File, as_json: AsJson = False) -> None:
+    """Print what a recording is of: mission, times, versions, numbers of messages."""
+    from backbone.command_line.recording_work import print_info
+
+    run(lambda: print_info(file, as_json=as_json))
+
+
+@recording.command("keys")
+def list_keys(file: File, as_json: AsJson = False) -> None:
+    """List its keys, with sender, schema, number and rate of messages."""
+    from backbone.command_line.recording_work import print_keys
+
+    run(lambda: print_keys(file, as_json=as_json))
+
+
+@recording.command("print")
+def print_(
+    file: File,
+    keys: Keys = None,
+    since: Since = 0.0,
+    until: Until = None,
+    most: Annotated[int, typer.Option("--most", min=1, max=MOST_LINES, help="Largest number of messages.")] = 1_000,
+    as_json: AsJson = False,
+) -> None:
+    """Print its messages in the order of their arrival; with --json, whole, one in each line."""
+    from backbone.command_line.recording_work import print_messages
+
+    run(lambda: print_messages(file, tuple(keys or ()), since, until, most, as_json=as_json))
+
+
+@recording.command("story")
+def print_story(
+    file: File,
+    name: Annotated[str, typer.Argument(help="A component, robot, behavior or person; default: all.")] = "",
+    since: Since = 0.0,
+    until: Until = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print the events of the mission's log that it holds, as 'story' and 'log' print them live."""
+    from backbone.command_line.recording_work import print_events
+
+    run(lambda: print_events(file, name, since, until, as_json=as_json))
+
+
+@recording.command("mission")
+def print_mission(file: File) -> None:
+    """Print the mission file that was up."""
+    from backbone.command_line.recording_work import print_mission_file
+
+    run(lambda: print_mission_file(file))

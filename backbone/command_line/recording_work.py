@@ -1,0 +1,279 @@
+"""The work of ``scout-backbone record`` and ``scout-backbone recording``."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import datetime, timedelta
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from backbone.addresses import COMPONENT_DATABASE, LAUNCHER
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
+from backbone.command_line.options import DISTRIBUTION
+from backbone.command_line.where import Where
+from backbone.component.launch import Launch
+from backbone.component.messages import StoryEvent
+from backbone.component_database.messages import ListTypes, Types
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.launcher import mission_connection
+from backbone.launcher.endings import ExitCode, say, show
+from backbone.launcher.messages import AskTree, Tree
+from backbone.mission_log.lines import event_json, story_lines
+from backbone.mission_log.log import MissionLog
+from backbone.mission_log.operators import OperatorActed
+from backbone.mission_log.question import LogQuestion
+from backbone.moments import Now
+from backbone.naming import Subsystem, address
+from backbone.recording.known_messages import message_classes
+from backbone.recording.reader import Recorded, Recording, recover_file
+from backbone.recording.recorder import Recorder
+from backbone.recording.revival import revived
+from backbone.spoken import counted
+
+REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
+LONGEST_BODY = 160  # chosen: a line of a wide terminal
+VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
+
+
+class FileUnusable(Refusal):
+    """A recording cannot be written or read there."""
+
+    code = "usage.file"
+    remedy = "Name a recording that this user may read, or a new file in a folder where this user may write."
+
+
+# ---------------------------------------------------------------------- making one
+async def record_to(where: Where, to: Path | None, keys: list[str], for_s: float | None) -> ExitCode:
+    """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended."""
+    name = f"recorder-{os.getpid()}"
+    source = address(Subsystem.BACKBONE, name)
+    async with mission_connection.connected(where.mission, where.connect, source, where.secret()) as (bus, clock):
+        path = to or Path(f"{bus.mission}-{datetime.now():%Y%m%d-%H%M%S}.mcap")
+        mission_xml, classes = await _mission_file(bus), message_classes(await _modules(bus))
+        with _new_file(path) as file:
+            launch = Launch(
+                bus.mission,
+                Subsystem.BACKBONE,
+                name,
+                "recorder",
+                "backbone.recording.recorder:Recorder",
+                socket.gethostname(),
+                "",
+                clock.origin_monotonic_s,
+                clock.rate,
+                {"keys": keys},
+            )
+            about = _about(bus, clock, keys)
+            recorder = Recorder(
+                launch, bus, clock, file=file, path=path, classes=classes, about=about, mission_xml=mission_xml
+            )
+            with suppress(OSError):
+                os.nice(10)  # who decides goes before who records
+            await _run(recorder, path, for_s)
+    say(f"{path}: {counted(recorder.written, 'message')}")
+    if recorder.dropped:
+        say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
+    return ExitCode.REFUSED if recorder.is_full else ExitCode.DONE
+
+
+async def _run(recorder: Recorder, path: Path, for_s: float | None) -> None:
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, recorder.end, number.name)
+    timer = loop.call_later(for_s, recorder.end, f"{for_s:g} s are over") if for_s is not None else None
+    say(f"records to {path}; Ctrl-C ends it")
+    try:
+        await recorder.run()
+    finally:
+        if timer is not None:
+            timer.cancel()
+
+
+async def _mission_file(bus: Bus) -> str:
+    try:
+        return (await bus.ask(LAUNCHER, AskTree(), Tree, within_s=REPLY_TIME_S)).text
+    except (LinkError, Refusal) as error:
+        say(f"the mission file is not in the recording: {error}")
+        return ""
+
+
+async def _modules(bus: Bus) -> list[str]:
+    """Return the modules of the mission's component types, whose messages may stand there."""
+    try:
+        types = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
+    except (LinkError, Refusal) as error:
+        say(f"messages of the mission's own types are recorded without names: {error}")
+        return []
+    return sorted({one.component_type.class_path.partition(":")[0] for one in types.types})
+
+
+def _about(bus: Bus, clock: MissionClock, keys: list[str]) -> dict[str, str]:
+    begun = datetime.now().astimezone() - timedelta(seconds=clock.now_s() / clock.rate)
+    facts = {
+        "mission": bus.mission,
+        "begun": begun.isoformat(timespec="milliseconds"),
+        "clock_rate": f"{clock.rate:g}",
+        "recorded_on": socket.gethostname(),
+        "recorded_keys": " ".join(keys) or "all",
+        "python": sys.version.partition(" ")[0],
+    }
+    for package in VERSIONS_OF:
+        with suppress(PackageNotFoundError):
+            facts[package] = version(package)
+    return facts
+
+
+@contextmanager
+def _new_file(path: Path) -> Iterator[Any]:
+    try:
+        file = path.open("xb")
+    except FileExistsError as error:
+        raise FileUnusable(f"{path} exists", remedy="Name a new file.") from error
+    except OSError as error:
+        raise FileUnusable(f"{path} cannot be written: {error.strerror or error}") from error
+    with file:
+        yield file
+
+
+async def recover_to(path: Path, to: Path) -> ExitCode:
+    """Write what is readable to a new file, read it back, and print how much it is."""
+    try:
+        count = recover_file(path, to)
+    except FileExistsError as error:
+        raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
+    except OSError as error:
+        raise FileUnusable(f"{error.filename or path}: {error.strerror or error}") from error
+    with _opened(to) as made:
+        assert made.contents().messages == count  # noqa: S101  what was written can be read
+    say(f"{to}: {counted(count, 'message')}")
+    return ExitCode.DONE
+
+
+# ---------------------------------------------------------------------- looking into one
+async def print_info(path: Path, *, as_json: bool) -> ExitCode:
+    """Print facts, times and numbers."""
+    with _opened(path) as recording:
+        found = recording.contents()
+    facts = found.about | {
+        "begin_s": found.begin_s,
+        "end_s": found.end_s,
+        "messages": found.messages,
+        "keys": len({one.key for one in found.counts}),
+        "bytes": _size(path),
+    }
+    if as_json:
+        show([json.dumps(facts)])
+        return ExitCode.DONE
+    for name, value in facts.items():
+        show([f"{name:16s} {value:.3f}" if isinstance(value, float) else f"{name:16s} {value}"])
+    return ExitCode.DONE
+
+
+async def print_keys(path: Path, *, as_json: bool) -> ExitCode:
+    """Print a line for each key, sender and schema."""
+    with _opened(path) as recording:
+        found = recording.contents()
+    lasted_s = max(found.end_s - found.begin_s, 1e-9)
+    rows = [
+        {"key": one.key, "source": one.source, "schema": one.schema, "messages": one.messages} for one in found.counts
+    ]
+    if as_json:
+        show(json.dumps(row) for row in rows)
+        return ExitCode.DONE
+    show(
+        f"{one.messages:8d} {one.messages / lasted_s:9.2f}/s  {one.key}  {one.schema or 'no message'}"
+        + ("" if one.key.split("/", 2)[-1].startswith(one.source) else f"  from {one.source}")
+        for one in found.counts
+    )
+    return ExitCode.DONE
+
+
+async def print_messages(
+    path: Path, keys: tuple[str, ...], since_s: float, until_s: float | None, most: int, *, as_json: bool
+) -> ExitCode:
+    """Print a line for each message, at most so many."""
+    left_out = 0
+    with _opened(path) as recording:
+        for number, message in enumerate(recording.messages(keys, since_s, until_s)):
+            if number >= most:
+                left_out += 1
+            else:
+                show([json.dumps(_plain(message)) if as_json else _line(message)])
+    if left_out:
+        say(f"{counted(left_out, 'later message')} left out; see --most, --since and --keys")
+    return ExitCode.DONE
+
+
+async def print_events(path: Path, name: str, since_s: float, until_s: float | None, *, as_json: bool) -> ExitCode:
+    """Print the events about a name, as the live mission would."""
+    log = MissionLog()
+    with _opened(path) as recording:
+        for message in recording.messages((f"*/{Conversation.LOG}", f"*/{Conversation.OPERATORS}")):
+            if message.schema == "StoryEvent/1":
+                log.add(revived(StoryEvent, message.body))
+            elif message.schema == "OperatorActed/1":
+                log.add(revived(OperatorActed, message.body).event(message.source, message.cause))
+        end_s = recording.contents().end_s
+    until = f"{until_s if until_s is not None else end_s + 1}"
+    asked = LogQuestion(robot=name, since=f"{since_s}", until=until).asked(Now(end_s, datetime.now()))
+    events = log.answer(asked).events
+    show([json.dumps(event_json(event)) for event in events] if as_json else story_lines(events))
+    if not events:
+        say(f"no event about {name}" if name else "no event")
+    return ExitCode.DONE
+
+
+async def print_mission_file(path: Path) -> ExitCode:
+    """Print the mission file."""
+    with _opened(path) as recording:
+        text = recording.mission_xml()
+    if not text:
+        say("the recording has no mission file")
+        return ExitCode.REFUSED
+    show(text.splitlines())
+    return ExitCode.DONE
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Recording]:
+    try:
+        file = path.open("rb")
+    except OSError as error:
+        raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
+    with file:
+        yield Recording(file)
+
+
+def _line(message: Recorded) -> str:
+    said = message.body if isinstance(message.body, bytes) else json.dumps(message.body, separators=(",", ":"))
+    body = str(said)
+    shown = body if len(body) <= LONGEST_BODY else f"{body[: LONGEST_BODY - 1]}…"
+    return f"{message.at_s:10.3f} s  {message.key.split('/', 2)[-1]}  {message.schema}  {shown}"
+
+
+def _plain(message: Recorded) -> dict[str, object]:
+    body = message.body.hex() if isinstance(message.body, bytes) else message.body
+    return {
+        "at_s": message.at_s,
+        "key": message.key,
+        "source": message.source,
+        "schema": message.schema,
+        "sequence": message.sequence,
+        "stamp_s": message.stamp_s,
+        "cause": message.cause,
+        "body": body,
+    }

@@ -1,0 +1,1 @@
+"""Recordings: everything that crossed the bus, decisions included, in MCAP files."""

@@ -1,0 +1,261 @@
+"""Reader of recordings; it needs neither the mission nor its robots, nor the classes of the messages."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import IO, Any, cast
+
+import msgspec
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.summary import Summary
+from mcap.writer import CompressionType, Writer
+from zstandard import ZstdError
+
+from backbone.errors import Refusal
+from backbone.recording.writer import ABOUT, CHUNK_BYTES, NS, PROFILE
+
+MOST_RECORD_BYTES = 64 * 1024 * 1024  # chosen: eight times the largest message; a damaged length asks for terabytes
+_DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
+_END = struct.Struct("<BQQQI8x")  # MCAP specification, op 0x02 and the magic: the end of every whole file
+
+
+class NoRecording(Refusal):
+    """The file is no recording, or its end is missing."""
+
+    code = "recording.unreadable"
+    remedy = "If its recorder was killed: scout-backbone record recover FILE TO."
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """One message of a recording.
+
+    Attributes:
+        key: Key expression on the bus.
+        source: Address of the sender.
+        schema: ``<Name>/<version>``; empty: the bytes were no message.
+        at_s: Mission time when the recorder got it.
+        stamp_s: Mission time when it was sent.
+        sequence: Its number among those of the sender.
+        cause: Id of the message that led to it.
+        body: Its fields by name; a list without names if no installed package had its class; else the bytes.
+    """
+
+    key: str
+    source: str
+    schema: str
+    at_s: float
+    stamp_s: float
+    sequence: int
+    cause: str
+    body: Any
+
+    @property
+    def id(self) -> str:
+        """``<source>#<sequence>``, as causes name it."""
+        return f"{self.source}#{self.sequence}"
+
+
+@dataclass(slots=True)
+class KeyCount:
+    """What a recording holds of one key, sender and schema."""
+
+    key: str
+    source: str
+    schema: str
+    messages: int
+
+
+@dataclass(slots=True)
+class Contents:
+    """What a recording holds.
+
+    Attributes:
+        about: Facts about the mission.
+        begin_s: Mission time of its first message.
+        end_s: Of its last.
+        messages: Their number.
+        counts: By key, sender and schema, in the order of keys.
+    """
+
+    about: dict[str, str] = field(default_factory=dict)
+    begin_s: float = 0.0
+    end_s: float = 0.0
+    messages: int = 0
+    counts: list[KeyCount] = field(default_factory=list)
+
+
+class Recording:
+    """A recording in a file.
+
+    Args:
+        file: Read until the recording is not used any more; not closed.
+
+    Raises:
+        NoRecording: The file is none, or its recorder was killed.
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        try:
+            _check_index(file)
+            self._reader = SeekingReader(file, validate_crcs=True, record_size_limit=MOST_RECORD_BYTES)
+            summary = self._reader.get_summary()
+        except (*_DAMAGED, OSError) as error:
+            raise NoRecording(f"no whole recording: {error}") from error
+        if summary is None or summary.statistics is None:
+            raise NoRecording("the recording has no index")
+        self._summary: Summary = summary
+
+    def contents(self) -> Contents:
+        """Return what it holds, from its index alone."""
+        statistics = self._summary.statistics
+        assert statistics is not None  # noqa: S101  checked when it was opened
+        counted = statistics.channel_message_counts
+        counts = [
+            KeyCount(*_named(channel), counted.get(number, 0)) for number, channel in self._summary.channels.items()
+        ]
+        about = next((one.metadata for one in self._reader.iter_metadata() if one.name == ABOUT), {})
+        return Contents(
+            dict(about),
+            statistics.message_start_time / NS,
+            statistics.message_end_time / NS,
+            statistics.message_count,
+            sorted(counts, key=lambda one: (one.key, one.source, one.schema)),
+        )
+
+    def mission_xml(self) -> str:
+        """Return the mission file; empty: it was not known."""
+        files = (one for one in self._reader.iter_attachments() if one.name == "mission.xml")
+        found = next(files, None)
+        return found.data.decode() if found is not None else ""
+
+    def messages(
+        self, patterns: Mapping[str, None] | tuple[str, ...] = (), since_s: float = 0.0, until_s: float | None = None
+    ) -> Iterator[Recorded]:
+        """Yield the messages in the order of their arrival.
+
+        Args:
+            patterns: Only of keys that match one of these; none: all. ``scout/<mission>/`` may be left out.
+            since_s: Not before this mission time.
+            until_s: Not after it; None: to the end.
+        """
+        topics = None
+        if patterns:
+            channels = self._summary.channels.values()
+            topics = [one.topic for one in channels if is_meant(one.metadata.get("key", one.topic), tuple(patterns))]
+        end_ns = None if until_s is None else round(until_s * NS)
+        found = self._reader.iter_messages(topics, starting_at=max(0, round(since_s * NS)), ending_at=end_ns)
+        try:
+            for _schema, channel, message in found:
+                yield _recorded(channel, message)
+        except _DAMAGED as error:
+            raise NoRecording(f"the recording is damaged: {error}") from error
+
+
+def is_meant(key: str, patterns: tuple[str, ...]) -> bool:
+    """Return whether a key matches one of these patterns, with or without ``scout/<mission>/`` before it.
+
+    Example:
+        >>> is_meant("scout/iros2001/resource_pool/scout1/telemetry", ("*/scout1/*",))
+        True
+    """
+    short = key.split("/", 2)[-1]
+    return any(fnmatchcase(key, pattern) or fnmatchcase(short, pattern) for pattern in patterns)
+
+
+def recover(damaged: IO[bytes], to: IO[bytes]) -> int:
+    """Write a whole recording with all messages before the damage; return their number.
+
+    Raises:
+        NoRecording: Not even the begin is there.
+    """
+    writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer.start(profile=PROFILE, library=PROFILE)
+    schemas: dict[int, int] = {0: 0}
+    channels: dict[int, int] = {}
+    count, has_begun = 0, False
+    reader = StreamReader(cast("Any", damaged), validate_crcs=True, record_size_limit=MOST_RECORD_BYTES)
+    try:
+        for record in reader.records:
+            has_begun = True
+            match record:
+                case Schema() if record.id not in schemas:
+                    schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+                case Channel() if record.id not in channels:
+                    channels[record.id] = writer.register_channel(
+                        record.topic, record.message_encoding, schemas[record.schema_id], record.metadata
+                    )
+                case Message():
+                    writer.add_message(
+                        channels[record.channel_id],
+                        record.log_time,
+                        record.data,
+                        record.publish_time,
+                        record.sequence,
+                    )
+                    count += 1
+                case Metadata():
+                    writer.add_metadata(record.name, record.metadata)
+                case Attachment():
+                    writer.add_attachment(
+                        record.create_time, record.log_time, record.name, record.media_type, record.data
+                    )
+    except _DAMAGED as error:
+        if not has_begun:
+            raise NoRecording(f"no recording: {error}") from error
+    writer.finish()  # type: ignore[no-untyped-call]
+    return count
+
+
+def recover_file(path: Path, to: Path) -> int:
+    """Write what is readable of a recording to a new file; return the number of its messages.
+
+    Raises:
+        NoRecording: It is none.
+        FileExistsError: The new file exists.
+        OSError: One of them cannot be opened.
+    """
+    with path.open("rb") as damaged, to.open("xb") as made:
+        return recover(damaged, made)
+
+
+def _check_index(file: IO[bytes]) -> None:
+    """Return if the index is as it was written; the library checks only the messages.
+
+    Raises:
+        ValueError: It is not, or the file has no end.
+    """
+    end = file.seek(0, os.SEEK_END) - _END.size
+    file.seek(max(0, end))
+    footer = file.read(_END.size)
+    _operation, _length, begin, _offsets, checksum = _END.unpack(footer)
+    if not 0 < begin <= end:
+        raise ValueError("it has no index")
+    file.seek(begin)
+    if zlib.crc32(file.read(end - begin) + footer[: _END.size - 12]) != checksum:
+        raise ValueError("its index is damaged")
+    file.seek(0)
+
+
+def _named(channel: Channel) -> tuple[str, str, str]:
+    about = channel.metadata
+    return about.get("key", channel.topic), about.get("source", ""), about.get("schema", "")
+
+
+def _recorded(channel: Channel, message: Message) -> Recorded:
+    key, source, schema = _named(channel)
+    if channel.message_encoding != "json":
+        stamp_s = message.publish_time / NS
+        return Recorded(key, source, schema, message.log_time / NS, stamp_s, message.sequence, "", message.data)
+    said = msgspec.json.decode(message.data)
+    at_s = message.log_time / NS
+    return Recorded(key, source, schema, at_s, said["stamp_s"], said["sequence"], said["cause"], said["body"])

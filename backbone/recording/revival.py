@@ -1,0 +1,87 @@
+"""From a recorded body back to the message that was sent. Pure."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import inspect
+
+from backbone.errors import Refusal
+from backbone.recording.json_schema import TAG, fields_of
+from backbone.wire import Message, schema_of
+
+Kind = TypeVar("Kind", bound=Message)
+
+
+class OtherForm(Refusal):
+    """A recorded message does not have the form that its class has in this release."""
+
+    code = "recording.form"
+    remedy = "Look into the recording with the release that made it, see 'scout-backbone recording info'."
+
+
+def revived(kind: type[Kind], body: dict[str, Any]) -> Kind:
+    """Return the message of this class that a recorded body holds; fields that are newer have their defaults.
+
+    Raises:
+        OtherForm: The body is of another form.
+    """
+    try:
+        listed = _listed_struct(kind, body)
+        return msgspec.json.decode(msgspec.json.encode(listed), type=kind)
+    except (msgspec.DecodeError, LookupError, TypeError, AttributeError) as error:
+        raise OtherForm(f"{schema_of(kind)}: {error}") from error
+
+
+def _listed(kind: inspect.Type, value: Any) -> Any:
+    """Return the value in the form of the wire: structs whose class says so are lists."""
+    match kind:
+        case inspect.StructType(cls=struct):
+            return _listed_struct(struct, value)
+        case inspect.Metadata(type=inner):
+            return _listed(inner, value)
+        case inspect.ListType(item_type=inner) | inspect.VarTupleType(item_type=inner):
+            return [_listed(inner, each) for each in value]
+        case inspect.TupleType(item_types=inners):
+            return [_listed(inner, each) for inner, each in zip(inners, value, strict=True)]
+        case inspect.DictType(value_type=inner):
+            return {name: _listed(inner, each) for name, each in value.items()}
+        case inspect.UnionType(types=types):
+            fits = next((one for one in types if _may_hold(one, value)), None)
+            return value if fits is None else _listed(fits, value)
+    return value
+
+
+def _may_hold(kind: inspect.Type, value: Any) -> bool:
+    """Return whether a value of a union, which is no plain one, is of this kind."""
+    match kind:
+        case inspect.StructType(cls=struct):
+            if isinstance(value, dict) and TAG in value and issubclass(struct, Message):
+                return bool(value[TAG] == schema_of(struct))
+            return isinstance(value, dict)
+        case inspect.DictType():
+            return isinstance(value, dict)
+        case inspect.ListType() | inspect.VarTupleType() | inspect.TupleType():
+            return isinstance(value, list)
+        case inspect.Metadata(type=inner):
+            return _may_hold(inner, value)
+    return False
+
+
+def _listed_struct(struct: type[msgspec.Struct], value: dict[str, Any]) -> Any:
+    fields, config = fields_of(struct), struct.__struct_config__
+    named = {field.encode_name: _field(field, value) for field in fields}
+    if not config.array_like:
+        return named if config.tag is None else {config.tag_field: config.tag, **named}
+    return [*([] if config.tag is None else [config.tag]), *named.values()]
+
+
+def _field(field: inspect.Field, value: dict[str, Any]) -> Any:
+    if field.name in value:
+        return _listed(field.type, value[field.name])
+    if field.default_factory is not msgspec.NODEFAULT:
+        return msgspec.to_builtins(field.default_factory())
+    if field.default is msgspec.NODEFAULT:
+        raise LookupError(f"no {field.name}")
+    return msgspec.to_builtins(field.default)

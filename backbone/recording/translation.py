@@ -1,0 +1,89 @@
+"""From the bytes of a message on the bus to what a recording holds of it. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Union, cast
+
+import msgspec
+
+from backbone.recording.json_schema import TAG
+from backbone.wire import Envelope, Message, schema_of
+
+_UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+
+@dataclass(frozen=True, slots=True)
+class Translated:
+    """A message as a recording holds it.
+
+    Attributes:
+        schema: ``<Name>/<version>``; empty: the bytes were no message.
+        source: Address of the sender; empty: the same.
+        sequence: Its number among those of the sender.
+        stamp_s: Mission time of sending.
+        kind: Its class; None: no installed package has it.
+        data: JSON, or the bytes as they were if they are no message.
+    """
+
+    schema: str
+    source: str
+    sequence: int
+    stamp_s: float
+    kind: type[Message] | None
+    data: bytes
+
+
+class Translator:
+    """Translates messages of known classes with the names of their fields, others as they are.
+
+    Args:
+        classes: Known message classes, by schema.
+    """
+
+    def __init__(self, classes: Mapping[str, type[Message]]) -> None:
+        known: Any = Union[tuple(classes.values())]  # noqa: UP007  made at run time
+        self._known = msgspec.msgpack.Decoder(Envelope[known])
+        self._any: Any = msgspec.msgpack.Decoder(Envelope[Any])
+
+    def translate(self, raw: bytes) -> Translated:
+        """Return the message; whatever the bytes are, they are kept."""
+        try:
+            envelope = self._known.decode(raw)
+        except _UNREADABLE:
+            return self._unknown(raw)
+        kind = type(envelope.body)
+        return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, _named(envelope.body))
+
+    def _unknown(self, raw: bytes) -> Translated:
+        try:
+            envelope = self._any.decode(raw)
+        except _UNREADABLE:
+            return Translated("", "", 0, 0.0, None, raw)
+        match envelope.body:
+            case [str(schema), *_]:
+                return _translated(envelope, schema, None, envelope.body)
+        return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw)
+
+
+def _translated(envelope: Envelope[Any], schema: str, kind: type[Message] | None, body: object) -> Translated:
+    said = {"sequence": envelope.sequence, "stamp_s": envelope.stamp_s, "cause": envelope.cause, "body": body}
+    data = msgspec.json.encode(said)
+    return Translated(schema, envelope.source, envelope.sequence, envelope.stamp_s, kind, data)
+
+
+def _named(body: msgspec.Struct) -> dict[str, Any]:
+    """Return the fields of a message by name; a message inside it has its schema beside them."""
+    return {name: _value(getattr(body, name)) for name in body.__struct_fields__}
+
+
+def _value(value: object) -> Any:
+    if isinstance(value, msgspec.Struct):
+        named = _named(value)
+        return {TAG: schema_of(type(value)), **named} if isinstance(value, Message) else named
+    if isinstance(value, list | tuple | set | frozenset):
+        return [_value(each) for each in value]
+    if isinstance(value, dict):
+        return {name: _value(each) for name, each in value.items()}
+    return value

@@ -1,0 +1,154 @@
+"""What was written is read back whole and in order; of a broken file, all that was flushed."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import IO, Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from backbone.component.messages import LogLevel, StoryEvent
+from backbone.recording.known_messages import message_classes
+from backbone.recording.reader import NoRecording, Recorded, Recording, is_meant, recover, recover_file
+from backbone.recording.revival import revived
+from backbone.recording.writer import RecordingWriter
+from backbone.wire import Envelope, Message, write
+
+CLASSES = message_classes()
+SOURCES = ("resource_pool/scout1", "backbone/rc_manager")
+ABOUT = {"mission": "night", "python": "3.11"}
+
+
+def key_of(source: str) -> str:
+    return f"scout/night/{source}/log"
+
+
+def story(number: int) -> StoryEvent:
+    return StoryEvent(float(number), "backbone/launcher", f"event {number}", "scout1", "", LogLevel.NOTICE, "anna")
+
+
+def raw(source: str, number: int, body: Message) -> bytes:
+    return write(Envelope(1, source, number, number / 8, f"{source}#0", body))
+
+
+def writer(file: IO[bytes]) -> RecordingWriter:
+    return RecordingWriter(file, CLASSES, ABOUT, "<mission/>")
+
+
+def recorded(senders: list[int], flushes: frozenset[int] = frozenset(), *, whole: bool = True) -> tuple[bytes, int]:
+    """Return a recording of a message from each of these senders, and how many messages the last flush had."""
+    file, flushed = io.BytesIO(), 0
+    made = writer(file)
+    for number, sender in enumerate(senders):
+        source = SOURCES[sender]
+        made.write(key_of(source), raw(source, number, story(number)), number / 4)
+        if number in flushes:
+            made.flush()
+            flushed = number + 1
+    if whole:
+        made.finish()
+    return file.getvalue(), flushed
+
+
+def read(data: bytes, *patterns: str, **times: Any) -> list[Recorded]:
+    return list(Recording(io.BytesIO(data)).messages(patterns, **times))
+
+
+senders = st.lists(st.integers(0, 1), max_size=30)
+
+
+@given(senders)
+def test_all_messages_come_back_in_the_order_of_their_arrival(sent: list[int]) -> None:
+    data, _ = recorded(sent)
+    found = read(data)
+    assert [(one.source, one.sequence, one.at_s, one.stamp_s) for one in found] == [
+        (SOURCES[sender], number, number / 4, number / 8) for number, sender in enumerate(sent)
+    ]
+    assert [revived(StoryEvent, one.body) for one in found] == [*map(story, range(len(sent)))]
+    contents = Recording(io.BytesIO(data)).contents()
+    assert (contents.messages, contents.about) == (len(sent), ABOUT)
+    assert sum(one.messages for one in contents.counts) == len(sent)
+
+
+@given(senders, st.frozensets(st.integers(0, 29)), st.data())
+def test_of_a_recording_cut_anywhere_all_that_came_before_the_cut_is_recovered(
+    sent: list[int], flushes: frozenset[int], data: st.DataObject
+) -> None:
+    whole, flushed = recorded(sent, flushes, whole=False)
+    cut = data.draw(st.integers(0, len(whole)))
+    made = io.BytesIO()
+    try:
+        count = recover(io.BytesIO(whole[:cut]), made)
+    except NoRecording:
+        assert cut < 64, "only a file without even a header is none"
+        return
+    found = read(made.getvalue())
+    assert [one.sequence for one in found] == [*range(count)], "no gap, none twice"
+    if cut == len(whole):
+        assert count == flushed
+
+
+@given(st.data())
+def test_damage_never_reads_as_something_else(data: st.DataObject) -> None:
+    whole, _ = recorded([0, 1] * 10, frozenset({5, 11}))
+    at = data.draw(st.integers(0, len(whole) - 1))
+    broken = whole[:at] + bytes([whole[at] ^ data.draw(st.integers(1, 255))]) + whole[at + 1 :]
+    try:
+        found = read(broken)
+    except NoRecording:
+        return
+    assert found == read(whole)[: len(found)]
+
+
+@pytest.mark.parametrize("data", [b"", b"RIFF" * 100, bytes(1000)])
+def test_what_is_no_recording_is_refused_with_a_remedy(data: bytes) -> None:
+    with pytest.raises(NoRecording) as refused:
+        Recording(io.BytesIO(data))
+    assert "recover" in refused.value.remedy
+    with pytest.raises(NoRecording):
+        recover(io.BytesIO(data), io.BytesIO())
+
+
+def test_an_unfinished_recording_names_the_remedy_and_recovers(tmp_path: Path) -> None:
+    data, _ = recorded([0, 1, 0], frozenset({2}), whole=False)
+    broken, whole = tmp_path / "broken.mcap", tmp_path / "whole.mcap"
+    broken.write_bytes(data)
+    with broken.open("rb") as file, pytest.raises(NoRecording):
+        Recording(file)
+    assert recover_file(broken, whole) == 3
+    with whole.open("rb") as file:
+        recording = Recording(file)
+        assert recording.mission_xml() == "<mission/>"
+        assert recording.contents().about == ABOUT
+    with pytest.raises(FileExistsError):
+        recover_file(broken, whole)
+
+
+def test_keys_and_times_choose_messages() -> None:
+    data, _ = recorded([0, 1, 0, 1])
+    assert [one.sequence for one in read(data, "resource_pool/*/log")] == [0, 2]
+    assert [one.sequence for one in read(data, since_s=0.25, until_s=0.5)] == [1, 2]
+    assert read(data, "nobody/*") == []
+
+
+def test_unknown_messages_and_bytes_that_are_none_are_in_the_recording() -> None:
+    file = io.BytesIO()
+    made = writer(file)
+    made.write("scout/night/x/y/log", msgspec.msgpack.encode([1, "x/y", 4, 1.0, "", ["Newcomer/3", 5]]), 1.0)
+    made.write("scout/night/x/y/log", b"\xc1\xc1", 2.0)
+    made.finish()
+    unknown, bad = read(file.getvalue())
+    assert (unknown.schema, unknown.body, unknown.id) == ("Newcomer/3", ["Newcomer/3", 5], "x/y#4")
+    assert (bad.schema, bad.body, bad.at_s) == ("", b"\xc1\xc1", 2.0)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "is_so"),
+    [("*", True), ("resource_pool/*", True), ("scout/night/*", True), ("*/log", True), ("*/frames", False)],
+)
+def test_a_pattern_may_leave_the_mission_out(pattern: str, is_so: bool) -> None:
+    assert is_meant("scout/night/resource_pool/scout1/log", (pattern,)) is is_so
