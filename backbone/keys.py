@@ -20,6 +20,7 @@ class Conversation(StrEnum):
     """Kind of message under a component's address, the last segment of its key."""
 
     ASK = "ask"  # questions: request/response
+    TOLD = "told"  # copies for recorders of what they cannot overhear themselves, while there is a recorder
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
@@ -39,6 +40,19 @@ class Conversation(StrEnum):
     HEALTH = "health"  # the launcher's verdict on the whole mission
     CLOCK = "clock"
     LOG = "log"
+
+
+NEVER_DROPPED = frozenset(
+    {
+        Conversation.COMMAND,
+        Conversation.LEASES,
+        Conversation.STATUS,
+        Conversation.EVENTS,
+        Conversation.OPERATORS,
+        Conversation.SCHEDULE,
+    }
+)
+"""Conversations whose messages are sent once and must arrive: a subscriber that takes none of them blocks senders."""
 
 
 @lru_cache(maxsize=4096)

@@ -60,6 +60,9 @@ Document = Annotated[str, Meta(max_length=LONGEST_DOCUMENT)]
 # ---------------------------------------------------------------------- bytes
 Payload = Annotated[bytes, Meta(max_length=4_096)]  # chosen: forty times the radio's longest packet
 StateVector = Annotated[bytes, Meta(max_length=524_288)]  # chosen: 65 536 numbers; three Scouts need 700
+MOST_QUOTED_BYTES = 4_000_000  # chosen: two of them fit a message
+Quoted = Annotated[bytes, Meta(max_length=MOST_QUOTED_BYTES)]
+"""A message inside another, as bytes."""
 MOST_PIXEL_BYTES = 8_000_000  # chosen: a frame of 1080p in color is 6.2 MB
 Pixels = Annotated[memoryview, Meta(max_length=MOST_PIXEL_BYTES)]
 

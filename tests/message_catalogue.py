@@ -172,7 +172,8 @@ def _beyond(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
                 yield "a line more", "plain\n"
                 yield "a capital", "Plain"
         case inspect.BytesType() | inspect.MemoryViewType():
-            yield "1 MB", bytes(A_MEGABYTE)
+            if kind.max_length is None or kind.max_length < A_MEGABYTE:  # a picture or a quoted message may be longer
+                yield "1 MB", bytes(A_MEGABYTE)
             yield "one too long", bytes((kind.max_length or 0) + 1)
             yield "text", "plain"
         case inspect.BoolType():

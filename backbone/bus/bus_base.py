@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-from backbone.bus.interface import Answer, BusStatistics, Clock, Listener, current_cause
+from backbone.bus.interface import Answer, BusStatistics, Clock, Listener, Told, current_cause
 from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
+from backbone.keys import Conversation
+from backbone.ranges import MOST_QUOTED_BYTES
 from backbone.waiting import settle
-from backbone.wire import WIRE_VERSION, Envelope, Message, Refused
+from backbone.wire import WIRE_VERSION, Envelope, Message, OversizedMessage, Refused, UnwritableMessage, write
 
+log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 
@@ -89,6 +93,23 @@ class BusBase(ABC):
             return None
         return self.envelope(body)
 
+    def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
+        """Publish copies of these messages, if anybody overhears; too long ones are left out.
+
+        The publication takes no number of its own: who overhears all messages of a sender sees from their numbers
+        whether one is missing.
+        """
+        if self.closed or not self.is_overheard(Conversation.TOLD):
+            return
+        try:
+            quoted = [write(message) for message in messages]
+        except (OversizedMessage, UnwritableMessage) as refusal:
+            log.info("not told: %s", refusal)
+            return
+        if sum(map(len, quoted)) <= 2 * MOST_QUOTED_BYTES and max(map(len, quoted)) <= MOST_QUOTED_BYTES:
+            self._sequence -= 1
+            self.publish(self.source, Conversation.TOLD, Told(address, conversation, quoted))
+
     def open_question(self) -> asyncio.Future[Any]:
         """Return the future of an answer; it gets None if this bus is closed first.
 
@@ -129,6 +150,14 @@ class BusBase(ABC):
         elif asyncio.current_task() in self._tasks:
             return  # the first close waits for this answer, so this answer must not wait for the first close
         await asyncio.shield(self._closing)
+
+    @abstractmethod
+    def publish(self, address: str, conversation: Conversation, message: Message) -> None:
+        """Send the message to all subscribers; see ``Bus.publish``."""
+
+    @abstractmethod
+    def is_overheard(self, conversation: Conversation) -> bool:
+        """Return whether anybody hears what this bus publishes in this conversation at its own address."""
 
     @abstractmethod
     def take_back(self) -> None:

@@ -13,10 +13,10 @@ from __future__ import annotations
 import types
 from collections.abc import Awaitable, Callable
 from contextvars import ContextVar
-from typing import Any, Protocol, TypeVar, overload
+from typing import Annotated, Any, Protocol, TypeVar, overload
 
 from backbone.keys import Conversation
-from backbone.ranges import Count
+from backbone.ranges import FEW, Count, Mention, Quoted
 from backbone.wire import Accepts, Envelope, Message
 
 Reply = TypeVar("Reply", bound=Message)
@@ -144,7 +144,9 @@ class Bus(Protocol):
     def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
         """Call ``listener(key, bytes)``, in the event loop, with each publication of a conversation, whoever sends it.
 
-        The bytes are not read, so messages of unknown classes and malformed ones come too.
+        The bytes are not read, so messages of unknown classes and malformed ones come too. Of conversations that are
+        ``NEVER_DROPPED``, and of questions, overhear the copies in ``Conversation.TOLD``: then nobody waits for this
+        process, even if it hangs.
 
         Args:
             most_waiting_bytes: Messages that arrive while so many bytes wait for the listener are dropped and counted.
@@ -171,6 +173,23 @@ class Bus(Protocol):
         Open questions of this bus, and questions that it is still answering, end with ``NoResponder`` at their
         requesters.
         """
+
+
+class Told(Message, frozen=True):
+    """Copies of messages, published by a bus while somebody overhears that; they are dropped rather than block anybody.
+
+    A question comes with its answer or refusal, from the bus of the answerer. A publication that is never dropped comes
+    from the bus of its sender.
+
+    Attributes:
+        address: Of the key of the messages.
+        conversation: Same.
+        messages: Their envelopes, as bytes.
+    """
+
+    address: Mention
+    conversation: Mention
+    messages: Annotated[list[Quoted], FEW]
 
 
 class BusStatistics(Message, frozen=True):

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Overhearer, Reply
 from backbone.errors import NoResponder, ReplyTimeout
-from backbone.keys import Conversation, key
+from backbone.keys import NEVER_DROPPED, Conversation, key
 from backbone.waiting import settle
 from backbone.wire import (
     Accepts,
@@ -159,6 +159,13 @@ class Neighbor(BusBase):
                 self.network.carry_life(watching, standing, alive=True)
         return watching
 
+    def is_overheard_by_neighbors(self, conversation: Conversation) -> bool:
+        """Return whether anybody in this process hears this conversation of its own address."""
+        network = self.network
+        return any(overheard.hears(conversation) for overheard in network.overhearers) or any(
+            _matches(listening.pattern, self.source) for listening in network.listeners[conversation]
+        )
+
     def take_back_from_neighbors(self) -> None:
         """Withdraw all declarations in this process."""
         for declared in list(self.declared):
@@ -245,9 +252,13 @@ class Overheard(Declaration):
         self._conversation, self._listener, self._most = conversation, listener, most
         self._waiting = self.dropped = 0
 
+    def hears(self, conversation: Conversation) -> bool:
+        """Return whether it is subscribed to this conversation."""
+        return conversation is self._conversation
+
     def arrived(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Deliver a publication in a step of its own, unless too many wait."""
-        if conversation is not self._conversation:
+        if not self.hears(conversation):
             return
         raw = write(envelope)
         if self._waiting + len(raw) > self._most:
@@ -310,7 +321,10 @@ class LocalBus(Neighbor):
             return
         _check(self.mission, address)
         self.published += 1
-        self.publish_to_neighbors(address, conversation, self.envelope(message))
+        envelope = self.envelope(message)
+        self.publish_to_neighbors(address, conversation, envelope)
+        if conversation in NEVER_DROPPED:
+            self.tell(address, conversation, envelope)
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
@@ -324,6 +338,10 @@ class LocalBus(Neighbor):
         """Subscribe to a conversation of all components; see ``Bus.overhear``."""
         self.require_open()
         return self.overhear_neighbors(conversation, listener, most_waiting_bytes)
+
+    def is_overheard(self, conversation: Conversation) -> bool:
+        """Return whether anybody hears this conversation of its own address."""
+        return self.is_overheard_by_neighbors(conversation)
 
     def declare_alive(self, address: str) -> Declaration:
         """Raise a liveliness token; see ``Bus.declare_alive``."""
@@ -359,7 +377,10 @@ class LocalBus(Neighbor):
 
 async def _answer(server: Serving, asked: Envelope[Message]) -> Envelope[Message] | None:
     if isinstance(asked.body, server.kinds):
-        return await server.owner.reply_to(asked, server.answer)
+        reply = await server.owner.reply_to(asked, server.answer)
+        if reply is not None:
+            server.owner.tell(server.owner.source, Conversation.ASK, asked, reply)
+        return reply
     server.owner.unreadable += 1
     schema = schema_of(type(asked.body))
     accepted = ", ".join(sorted(schema_of(kind) for kind in server.kinds))

@@ -27,7 +27,7 @@ from backbone.bus.interface import (
 )
 from backbone.bus.local_bus import LocalNetwork, Neighbor
 from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session, watch_links
-from backbone.keys import Conversation
+from backbone.keys import NEVER_DROPPED, Conversation
 from backbone.wire import Accepts, Message
 
 AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
@@ -79,7 +79,10 @@ class SharedBus(Neighbor, ZenohBus):
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Send the message to all subscribers; see ``Bus.publish``."""
         if not self.closed:
-            self.publish_to_neighbors(address, conversation, self.send(address, conversation, message))
+            envelope = self.send(address, conversation, message)
+            self.publish_to_neighbors(address, conversation, envelope)
+            if conversation in NEVER_DROPPED:
+                self.tell(address, conversation, envelope)
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
@@ -87,6 +90,10 @@ class SharedBus(Neighbor, ZenohBus):
         """Subscribe to publications; see ``Bus.subscribe``."""
         elsewhere = super().subscribe(address, conversation, accepts, listener, latest=latest)
         return _Both(self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest), elsewhere)
+
+    def is_overheard(self, conversation: Conversation) -> bool:
+        """Return whether anybody hears this conversation of its own address, here or in another process."""
+        return self.is_overheard_by_neighbors(conversation) or super().is_overheard(conversation)
 
     def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
         """Subscribe to a conversation of all components, neighbors too; see ``Bus.overhear``."""

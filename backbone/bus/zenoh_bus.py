@@ -35,7 +35,7 @@ from backbone.bus.interface import (
 from backbone.bus.sockets import close_without_waiting
 from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
-from backbone.keys import Conversation, address_of, key, key_of_all
+from backbone.keys import NEVER_DROPPED, Conversation, address_of, key, key_of_all
 from backbone.waiting import settle
 from backbone.wire import (
     Accepts,
@@ -153,6 +153,7 @@ class ZenohBus(BusBase):
         self._woken = False
         self._declared: set[_Declared] = set()
         self._publishers: OrderedDict[tuple[str, Conversation], zenoh.Publisher] = OrderedDict()
+        self._publisher(source, Conversation.TOLD)  # knows who overhears before the first question is answered
 
     @classmethod
     def open(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -248,6 +249,7 @@ class ZenohBus(BusBase):
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
                 query.reply(own, self._write_reply(envelope), express=True)
+                self.tell(self.source, Conversation.ASK, question, envelope)
         except Refusal as unreadable:
             self.unreadable += 1
             query.reply_err(write(self.envelope(Refused.of(unreadable))))
@@ -268,16 +270,27 @@ class ZenohBus(BusBase):
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Send the message to all subscribers; see ``Bus.publish``."""
         if not self.closed:
-            self.send(address, conversation, message)
+            envelope = self.send(address, conversation, message)
+            if conversation in NEVER_DROPPED:
+                self.tell(address, conversation, envelope)
 
     def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Message]:
         """Publish over the session and return the envelope."""
-        publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
-        self._publishers.move_to_end((address, conversation))
+        publisher = self._publisher(address, conversation)
         self.published += 1
         envelope = self.envelope(message)
         publisher.put(write(envelope))
         return envelope
+
+    def is_overheard(self, conversation: Conversation) -> bool:
+        """Return whether another process hears this conversation of its own address; 0.5 µs."""
+        publisher = cast("Any", self._publisher(self.source, conversation))  # zenoh's stubs say bool of its status
+        return bool(publisher.matching_status.matching)
+
+    def _publisher(self, address: str, conversation: Conversation) -> zenoh.Publisher:
+        publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
+        self._publishers.move_to_end((address, conversation))
+        return publisher
 
     def _declare_publisher(self, address: str, conversation: Conversation) -> zenoh.Publisher:
         priority, congestion_control = _QUALITY.get(conversation, _REPEATED)

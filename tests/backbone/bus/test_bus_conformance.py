@@ -18,14 +18,14 @@ import uvloop
 from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock, VirtualClock, VirtualLoop
-from backbone.bus.interface import Bus, BusStatistics, Clock, current_cause
+from backbone.bus.interface import Bus, BusStatistics, Clock, Told, current_cause
 from backbone.bus.local_bus import LocalNetwork
 from backbone.bus.shared_bus import SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.errors import NoResponder, Refusal, ReplyTimeout, UnknownRefusal
 from backbone.keys import Conversation
 from backbone.naming import IllegalName
-from backbone.wire import Envelope, MalformedMessage, Message, Reader, UnknownMessage, write
+from backbone.wire import Envelope, MalformedMessage, Message, Reader, Refused, UnknownMessage, write
 
 marks = itertools.count()
 DEADLINE_S = 10.0  # of real or virtual time, for anything that must happen; a test fails with a message after it
@@ -576,13 +576,13 @@ def test_a_conversation_is_overheard_whoever_says_what_in_it(on_bus: Runner) -> 
             heard.append((key, Reader(News).read(raw).body.number))
             came.set()
 
-        subscribed = listener.overhear(Conversation.EVENTS, overheard, 1_000_000)
+        subscribed = listener.overhear(Conversation.POSES, overheard, 1_000_000)
         await until_known(listener, source)
         await until_known(listener, other)
         source.publish("resource_pool/scout1", Conversation.STATUS, News(0))
-        source.publish("resource_pool/scout1", Conversation.EVENTS, News(1))
-        source.publish("backbone/scout1/claim", Conversation.EVENTS, News(2))
-        other.publish(THIRD, Conversation.EVENTS, News(3))
+        source.publish("resource_pool/scout1", Conversation.POSES, News(1))
+        source.publish("backbone/scout1/claim", Conversation.POSES, News(2))
+        other.publish(THIRD, Conversation.POSES, News(3))
 
         async def all_came() -> None:
             while len(heard) < 3:
@@ -591,9 +591,9 @@ def test_a_conversation_is_overheard_whoever_says_what_in_it(on_bus: Runner) -> 
 
         await within(all_came(), "all three")
         assert sorted(heard, key=lambda one: one[1]) == [
-            ("scout/conformance/resource_pool/scout1/events", 1),
-            ("scout/conformance/backbone/scout1/claim/events", 2),
-            (f"scout/conformance/{THIRD}/events", 3),
+            ("scout/conformance/resource_pool/scout1/poses", 1),
+            ("scout/conformance/backbone/scout1/claim/poses", 2),
+            (f"scout/conformance/{THIRD}/poses", 3),
         ]
         assert subscribed.dropped == 0
         subscribed.close()
@@ -625,6 +625,98 @@ def test_who_overhears_too_slowly_loses_messages_and_knows_how_many(on_bus: Runn
         while heard[0] + subscribed.dropped < 501:
             await net.clock.sleep_s(0.01)
         assert heard[0] >= 20
+
+    on_bus(law)
+
+
+def test_what_is_never_dropped_is_told_in_copies_without_a_number_of_their_own(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, listener = net.join(SERVER), net.join(ASKER)
+        told, heard = list[Told](), Heard()
+        came = asyncio.Event()
+
+        def overheard(_key: str, raw: bytes) -> None:
+            told.append(Reader(Told).read(raw).body)
+            came.set()
+
+        listener.overhear(Conversation.TOLD, overheard, 1_000_000)
+        listener.subscribe("*/*", Conversation.STATUS, News, heard)
+        await until_known(listener, source)
+        while not told:  # the sender knows of a listener a moment later
+            source.publish(SERVER, Conversation.STATUS, News(0))
+            await net.clock.sleep_s(0.005)
+        for number in range(1, 4):
+            source.publish(THIRD, Conversation.STATUS, News(number))
+            source.publish(THIRD, Conversation.POSES, News(10 * number))
+
+        async def all_came() -> None:
+            while told[-1].address != THIRD or Reader(News).read(told[-1].messages[0]).body.number < 3:
+                came.clear()
+                await came.wait()
+
+        await within(all_came(), "the last copy")
+        await heard.until(lambda all_: all_ != [] and all_[-1].body.number == 3, "the last status")
+        copies = [Reader(News).read(one.messages[0]) for one in told if one.address == THIRD]
+        assert [copy.body.number for copy in copies] == [1, 2, 3], "poses can be overheard directly"
+        assert copies == heard.all[-3:]
+        numbers = [copy.sequence for copy in copies]
+        assert numbers == [numbers[0], numbers[0] + 2, numbers[0] + 4], "the poses are between them, and nothing else"
+
+    on_bus(law)
+
+
+def test_questions_are_told_with_their_answers_while_somebody_overhears_that(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        async def answer(asked: Envelope[Any]) -> Message:
+            if asked.body.text == "loud":
+                raise TooLoud("too loud")
+            return Echoed(asked.body.text)
+
+        async with pair(net, answer) as (asker, server):
+            await asker.ask(SERVER, Echo("before"), Echoed, within_s=ASK_S)
+            published = server.statistics().published
+            listener, told = net.join(THIRD), list[tuple[str, Told]]()
+            came = asyncio.Event()
+
+            def overheard(key: str, raw: bytes) -> None:
+                told.append((key, Reader(Told).read(raw).body))
+                came.set()
+
+            subscribed = listener.overhear(Conversation.TOLD, overheard, 1_000_000)
+            await until_known(listener, server)
+            while not told:  # the answerer knows of a listener a moment later
+                await asker.ask(SERVER, Echo("knows"), Echoed, within_s=ASK_S)
+                await net.clock.sleep_s(0.005)
+            told.clear()
+            await asker.ask(SERVER, Echo("hello"), Echoed, within_s=ASK_S)
+            with pytest.raises(TooLoud):
+                await asker.ask(SERVER, Echo("loud"), Echoed, within_s=ASK_S)
+
+            async def both() -> None:
+                while not (told and b"loud" in told[-1][1].messages[0]):
+                    came.clear()
+                    await came.wait()
+
+            await within(both(), "question and answer")
+            key, refused = told[-1]
+            assert key == f"scout/conformance/{SERVER}/told"
+            assert (refused.address, refused.conversation) == (SERVER, "ask")
+            question, reply = Reader(Echo).read(refused.messages[0]), Reader(Refused).read(refused.messages[1])
+            assert (question.source, question.body) == (ASKER, Echo("loud"))
+            assert (reply.source, reply.cause, reply.body.code) == (SERVER, question.id, "test.loud")
+            assert Reader(Echoed).read(told[-2][1].messages[1]).body == Echoed("hello")
+            subscribed.close()
+            assert server.statistics().published > published
+
+    on_bus(law)
+
+
+def test_nothing_is_published_of_answers_that_nobody_overhears(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        async with pair(net, echo) as (asker, server):
+            for number in range(20):
+                await asker.ask(SERVER, Echo(f"{number}"), Echoed, within_s=ASK_S)
+            assert server.statistics().published == 0
 
     on_bus(law)
 
