@@ -1,0 +1,107 @@
+"""What a recorder costs: its processor time, and context switches with and without it.
+
+Runs the mission of IROS 2001 with short slices several times, with and without a recorder of everything in turn, and
+asks the RC manager a question twenty times a second meanwhile. Prints one JSON line; ``core_share`` is the recorder's
+part of one core, ``switch_ratio`` and ``question_ratio`` are medians with a recorder over those without.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import signal
+import subprocess
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median, quantiles
+
+import psutil
+from measuring import BIN, report
+from switch_time import fast_mission, measure
+
+from backbone.recording.reader import Recording, missing_numbers
+
+SETTLE_S = 3.0  # chosen: the recorder's imports and its first questions are over
+
+
+@dataclass
+class Runs:
+    """What was measured in the runs of one kind."""
+
+    switches_s: list[float] = field(default_factory=list)
+    late_switches_s: list[float] = field(default_factory=list)
+    questions_s: list[float] = field(default_factory=list)
+    late_questions_s: list[float] = field(default_factory=list)
+
+
+def run(mission: Path, seconds: float, to: Path | None, runs: Runs) -> float:
+    """Run the mission once, recorded to a file or not; return the recorder's part of a core."""
+    command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
+        assert launcher.stderr is not None
+        next(line for line in launcher.stderr if line.startswith("all ready"))
+        recorder = subprocess.Popen([str(BIN / "scout-backbone"), "record", "--to", str(to)]) if to else None
+        asyncio.run(asyncio.sleep(SETTLE_S))
+        before_s = busy_s(recorder)
+        values, questions = asyncio.run(measure(seconds))
+        share = (busy_s(recorder) - before_s) / seconds
+        if recorder is not None:
+            recorder.send_signal(signal.SIGINT)
+            recorder.wait(20)
+        launcher.terminate()
+        launcher.stderr.read()
+    ordered = quantiles(questions, n=100)
+    runs.switches_s.append(values["switch_p50_s"])
+    runs.late_switches_s.append(values["switch_p99_s"])
+    runs.questions_s.append(ordered[49])
+    runs.late_questions_s.append(ordered[98])
+    return share
+
+
+def busy_s(recorder: subprocess.Popen[bytes] | None) -> float:
+    """Return the recorder's processor time so far."""
+    if recorder is None:
+        return 0.0
+    times = psutil.Process(recorder.pid).cpu_times()
+    return times.user + times.system
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--rounds", type=int, default=2)
+    given = parser.parse_args()
+    plain, recorded, shares, messages, size, missing = Runs(), Runs(), [], 0, 0, 0
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        mission = fast_mission(Path(folder), settling=False, clean_stop=False)
+        for number in range(given.rounds):
+            run(mission, given.seconds, None, plain)
+            to = Path(folder) / f"{number}.mcap"
+            shares.append(run(mission, given.seconds, to, recorded))
+            with to.open("rb") as file:
+                recording = Recording(file)
+                messages += recording.contents().messages
+                missing += sum(missing_numbers(recording.messages()).values())
+            size += to.stat().st_size
+    lasted_s = given.rounds * (given.seconds + SETTLE_S)
+    report(
+        "recording",
+        messages_a_second=round(messages / lasted_s),
+        bytes_a_second=round(size / lasted_s),
+        missing=missing,
+        core_share=round(median(shares), 4),
+        switch_p50_ms=round(median(recorded.switches_s) * 1e3, 2),
+        switch_p99_ms=round(median(recorded.late_switches_s) * 1e3, 2),
+        switch_ratio=round(median(recorded.switches_s) / median(plain.switches_s), 3),
+        late_switch_ratio=round(median(recorded.late_switches_s) / median(plain.late_switches_s), 3),
+        question_ratio=round(median(recorded.questions_s) / median(plain.questions_s), 3),
+        late_question_ratio=round(median(recorded.late_questions_s) / median(plain.late_questions_s), 3),
+    )
+
+
+if __name__ == "__main__":
+    main()
