@@ -81,6 +81,14 @@ def info(file: File, as_json: AsJson = False) -> None:
     run(lambda: print_info(file, as_json=as_json))
 
 
+@recording.command()
+def check(file: File, as_json: AsJson = False) -> None:
+    """Read a recording to its end, and tell whose messages are missing in it; a damaged one is refused."""
+    from backbone.command_line.recording_work import check_whole
+
+    run(lambda: check_whole(file, as_json=as_json))
+
+
 @recording.command("keys")
 def list_keys(file: File, as_json: AsJson = False) -> None:
     """List its keys, with sender, schema, number and rate of messages."""
@@ -98,7 +106,7 @@ def print_(
     most: Annotated[int, typer.Option("--most", min=1, max=MOST_LINES, help="Largest number of messages.")] = 1_000,
     as_json: AsJson = False,
 ) -> None:
-    """Print its messages in the order of their arrival; with --json, whole, one in each line."""
+    """Print its messages in the order of sending; with --json, whole, one in each line."""
     from backbone.command_line.recording_work import print_messages
 
     run(lambda: print_messages(file, tuple(keys or ()), since, until, most, as_json=as_json))

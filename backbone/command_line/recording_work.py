@@ -20,7 +20,6 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.command_line.options import DISTRIBUTION
 from backbone.command_line.where import Where
-from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
@@ -30,12 +29,12 @@ from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.messages import AskTree, Tree
 from backbone.mission_log.lines import event_json, story_lines
 from backbone.mission_log.log import MissionLog
-from backbone.mission_log.operators import OperatorActed
+from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.naming import Subsystem, address
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import Recorded, Recording, recover_file
+from backbone.recording.reader import Recorded, Recording, missing_numbers, recover_file
 from backbone.recording.recorder import Recorder
 from backbone.recording.revival import revived
 from backbone.spoken import counted
@@ -45,37 +44,31 @@ LONGEST_BODY = 160  # chosen: a line of a wide terminal
 VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
 
 
-class FileUnusable(Refusal):
+class RecordingUnusable(Refusal):
     """A recording cannot be written or read there."""
 
-    code = "usage.file"
+    code = "usage.recording"
     remedy = "Name a recording that this user may read, or a new file in a folder where this user may write."
 
 
 # ---------------------------------------------------------------------- making one
 async def record_to(where: Where, to: Path | None, keys: list[str], for_s: float | None) -> ExitCode:
     """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended."""
-    name = f"recorder-{os.getpid()}"
-    source = address(Subsystem.BACKBONE, name)
+    source = address(Subsystem.BACKBONE, f"recorder-{os.getpid()}")
     async with mission_connection.connected(where.mission, where.connect, source, where.secret()) as (bus, clock):
         path = to or Path(f"{bus.mission}-{datetime.now():%Y%m%d-%H%M%S}.mcap")
         mission_xml, classes = await _mission_file(bus), message_classes(await _modules(bus))
         with _new_file(path) as file:
-            launch = Launch(
-                bus.mission,
-                Subsystem.BACKBONE,
-                name,
-                "recorder",
-                "backbone.recording.recorder:Recorder",
-                socket.gethostname(),
-                "",
-                clock.origin_monotonic_s,
-                clock.rate,
-                {"keys": keys},
-            )
-            about = _about(bus, clock, keys)
             recorder = Recorder(
-                launch, bus, clock, file=file, path=path, classes=classes, about=about, mission_xml=mission_xml
+                bus,
+                clock,
+                file=file,
+                path=path,
+                classes=classes,
+                about=_about(bus, clock, keys),
+                keys=tuple(keys),
+                mission_xml=mission_xml,
+                user=login_name(),
             )
             with suppress(OSError):
                 os.nice(10)  # who decides goes before who records
@@ -83,14 +76,16 @@ async def record_to(where: Where, to: Path | None, keys: list[str], for_s: float
     say(f"{path}: {counted(recorder.written, 'message')}")
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
-    return ExitCode.REFUSED if recorder.is_full else ExitCode.DONE
+    if recorder.full:
+        say(f"it ended because {recorder.full}")
+    return ExitCode.REFUSED if recorder.full else ExitCode.DONE
 
 
 async def _run(recorder: Recorder, path: Path, for_s: float | None) -> None:
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, recorder.end, number.name)
-    timer = loop.call_later(for_s, recorder.end, f"{for_s:g} s are over") if for_s is not None else None
+        loop.add_signal_handler(number, recorder.end)
+    timer = loop.call_later(for_s, recorder.end) if for_s is not None else None
     say(f"records to {path}; Ctrl-C ends it")
     try:
         await recorder.run()
@@ -138,9 +133,9 @@ def _new_file(path: Path) -> Iterator[Any]:
     try:
         file = path.open("xb")
     except FileExistsError as error:
-        raise FileUnusable(f"{path} exists", remedy="Name a new file.") from error
+        raise RecordingUnusable(f"{path} exists", remedy="Name a new file.") from error
     except OSError as error:
-        raise FileUnusable(f"{path} cannot be written: {error.strerror or error}") from error
+        raise RecordingUnusable(f"{path} cannot be written: {error.strerror or error}") from error
     with file:
         yield file
 
@@ -150,9 +145,9 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
     try:
         count = recover_file(path, to)
     except FileExistsError as error:
-        raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
+        raise RecordingUnusable(f"{to} exists", remedy="Name a new file.") from error
     except OSError as error:
-        raise FileUnusable(f"{error.filename or path}: {error.strerror or error}") from error
+        raise RecordingUnusable(f"{error.filename or path}: {error.strerror or error}") from error
     with _opened(to) as made:
         assert made.contents().messages == count  # noqa: S101  what was written can be read
     say(f"{to}: {counted(count, 'message')}")
@@ -176,6 +171,18 @@ async def print_info(path: Path, *, as_json: bool) -> ExitCode:
         return ExitCode.DONE
     for name, value in facts.items():
         show([f"{name:16s} {value:.3f}" if isinstance(value, float) else f"{name:16s} {value}"])
+    return ExitCode.DONE
+
+
+async def check_whole(path: Path, *, as_json: bool) -> ExitCode:
+    """Print whose messages are missing, and how many."""
+    with _opened(path) as recording:
+        found, missing = recording.contents(), missing_numbers(recording.messages())
+    if as_json:
+        show([json.dumps({"messages": found.messages, "missing": missing})])
+    else:
+        show([f"{counted(found.messages, 'message')}, as they were written"])
+        show(f"{count:8d} missing from {source}" for source, count in missing.items())
     return ExitCode.DONE
 
 
@@ -253,7 +260,7 @@ def _opened(path: Path) -> Iterator[Recording]:
     try:
         file = path.open("rb")
     except OSError as error:
-        raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
+        raise RecordingUnusable(f"{path} cannot be read: {error.strerror or error}") from error
     with file:
         yield Recording(file)
 
@@ -274,6 +281,7 @@ def _plain(message: Recorded) -> dict[str, object]:
         "schema": message.schema,
         "sequence": message.sequence,
         "stamp_s": message.stamp_s,
+        "heard_s": message.heard_s,
         "cause": message.cause,
         "body": body,
     }

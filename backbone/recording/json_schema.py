@@ -34,6 +34,7 @@ def schema_json(kind: type[Message]) -> bytes:
     envelope = {
         "sequence": {"type": "integer", "description": "Grows by one with each message of the sender."},
         "stamp_s": {"type": "number", "description": "Mission time of sending, seconds."},
+        "heard_s": {"type": "number", "description": "Mission time when the recorder got it, seconds."},
         "cause": {"type": "string", "description": "Id of the message that led to it: <source>#<sequence>."},
         "body": _struct(kind, definitions),
     }

@@ -22,19 +22,20 @@ log = logging.getLogger(__name__)
 def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
     """Return the message classes of the installed packages and of these modules, by schema, ``<Name>/<version>``.
 
+    What these modules import is known too.
+
     Args:
         modules: Further modules, such as those of the mission's component types; one that is not installed here is
             left out.
     """
-    loaded = {entry.load().__name__ for entry in entry_points(group=GROUP)}
+    for entry in entry_points(group=GROUP):
+        entry.load()
     for module in modules:
         try:
             importlib.import_module(module)
         except ImportError as error:
             log.warning("messages of %s are recorded without names: %s", module, error)
-        else:
-            loaded.add(module)
-    return {schema_of(kind): kind for kind in _derived(Message) if kind.__module__ in loaded}
+    return {schema_of(kind): kind for kind in _derived(Message)}
 
 
 def _derived(kind: type[Message]) -> Iterator[type[Message]]:

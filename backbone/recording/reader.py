@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -21,7 +20,7 @@ from mcap.writer import CompressionType, Writer
 from zstandard import ZstdError
 
 from backbone.errors import Refusal
-from backbone.recording.writer import ABOUT, CHUNK_BYTES, NS, PROFILE
+from backbone.recording.writer import ABOUT, CHUNK_BYTES, NS, PROFILE, is_meant
 
 MOST_RECORD_BYTES = 64 * 1024 * 1024  # chosen: eight times the largest message; a damaged length asks for terabytes
 _DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
@@ -43,8 +42,9 @@ class Recorded:
         key: Key expression on the bus.
         source: Address of the sender.
         schema: ``<Name>/<version>``; empty: the bytes were no message.
-        at_s: Mission time when the recorder got it.
-        stamp_s: Mission time when it was sent.
+        at_s: Mission time when it was sent, as the recording orders it; if that is not credible, when it was heard.
+        stamp_s: Mission time when it was sent, as it says.
+        heard_s: Mission time when the recorder got it.
         sequence: Its number among those of the sender.
         cause: Id of the message that led to it.
         body: Its fields by name; a list without names if no installed package had its class; else the bytes.
@@ -55,6 +55,7 @@ class Recorded:
     schema: str
     at_s: float
     stamp_s: float
+    heard_s: float
     sequence: int
     cause: str
     body: Any
@@ -139,9 +140,9 @@ class Recording:
         return found.data.decode() if found is not None else ""
 
     def messages(
-        self, patterns: Mapping[str, None] | tuple[str, ...] = (), since_s: float = 0.0, until_s: float | None = None
+        self, patterns: tuple[str, ...] = (), since_s: float = 0.0, until_s: float | None = None
     ) -> Iterator[Recorded]:
-        """Yield the messages in the order of their arrival.
+        """Yield the messages in the order of sending.
 
         Args:
             patterns: Only of keys that match one of these; none: all. ``scout/<mission>/`` may be left out.
@@ -151,7 +152,7 @@ class Recording:
         topics = None
         if patterns:
             channels = self._summary.channels.values()
-            topics = [one.topic for one in channels if is_meant(one.metadata.get("key", one.topic), tuple(patterns))]
+            topics = [one.topic for one in channels if is_meant(one.metadata.get("key", one.topic), patterns)]
         end_ns = None if until_s is None else round(until_s * NS)
         found = self._reader.iter_messages(topics, starting_at=max(0, round(since_s * NS)), ending_at=end_ns)
         try:
@@ -161,15 +162,18 @@ class Recording:
             raise NoRecording(f"the recording is damaged: {error}") from error
 
 
-def is_meant(key: str, patterns: tuple[str, ...]) -> bool:
-    """Return whether a key matches one of these patterns, with or without ``scout/<mission>/`` before it.
+def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
+    """Return sender → how many of its messages are missing between its first and its last, for those that lack any.
 
-    Example:
-        >>> is_meant("scout/iros2001/resource_pool/scout1/telemetry", ("*/scout1/*",))
-        True
+    Each sender numbers its messages. One is missing if it was lost, if it is of a key that was not recorded, or if it
+    is a question that nobody answered.
     """
-    short = key.split("/", 2)[-1]
-    return any(fnmatchcase(key, pattern) or fnmatchcase(short, pattern) for pattern in patterns)
+    numbers: dict[str, set[int]] = {}
+    for message in messages:
+        if message.source:
+            numbers.setdefault(message.source, set()).add(message.sequence)
+    missing = {source: max(found) - min(found) + 1 - len(found) for source, found in sorted(numbers.items())}
+    return {source: count for source, count in missing.items() if count}
 
 
 def recover(damaged: IO[bytes], to: IO[bytes]) -> int:
@@ -254,8 +258,8 @@ def _named(channel: Channel) -> tuple[str, str, str]:
 def _recorded(channel: Channel, message: Message) -> Recorded:
     key, source, schema = _named(channel)
     if channel.message_encoding != "json":
-        stamp_s = message.publish_time / NS
-        return Recorded(key, source, schema, message.log_time / NS, stamp_s, message.sequence, "", message.data)
+        at_s = message.log_time / NS
+        return Recorded(key, source, schema, at_s, at_s, at_s, message.sequence, "", message.data)
     said = msgspec.json.decode(message.data)
     at_s = message.log_time / NS
-    return Recorded(key, source, schema, at_s, said["stamp_s"], said["sequence"], said["cause"], said["body"])
+    return Recorded(key, source, schema, at_s, **said)

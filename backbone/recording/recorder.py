@@ -1,61 +1,69 @@
-"""Recorder: a component that writes everything it overhears into a recording.
+"""Recorder: writes everything it overhears into a recording.
 
-It claims nothing and is asked by nobody, so it delays nobody: its subscriptions drop what it has no time for, and count
-that. It ends in good order when its file can grow no more.
+It is no component: it answers nobody, so nobody asks it, and what it overhears is dropped rather than waited for. So it
+delays nobody, even if its process hangs. It ends in good order when its file can grow no more.
 """
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Annotated
+from typing import IO
 
-import msgspec
-
-from backbone.bus.interface import Bus, Clock, Overhearing
-from backbone.component.component import Component
-from backbone.component.launch import Launch
-from backbone.component.messages import LogLevel
-from backbone.keys import Conversation
-from backbone.ranges import FEW
-from backbone.recording.reader import is_meant
+from backbone.addresses import NAMESERVER, RC_MANAGER
+from backbone.bus.interface import Bus, Clock, Overhearing, Reply
+from backbone.component.messages import (
+    AskParameters,
+    AskState,
+    AskStory,
+    ComponentState,
+    LogLevel,
+    Parameters,
+    Story,
+    StoryEvent,
+)
+from backbone.errors import LinkError, Refusal
+from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import key as key_of
+from backbone.nameserver.messages import Components, ListComponents
+from backbone.naming import component_of
+from backbone.rc_manager.messages import AskSchedule
 from backbone.recording.writer import RecordingWriter
+from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
 from backbone.wire import Message
 
 FLUSH_EACH_S = 0.4  # chosen: below the half second that a killed recorder may lose; seconds of the machine
+REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
+OVERHEARD_WITHIN_S = 0.02  # measured: a publisher knows of its first subscriber after 7 ms; seconds of the machine
+MOST_ATTEMPTS = 5  # chosen: together ten times as long
+GONE_AFTER_S = 5.0  # chosen: a restarted hub is back within two; seconds of the machine
 LEAST_FREE_BYTES = 100 * 1000 * 1000  # B-Human's logger: it stops below 100 MB
 MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: a second of four cameras in color
 
-
-class RecorderParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Parameters of ``Recorder``.
-
-    Attributes:
-        keys: Patterns of the keys to record, without ``scout/<mission>/``; empty: all.
-    """
-
-    keys: Annotated[list[str], FEW] = []
+log = logging.getLogger(__name__)
 
 
-class Recorder(Component[RecorderParameters]):
-    """Writes a recording until it ends.
+class Recorder:
+    """Writes a recording until it ends, or the mission has ended.
 
     Args:
+        bus: Not closed.
         file: Written from its beginning; not closed.
         path: Of the file.
         classes: Known message classes, by schema.
         about: Facts about the mission.
-        mission_xml: Its file; empty: not known.
+        keys: Patterns of the keys to record, without ``scout/<mission>/``; empty: all.
+        mission_xml: The mission's file; empty: not known.
+        user: The person who records; empty: nobody.
     """
-
-    parameters_type = RecorderParameters
 
     def __init__(
         self,
-        launch: Launch,
         bus: Bus,
         clock: Clock,
         *,
@@ -63,13 +71,19 @@ class Recorder(Component[RecorderParameters]):
         path: Path,
         classes: Mapping[str, type[Message]],
         about: Mapping[str, str],
+        keys: tuple[str, ...] = (),
         mission_xml: str = "",
+        user: str = "",
     ) -> None:
-        super().__init__(launch, bus, clock)
-        self._file, self._path = file, path
-        self._writer = RecordingWriter(file, classes, about, mission_xml)
+        self._bus, self._clock, self._user = bus, clock, user
+        self._file, self._path, self._keys = file, path, keys
+        self._writer = RecordingWriter(file, classes, about, keys, mission_xml)
         self._subscribed: list[Overhearing] = []
-        self._is_full = False
+        self._tellers: set[str] = set()
+        self._ended = asyncio.Event()
+        self._has_link = True
+        self.full = ""
+        """Why the file can grow no more; empty: it can."""
 
     @property
     def written(self) -> int:
@@ -81,30 +95,48 @@ class Recorder(Component[RecorderParameters]):
         """Messages that it had no time for."""
         return sum(each.dropped for each in self._subscribed)
 
-    @property
-    def is_full(self) -> bool:
-        """True if it ended because the disc was full."""
-        return self._is_full
+    def end(self) -> None:
+        """End in good order; then ``run`` returns."""
+        self._ended.set()
 
-    async def connect(self) -> None:
-        """Subscribe to all conversations of which a key is meant."""
-        for conversation in _conversations(self.parameters.keys):
-            self._subscribed.append(self.bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
+    async def run(self) -> None:
+        """Record until the end; then the file is whole, unless the disc is full."""
+        for conversation in _overheard(self._keys):
+            self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
+        self._bus.watch_link(self._link_changed)
+        self._say(f"{self._who} records the mission to {self._path.name}", LogLevel.NOTICE)
+        asking = asyncio.create_task(self._ask_all(), name="first state")
+        try:
+            await self._flush_until_end()
+        finally:
+            asking.cancel()
+            await asyncio.wait({asking})
+            self._finish()
+        if not asking.cancelled():
+            asking.result()
 
-    async def serve(self) -> None:
-        """Flush twice a second; end below ``LEAST_FREE_BYTES``."""
-        dropped = 0
-        while True:
-            await self.clock.sleep_s(FLUSH_EACH_S * self.clock.rate)
-            if not self._flushed():
-                return
-            if self.dropped > dropped:
-                self.publish_event(self.name, f"dropped {counted(self.dropped - dropped, 'message')}", LogLevel.WARNING)
-                dropped = self.dropped
-            self.report(f"{counted(self.written, 'message')} in {self._path.name}")
+    async def _flush_until_end(self) -> None:
+        dropped, silent_s = 0, 0.0
+        while not self._ended.is_set() and not self.full:
+            await self._clock.sleep_s(FLUSH_EACH_S * self._clock.rate)
+            self._flush()
+            news = self.dropped - dropped
+            if news:
+                self._say(f"{counted(news, 'message')} came too fast to be recorded", LogLevel.WARNING)
+                dropped += news
+            silent_s = 0.0 if self._has_link else silent_s + FLUSH_EACH_S
+            if silent_s > GONE_AFTER_S:
+                self.end()
 
-    async def drain(self) -> None:
-        """Finish the file."""
+    def _flush(self) -> None:
+        try:
+            self._writer.flush()
+            if shutil.disk_usage(self._path.parent).free < LEAST_FREE_BYTES:
+                self._fill(f"less than {LEAST_FREE_BYTES // 1_000_000} MB are free")
+        except OSError as error:
+            self._fill(str(error))
+
+    def _finish(self) -> None:
         for subscribed in self._subscribed:
             subscribed.close()
         try:
@@ -113,44 +145,74 @@ class Recorder(Component[RecorderParameters]):
             os.fsync(self._file.fileno())
         except OSError as error:
             self._fill(str(error))
+        self._say(f"{self._who} records no more{f': {self.full}' if self.full else ''}", LogLevel.NOTICE)
 
-    def statistics(self) -> dict[str, float]:
-        """Return its counts."""
-        return {"messages_written": self.written, "messages_dropped": self.dropped, "file_bytes": self._file.tell()}
+    def _fill(self, why: str) -> None:
+        self.full = self.full or why
+
+    def _link_changed(self, is_up: bool) -> None:
+        self._has_link = is_up
+
+    @property
+    def _who(self) -> str:
+        return self._user or component_of(self._bus.source)
+
+    def _say(self, what: str, level: LogLevel) -> None:
+        event = StoryEvent(self._clock.now_s(), self._bus.source, what, "recording", "", level, self._user)
+        self._bus.publish(self._bus.source, Conversation.LOG, event)
 
     def _heard(self, key: str, raw: bytes) -> None:
-        if self._is_full or (self.parameters.keys and not is_meant(key, tuple(self.parameters.keys))):
+        self._tellers.add(key)
+        if self.full:
             return
         try:
-            self._writer.write(key, raw, self.clock.now_s())
+            self._writer.write(key, raw, self._clock.now_s())
         except OSError as error:
             self._fill(str(error))
 
-    def _flushed(self) -> bool:
-        try:
-            self._writer.flush()
-            free = shutil.disk_usage(self._path.parent).free
-        except OSError as error:
-            return self._fill(str(error))
-        return free >= LEAST_FREE_BYTES or self._fill(f"less than {LEAST_FREE_BYTES // 1_000_000} MB are free")
+    # ------------------------------------------------------------------ what was said before
+    async def _ask_all(self) -> None:
+        """Ask for what was said before anybody overheard it; the answers come as all others do."""
+        if Conversation.TOLD not in _overheard(self._keys):
+            return
+        listed = await self._asked(NAMESERVER, ListComponents(), Components)
+        await self._asked(RC_MANAGER, AskSchedule(), Schedule)
+        for component in listed.components if listed is not None else ():
+            await self._asked(component.address, AskState(), ComponentState)
+            await self._asked(component.address, AskParameters(), Parameters)
+            await self._asked(component.address, AskStory(), Story)
 
-    def _fill(self, why: str) -> bool:
-        if not self._is_full:
-            self._is_full = True
-            self.publish_event(self.name, f"stops to record: {why}", LogLevel.WARNING)
-            self.end(why)
-        return False
+    async def _asked(self, address: str, question: Message, reply: type[Reply]) -> Reply | None:
+        """Return the answer once it was overheard too; None: there is none."""
+        key = key_of(self._bus.mission, address, Conversation.TOLD)
+        for _attempt in range(MOST_ATTEMPTS):
+            self._tellers.discard(key)
+            try:
+                answer = await self._bus.ask(address, question, reply, within_s=REPLY_TIME_S)
+            except (LinkError, Refusal) as error:
+                log.info("%s is not in the recording: %s", address, error)
+                return None
+            await self._clock.sleep_s(OVERHEARD_WITHIN_S * self._clock.rate)
+            if key in self._tellers:
+                break
+        return answer
 
 
-def _conversations(patterns: list[str]) -> list[Conversation]:
-    """Return the conversations of which a key could match a pattern.
+def _overheard(patterns: tuple[str, ...]) -> list[Conversation]:
+    """Return the conversations to overhear for keys that match a pattern, copies first.
+
+    Who publishes something else that is recorded knows by then that copies are, too: what is declared in this order is
+    known everywhere in this order.
 
     Example:
-        >>> [one.value for one in _conversations(["resource_pool/*/readings"])]
+        >>> [one.value for one in _overheard(("resource_pool/*/readings",))]
         ['readings']
+        >>> [one.value for one in _overheard(("*/ask", "*/status", "*/log"))]
+        ['told', 'log']
     """
-    published: list[Conversation] = [one for one in Conversation if one not in (Conversation.ASK, Conversation.ALIVE)]
+    copied = {*NEVER_DROPPED, Conversation.ASK}
+    direct = [one for one in Conversation if one not in {*copied, Conversation.TOLD, Conversation.ALIVE}]
     ends = {pattern.rpartition("/")[2] for pattern in patterns}
-    if not ends or not ends <= {one.value for one in published}:
-        return published
-    return [one for one in published if one.value in ends]
+    if not ends or not ends <= set(Conversation):
+        return [Conversation.TOLD, *direct]
+    return [*([Conversation.TOLD] if ends & copied else []), *(one for one in direct if one in ends)]

@@ -8,6 +8,7 @@ from typing import Any, Union, cast
 
 import msgspec
 
+from backbone.bus.interface import Told
 from backbone.recording.json_schema import TAG
 from backbone.wire import Envelope, Message, schema_of
 
@@ -47,29 +48,35 @@ class Translator:
         self._known = msgspec.msgpack.Decoder(Envelope[known])
         self._any: Any = msgspec.msgpack.Decoder(Envelope[Any])
 
-    def translate(self, raw: bytes) -> Translated:
-        """Return the message; whatever the bytes are, they are kept."""
+    def translate(self, raw: bytes, heard_s: float) -> Translated:
+        """Return the message, which was heard at a mission time; whatever the bytes are, they are kept."""
         try:
             envelope = self._known.decode(raw)
         except _UNREADABLE:
-            return self._unknown(raw)
+            return self._unknown(raw, heard_s)
         kind = type(envelope.body)
-        return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, _named(envelope.body))
+        return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, _named(envelope.body), heard_s)
 
-    def _unknown(self, raw: bytes) -> Translated:
+    def told(self, raw: bytes) -> Told:
+        """Return the ``Told`` that these bytes hold."""
+        return cast("Told", self._known.decode(raw).body)
+
+    def _unknown(self, raw: bytes, heard_s: float) -> Translated:
         try:
             envelope = self._any.decode(raw)
         except _UNREADABLE:
             return Translated("", "", 0, 0.0, None, raw)
         match envelope.body:
             case [str(schema), *_]:
-                return _translated(envelope, schema, None, envelope.body)
+                return _translated(envelope, schema, None, envelope.body, heard_s)
         return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw)
 
 
-def _translated(envelope: Envelope[Any], schema: str, kind: type[Message] | None, body: object) -> Translated:
-    said = {"sequence": envelope.sequence, "stamp_s": envelope.stamp_s, "cause": envelope.cause, "body": body}
-    data = msgspec.json.encode(said)
+def _translated(
+    envelope: Envelope[Any], schema: str, kind: type[Message] | None, body: object, heard_s: float
+) -> Translated:
+    said = {"sequence": envelope.sequence, "stamp_s": envelope.stamp_s, "heard_s": heard_s, "cause": envelope.cause}
+    data = msgspec.json.encode({**said, "body": body})
     return Translated(schema, envelope.source, envelope.sequence, envelope.stamp_s, kind, data)
 
 

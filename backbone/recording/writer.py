@@ -1,16 +1,20 @@
 """Writer: messages of the bus into one MCAP file, a channel for each key, sender and schema.
 
-Times are mission time, nanoseconds: ``log_time`` when the recorder got the message, ``publish_time`` when its sender
-sent it. What was flushed outlives the recorder's death, see ``reader.recover``.
+Times are mission time, nanoseconds: when the sender sent the message. So readers, which go by ``log_time``, yield the
+messages of each sender in its order, although the bus delivers urgent ones first; ``heard_s`` beside the body is when
+the recorder got it. What was flushed outlives the recorder's death, see ``reader.recover``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import IO
 
 from mcap.writer import CompressionType, Writer
 
+from backbone.bus.interface import Told
+from backbone.keys import Conversation
 from backbone.recording.json_schema import schema_json
 from backbone.recording.translation import Translated, Translator
 from backbone.wire import Message
@@ -20,6 +24,7 @@ ABOUT = "mission"
 """Name of the metadata about the mission."""
 NS = 1_000_000_000
 CHUNK_BYTES = 256 * 1024  # chosen: a chunk is written well before the next flush, and still compresses
+MOST_AWAY_S = 60.0  # chosen: beyond any delay and any difference of clocks that a mission survives
 MOST_SEQUENCE = 2**32  # MCAP specification, op 0x05: sequence is a uint32
 MIME_XML = "application/xml"
 
@@ -31,6 +36,7 @@ class RecordingWriter:
         file: Written from its beginning; not closed.
         classes: Known message classes, by schema.
         about: Facts about the mission, for people and programs.
+        keys: Patterns of the keys to write, see ``is_meant``; empty: all.
         mission_xml: Its file; empty: not known.
     """
 
@@ -39,10 +45,12 @@ class RecordingWriter:
         file: IO[bytes],
         classes: Mapping[str, type[Message]],
         about: Mapping[str, str],
+        keys: Sequence[str] = (),
         mission_xml: str = "",
     ) -> None:
         self._writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
         self._translator = Translator(classes)
+        self._keys = tuple(keys)
         self._schemas: dict[type[Message], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
         self.written = 0
@@ -53,13 +61,30 @@ class RecordingWriter:
             self._writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
 
     def write(self, key: str, raw: bytes, at_s: float) -> None:
-        """Add a message as it came over the bus at a mission time."""
-        message = self._translator.translate(raw)
-        at_ns = _ns(at_s)
+        """Add a message as it came over the bus at a mission time; of a ``Told`` those that it tells, if meant."""
+        is_told = key.endswith(f"/{Conversation.TOLD}")
+        if not is_told and not self._is_meant(key):
+            return
+        message = self._translator.translate(raw, at_s)
+        if message.kind is not Told:
+            self._write(key, message, at_s)
+            return
+        told = self._translator.told(raw)
+        told_key = f"{'/'.join(key.split('/')[:2])}/{told.address}/{told.conversation}"
+        if self._is_meant(told_key):
+            for quoted in told.messages:
+                self._write(told_key, self._translator.translate(quoted, at_s), at_s)
+
+    def _is_meant(self, key: str) -> bool:
+        return not self._keys or is_meant(key, self._keys)
+
+    def _write(self, key: str, message: Translated, at_s: float) -> None:
+        is_credible = message.source and abs(message.stamp_s - at_s) <= MOST_AWAY_S
+        sent_ns = _ns(message.stamp_s if is_credible else at_s)
         self._writer.add_message(
             channel_id=self._channel(key, message),
-            log_time=at_ns,
-            publish_time=_ns(message.stamp_s) if message.source else at_ns,
+            log_time=sent_ns,
+            publish_time=sent_ns,
             sequence=message.sequence % MOST_SEQUENCE,
             data=message.data,
         )
@@ -92,6 +117,17 @@ class RecordingWriter:
             name = kind.__struct_config__.tag
             known = self._schemas[kind] = self._writer.register_schema(str(name), "jsonschema", schema_json(kind))
         return known
+
+
+def is_meant(key: str, patterns: tuple[str, ...]) -> bool:
+    """Return whether a key matches one of these patterns, with or without ``scout/<mission>/`` before it.
+
+    Example:
+        >>> is_meant("scout/iros2001/resource_pool/scout1/telemetry", ("*/scout1/*",))
+        True
+    """
+    short = key.split("/", 2)[-1]
+    return any(fnmatchcase(key, pattern) or fnmatchcase(short, pattern) for pattern in patterns)
 
 
 def _ns(at_s: float) -> int:

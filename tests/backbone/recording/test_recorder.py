@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -10,13 +11,12 @@ from typing import Any, NamedTuple
 import pytest
 
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.component.launch import Launch
-from backbone.component.messages import LogLevel, StoryEvent
+from backbone.component.messages import AskStory, LogLevel, Story, StoryEvent
 from backbone.keys import Conversation
-from backbone.naming import Subsystem
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import Recorded, Recording
+from backbone.recording.reader import Recorded, Recording, missing_numbers
 from backbone.recording.recorder import FLUSH_EACH_S, LEAST_FREE_BYTES, Recorder
+from backbone.wire import Envelope
 
 CLASSES = message_classes()
 
@@ -30,7 +30,7 @@ def event(number: int) -> StoryEvent:
 
 
 @pytest.fixture
-def recorded(tmp_path: Path, local_mission: Any, beside: Any) -> Callable[..., list[Recorded]]:
+def recorded(tmp_path: Path, local_mission: Any) -> Callable[..., list[Recorded]]:
     """Return what records a scene: the scene gets a bus, the clock, and the recorder."""
 
     def record(scene: Any, *keys: str) -> list[Recorded]:
@@ -39,16 +39,15 @@ def recorded(tmp_path: Path, local_mission: Any, beside: Any) -> Callable[..., l
         async def play() -> None:
             clock = VirtualClock()
             async with local_mission("local") as network:
-                parameters = {"keys": list(keys)}
-                launch = Launch(
-                    "local", Subsystem.BACKBONE, "recorder", "recorder", "x:Y", "here", "", 0.0, 1.0, parameters
-                )
-                bus = network.join(launch.address, clock)
+                bus = network.join("backbone/recorder", clock)
                 with path.open("xb") as file:
-                    recorder = Recorder(launch, bus, clock, file=file, path=path, classes=CLASSES, about={})
-                    async with beside(recorder):
-                        await clock.sleep_s(0.01)
-                        await scene(network.join("resource_pool/scout1", clock), clock, recorder)
+                    recorder = Recorder(bus, clock, file=file, path=path, classes=CLASSES, about={}, keys=keys)
+                    running = asyncio.create_task(recorder.run())
+                    await clock.sleep_s(0.01)
+                    await scene(network.join("resource_pool/scout1", clock), clock, recorder)
+                    recorder.end()
+                    await running
+                await bus.close()
 
         run_virtual(play())
         with path.open("rb") as file:
@@ -67,7 +66,7 @@ def test_all_publications_are_recorded_with_key_sender_and_times(recorded: Calla
     assert [one.body["what"] for one in found] == [f"event {number}" for number in range(5)]
     assert {one.key for one in found} == {"scout/local/resource_pool/scout1/log"}
     assert [one.sequence for one in found] == [1, 2, 3, 4, 5]
-    assert all(one.stamp_s <= one.at_s <= one.stamp_s + 0.01 for one in found)
+    assert all(one.stamp_s <= one.heard_s <= one.stamp_s + 0.01 for one in found)
 
 
 def test_only_keys_that_are_meant_are_recorded(recorded: Callable[..., list[Recorded]]) -> None:
@@ -88,13 +87,68 @@ def test_below_a_hundred_megabytes_it_ends_with_a_whole_file_and_says_so(
     async def scene(bus: Any, clock: Any, recorder: Recorder) -> None:
         bus.publish(bus.source, Conversation.LOG, event(1))
         await clock.sleep_s(2 * FLUSH_EACH_S)
-        assert not recorder.is_full
+        assert not recorder.full
         free[0] -= 1
         await clock.sleep_s(2 * FLUSH_EACH_S)
-        assert recorder.is_full
+        assert "100 MB" in recorder.full
         bus.publish(bus.source, Conversation.LOG, event(2))
 
     found = recorded(scene)
-    said = [one.body["what"] for one in found if one.schema == "StoryEvent/1"]
-    assert said[0] == "event 1"
-    assert "event 2" not in said
+    said = [one.body["what"] for one in found if one.source == "resource_pool/scout1"]
+    assert said == ["event 1"]
+
+
+def test_what_is_never_dropped_and_questions_are_recorded_from_their_copies(
+    recorded: Callable[..., list[Recorded]],
+) -> None:
+    async def answer(asked: Envelope[Any]) -> Story:
+        return Story([event(asked.body.subject == "scout1")])
+
+    async def scene(bus: Any, clock: Any, _recorder: Recorder) -> None:
+        bus.serve(bus.source, AskStory, answer)
+        bus.publish(bus.source, Conversation.EVENTS, event(1))
+        await bus.ask(bus.source, AskStory("scout1"), Story, within_s=1.0)
+        bus.publish(bus.source, Conversation.LOG, event(2))
+        await clock.sleep_s(0.1)
+
+    found = [one for one in recorded(scene) if one.source == "resource_pool/scout1"]
+    assert [(one.sequence, one.key.rpartition("/")[2], one.schema) for one in found] == [
+        (1, "events", "StoryEvent/1"),
+        (2, "ask", "AskStory/1"),
+        (3, "ask", "Story/1"),
+        (4, "log", "StoryEvent/1"),
+    ]
+    assert found[2].cause == found[1].id
+    assert missing_numbers(found) == {}
+
+
+def test_of_keys_that_are_meant_copies_count_by_what_they_copy(recorded: Callable[..., list[Recorded]]) -> None:
+    async def scene(bus: Any, clock: Any, _recorder: Recorder) -> None:
+        bus.publish("resource_pool/scout1", Conversation.EVENTS, event(1))
+        bus.publish("resource_pool/scout2", Conversation.EVENTS, event(2))
+        await clock.sleep_s(0.1)
+
+    [found] = recorded(scene, "*/scout2/events")
+    assert (found.key, found.body["what"]) == ("scout/local/resource_pool/scout2/events", "event 2")
+
+
+def test_it_ends_when_the_mission_has_ended(tmp_path: Path, local_mission: Any) -> None:
+    async def play() -> None:
+        clock = VirtualClock()
+        async with local_mission("local") as network:
+            bus = network.join("backbone/recorder", clock)
+            links: list[Any] = []
+            bus.watch_link = links.append
+            with (tmp_path / "it.mcap").open("xb") as file:
+                recorder = Recorder(bus, clock, file=file, path=tmp_path / "it.mcap", classes=CLASSES, about={})
+                running = asyncio.create_task(recorder.run())
+                await clock.sleep_s(1.0)
+                for is_up, wait_s in ((False, 3.0), (True, 10.0), (False, 3.0)):
+                    links[0](is_up)
+                    await clock.sleep_s(wait_s)
+                    assert not running.done()
+                await clock.sleep_s(3.0)
+                assert running.done()
+            await bus.close()
+
+    run_virtual(play())

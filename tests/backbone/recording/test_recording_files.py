@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import NoRecording, Recorded, Recording, is_meant, recover, recover_file
+from backbone.recording.reader import NoRecording, Recorded, Recording, recover, recover_file
 from backbone.recording.revival import revived
-from backbone.recording.writer import RecordingWriter
+from backbone.recording.writer import RecordingWriter, is_meant
 from backbone.wire import Envelope, Message, write
 
 CLASSES = message_classes()
@@ -32,11 +32,11 @@ def story(number: int) -> StoryEvent:
 
 
 def raw(source: str, number: int, body: Message) -> bytes:
-    return write(Envelope(1, source, number, number / 8, f"{source}#0", body))
+    return write(Envelope(1, source, number, number / 4 - 0.1, f"{source}#0", body))
 
 
 def writer(file: IO[bytes]) -> RecordingWriter:
-    return RecordingWriter(file, CLASSES, ABOUT, "<mission/>")
+    return RecordingWriter(file, CLASSES, ABOUT, mission_xml="<mission/>")
 
 
 def recorded(senders: list[int], flushes: frozenset[int] = frozenset(), *, whole: bool = True) -> tuple[bytes, int]:
@@ -62,12 +62,13 @@ senders = st.lists(st.integers(0, 1), max_size=30)
 
 
 @given(senders)
-def test_all_messages_come_back_in_the_order_of_their_arrival(sent: list[int]) -> None:
+def test_all_messages_come_back_in_the_order_of_sending(sent: list[int]) -> None:
     data, _ = recorded(sent)
     found = read(data)
-    assert [(one.source, one.sequence, one.at_s, one.stamp_s) for one in found] == [
-        (SOURCES[sender], number, number / 4, number / 8) for number, sender in enumerate(sent)
+    assert [(one.source, one.sequence, one.heard_s, one.stamp_s) for one in found] == [
+        (SOURCES[sender], number, number / 4, number / 4 - 0.1) for number, sender in enumerate(sent)
     ]
+    assert all(one.at_s == pytest.approx(max(0.0, one.stamp_s)) for one in found)
     assert [revived(StoryEvent, one.body) for one in found] == [*map(story, range(len(sent)))]
     contents = Recording(io.BytesIO(data)).contents()
     assert (contents.messages, contents.about) == (len(sent), ABOUT)
@@ -131,8 +132,29 @@ def test_an_unfinished_recording_names_the_remedy_and_recovers(tmp_path: Path) -
 def test_keys_and_times_choose_messages() -> None:
     data, _ = recorded([0, 1, 0, 1])
     assert [one.sequence for one in read(data, "resource_pool/*/log")] == [0, 2]
-    assert [one.sequence for one in read(data, since_s=0.25, until_s=0.5)] == [1, 2]
+    assert [one.sequence for one in read(data, since_s=0.15, until_s=0.4)] == [1, 2]
     assert read(data, "nobody/*") == []
+
+
+@given(st.permutations(range(8)))
+def test_what_arrives_in_another_order_is_read_in_the_order_of_sending(arrived: list[int]) -> None:
+    file = io.BytesIO()
+    made = writer(file)
+    for number in arrived:
+        made.write(key_of(SOURCES[0]), raw(SOURCES[0], number, story(number)), 2.0)
+        made.flush()
+    made.finish()
+    assert [one.sequence for one in read(file.getvalue())] == [*range(8)]
+
+
+@pytest.mark.parametrize("stamp_s", [-86_400.0, 1e12])
+def test_a_time_that_is_not_credible_orders_nothing(stamp_s: float) -> None:
+    file = io.BytesIO()
+    made = writer(file)
+    made.write("scout/night/x/y/log", write(Envelope(1, "x/y", 1, stamp_s, "", story(1))), 3.0)
+    made.finish()
+    [found] = read(file.getvalue())
+    assert (found.at_s, found.stamp_s) == (3.0, stamp_s)
 
 
 def test_unknown_messages_and_bytes_that_are_none_are_in_the_recording() -> None:

@@ -9,7 +9,6 @@ import msgspec
 import pytest
 from message_catalogue import catalogue, honest_body, limit_bodies
 
-from backbone.ranges import Text
 from backbone.recording.json_schema import schema_json
 from backbone.recording.known_messages import message_classes
 from backbone.recording.revival import OtherForm, revived
@@ -29,7 +28,7 @@ def on_the_wire(body: list[Any]) -> bytes:
 
 
 def translated(body: list[Any]) -> tuple[type[Message], dict[str, Any]]:
-    found = TRANSLATOR.translate(on_the_wire(body))
+    found = TRANSLATOR.translate(on_the_wire(body), 12.6)
     assert found.kind is not None, body
     assert (found.source, found.sequence, found.stamp_s) == ("resource_pool/scout1", 7, 12.5)
     return found.kind, msgspec.json.decode(found.data)
@@ -60,19 +59,15 @@ def test_a_message_inside_another_keeps_its_schema() -> None:
     assert said["body"]["values"] == {"brightness": 0.5}
 
 
-class Newcomer(Message, frozen=True):
-    text: Text
-
-
 def test_a_message_of_an_unknown_class_is_recorded_without_names() -> None:
-    found = TRANSLATOR.translate(on_the_wire(["Newcomer/1", "hello", [1, 2]]))
+    found = TRANSLATOR.translate(on_the_wire(["Newcomer/1", "hello", [1, 2]]), 12.6)
     assert (found.kind, found.schema, found.source) == (None, "Newcomer/1", "resource_pool/scout1")
     assert msgspec.json.decode(found.data)["body"] == ["Newcomer/1", "hello", [1, 2]]
 
 
 @pytest.mark.parametrize("raw", [b"", b"\xc1", b"not a message", msgspec.msgpack.encode([1, 2]), b"\x96" * 2000])
 def test_bytes_that_are_no_message_are_kept(raw: bytes) -> None:
-    found = TRANSLATOR.translate(raw)
+    found = TRANSLATOR.translate(raw, 12.6)
     assert (found.schema, found.source, found.data) == ("", "", raw)
 
 

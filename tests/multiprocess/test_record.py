@@ -1,0 +1,153 @@
+"""A mission is recorded from beside it, and looked into without it."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running_mission import BIN, MISSION_XML, RunningMission, mission_up
+from tutorial_commands import run_all
+
+from backbone.recording.reader import Recorded, Recording
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
+
+GUIDE = MISSION_XML.parent / "docs" / "how-to" / "record-a-mission.md"
+MIXED = Path(__file__).parents[2] / "docs" / "examples" / "mixed.xml"
+LOST_AT_MOST_S = 0.5
+UNANSWERED = 4  # an ARC that ends is asked once more by creator, placer and RC manager
+
+
+@pytest.fixture(scope="module")
+def mission() -> Iterator[RunningMission]:
+    with mission_up(mission_xml=MIXED) as running:
+        yield running
+
+
+@contextmanager
+def recording_to(mission: RunningMission, path: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+    """Record; the recorder has begun when this is entered."""
+    words = [str(BIN / "scout-backbone"), "record", "--to", str(path), "--mission", mission.name, *options]
+    recorder = subprocess.Popen(words, env=mission.environment, stderr=subprocess.PIPE, text=True)
+    assert recorder.stderr is not None
+    try:
+        said = recorder.stderr.readline()
+        assert said.startswith("records to"), said + recorder.stderr.read()
+        yield recorder
+    finally:
+        recorder.kill()
+        recorder.wait(10)
+        recorder.stderr.close()
+
+
+def ended(recorder: subprocess.Popen[str], by: signal.Signals = signal.SIGINT) -> str:
+    recorder.send_signal(by)
+    _none, said = recorder.communicate(timeout=20)
+    assert recorder.returncode == 0, said
+    return said
+
+
+def looked_into(mission: RunningMission, *words: str) -> list[dict[str, Any]]:
+    """Return what ``scout-backbone recording … --json`` prints."""
+    done = mission.command("scout-backbone", "recording", *words, "--json")
+    assert done.returncode == 0, done.stderr + done.stdout
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def messages(path: Path) -> list[Recorded]:
+    with path.open("rb") as file:
+        return [*Recording(file).messages()]
+
+
+def test_every_command_of_the_guide_works() -> None:
+    with tempfile.TemporaryDirectory(prefix="scout-record-") as name:
+        shutil.copy(MISSION_XML, Path(name) / "mission.xml")
+        run_all(GUIDE, Path(name))
+        assert messages(Path(name) / "night.mcap")
+
+
+def test_a_recording_has_all_messages_and_tells_what_the_mission_told(mission: RunningMission, tmp_path: Path) -> None:
+    path = tmp_path / "it.mcap"
+    with recording_to(mission, path) as recorder:
+        time.sleep(3.0)
+        done = mission.command(
+            "scout-console",
+            *("attach", "scout1", "--kind", "drive", "--script", "-", "--user", "anna", "--mission", mission.name),
+            stdin='{"at_s": 0.1, "forward_m_s": 0.1, "turn_rad_s": 0}\n{"at_s": 1, "halt": true}\n',
+        )
+        assert done.returncode == 0, done.stderr
+        time.sleep(1.0)
+        said = ended(recorder)
+    assert "incomplete" not in said
+    found = messages(path)
+    [info] = looked_into(mission, "info", str(path))
+    assert (info["mission"], info["messages"]) == (mission.name, len(found))
+    [checked] = looked_into(mission, "check", str(path))
+    assert sum(checked["missing"].values()) <= UNANSWERED, checked
+    for source in {one.source for one in found}:
+        of_source = [one.sequence for one in found if one.source == source]
+        assert of_source == sorted(of_source), f"{source}: in the order of sending"
+        assert len(of_source) == len(set(of_source)), f"{source}: each once"
+    schemas = {one.schema.partition("/")[0] for one in found}
+    assert {"WorldState", "Pose", "Leases", "Schedule", "Applied", "RadioPacket", "Parameters", "Story"} <= schemas
+    assert {"Move", "Admit", "Connect", "Disconnect", "TraceLine", "OperatorActed"} <= schemas, sorted(schemas)
+    story = looked_into(mission, "story", str(path), "scout1")
+    assert any("anna" in event["what"] for event in story), story
+    shown = mission.command("scout-backbone", "recording", "mission", str(path))
+    assert "<mission" in shown.stdout
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_a_killed_recorder_at_most_half_a_second_is_lost(mission: RunningMission, tmp_path: Path, seed: int) -> None:
+    path, whole = tmp_path / "killed.mcap", tmp_path / "whole.mcap"
+    with recording_to(mission, path) as recorder:
+        time.sleep(random.Random(seed).uniform(1.5, 3.0))
+        killed_s = mission.clock.now_s()
+        recorder.kill()
+        recorder.wait(10)
+    refused = mission.command("scout-backbone", "recording", "info", str(path))
+    assert refused.returncode == 5
+    assert "record recover" in refused.stderr
+    done = mission.command("scout-backbone", "record", "recover", str(path), str(whole))
+    assert done.returncode == 0, done.stderr
+    assert messages(whole)[-1].at_s > killed_s - LOST_AT_MOST_S
+    again = mission.command("scout-backbone", "record", "recover", str(path), str(whole))
+    assert (again.returncode, "exists" in again.stderr) == (2, True)
+
+
+def test_a_recorder_that_hangs_delays_nobody(mission: RunningMission, tmp_path: Path) -> None:
+    with recording_to(mission, tmp_path / "hangs.mcap") as recorder:
+        time.sleep(1.0)
+        recorder.send_signal(signal.SIGSTOP)
+        try:
+            for _ in range(20):
+                assert mission.status()["health"] == "ok"
+                time.sleep(0.2)
+        finally:
+            recorder.send_signal(signal.SIGCONT)
+        ended(recorder)
+
+
+def test_what_cannot_be_recorded_is_refused_with_a_remedy(mission: RunningMission, tmp_path: Path) -> None:
+    there = tmp_path / "there.mcap"
+    there.touch()
+    for words, told in (
+        (["--to", str(there)], "exists"),
+        (["--to", str(tmp_path / "no" / "x.mcap")], "cannot be written"),
+    ):
+        done = mission.command("scout-backbone", "record", *words, "--mission", mission.name)
+        assert (done.returncode, told in done.stderr) == (2, True), done.stderr
+    assert os.path.getsize(there) == 0
+    done = mission.command("scout-backbone", "record", "--mission", "nobody")
+    assert done.returncode == 4
