@@ -198,7 +198,7 @@ async def print_keys(path: Path, *, as_json: bool) -> ExitCode:
         show(json.dumps(row) for row in rows)
         return ExitCode.DONE
     show(
-        f"{one.messages:8d} {one.messages / lasted_s:9.2f}/s  {one.key}  {one.schema or 'no message'}"
+        f"{one.messages:8d} {one.messages / lasted_s:9.2f}/s  {one.key or 'several keys'}  {one.schema or 'no message'}"
         + ("" if one.key.split("/", 2)[-1].startswith(one.source) else f"  from {one.source}")
         for one in found.counts
     )

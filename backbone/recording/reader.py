@@ -39,7 +39,7 @@ class Recorded:
     """One message of a recording.
 
     Attributes:
-        key: Key expression on the bus.
+        key: Key expression on the bus; empty: not known.
         source: Address of the sender.
         schema: ``<Name>/<version>``; empty: the bytes were no message.
         at_s: Mission time when it was sent, as the recording orders it; if that is not credible, when it was heard.
@@ -152,12 +152,14 @@ class Recording:
         topics = None
         if patterns:
             channels = self._summary.channels.values()
-            topics = [one.topic for one in channels if is_meant(one.metadata.get("key", one.topic), patterns)]
+            topics = [one.topic for one in channels if not _named(one)[0] or is_meant(_named(one)[0], patterns)]
         end_ns = None if until_s is None else round(until_s * NS)
         found = self._reader.iter_messages(topics, starting_at=max(0, round(since_s * NS)), ending_at=end_ns)
         try:
             for _schema, channel, message in found:
-                yield _recorded(channel, message)
+                recorded = _recorded(channel, message)
+                if not patterns or is_meant(recorded.key, patterns):
+                    yield recorded
         except _DAMAGED as error:
             raise NoRecording(f"the recording is damaged: {error}") from error
 
@@ -262,4 +264,4 @@ def _recorded(channel: Channel, message: Message) -> Recorded:
         return Recorded(key, source, schema, at_s, at_s, at_s, message.sequence, "", message.data)
     said = msgspec.json.decode(message.data)
     at_s = message.log_time / NS
-    return Recorded(key, source, schema, at_s, **said)
+    return Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)

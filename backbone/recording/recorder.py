@@ -80,6 +80,7 @@ class Recorder:
         self._writer = RecordingWriter(file, classes, about, keys, mission_xml)
         self._subscribed: list[Overhearing] = []
         self._tellers: set[str] = set()
+        self._bug: BaseException | None = None
         self._ended = asyncio.Event()
         self._has_link = True
         self.full = ""
@@ -100,7 +101,12 @@ class Recorder:
         self._ended.set()
 
     async def run(self) -> None:
-        """Record until the end; then the file is whole, unless the disc is full."""
+        """Record until the end; then the file is whole, unless the disc is full.
+
+        Raises:
+            BaseException: A bug ended it.
+        """
+        self._bus.on_bug = self._fail
         for conversation in _overheard(self._keys):
             self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
         self._bus.watch_link(self._link_changed)
@@ -114,6 +120,8 @@ class Recorder:
             self._finish()
         if not asking.cancelled():
             asking.result()
+        if self._bug is not None:
+            raise self._bug
 
     async def _flush_until_end(self) -> None:
         dropped, silent_s = 0, 0.0
@@ -146,6 +154,10 @@ class Recorder:
         except OSError as error:
             self._fill(str(error))
         self._say(f"{self._who} records no more{f': {self.full}' if self.full else ''}", LogLevel.NOTICE)
+
+    def _fail(self, bug: BaseException) -> None:
+        self._bug = self._bug or bug
+        self.end()
 
     def _fill(self, why: str) -> None:
         self.full = self.full or why

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Union, cast
 
@@ -13,6 +14,7 @@ from backbone.recording.json_schema import TAG
 from backbone.wire import Envelope, Message, schema_of
 
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+_UNSPEAKABLE = (TypeError, ValueError, OverflowError, RecursionError)  # what MessagePack can say, and JSON cannot
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,12 +22,12 @@ class Translated:
     """A message as a recording holds it.
 
     Attributes:
-        schema: ``<Name>/<version>``; empty: the bytes were no message.
-        source: Address of the sender; empty: the same.
+        schema: ``<Name>/<version>``; empty: the bytes are no message, or one that JSON cannot say.
+        source: Address of the sender; empty: the bytes are no message.
         sequence: Its number among those of the sender.
         stamp_s: Mission time of sending.
         kind: Its class; None: no installed package has it.
-        data: JSON, or the bytes as they were if they are no message.
+        data: JSON; with an empty schema the bytes as they were.
     """
 
     schema: str
@@ -55,7 +57,11 @@ class Translator:
         except _UNREADABLE:
             return self._unknown(raw, heard_s)
         kind = type(envelope.body)
-        return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, _named(envelope.body), heard_s)
+        try:
+            named = _named(envelope.body)
+            return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, named, heard_s)
+        except _UNSPEAKABLE:
+            return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw)
 
     def told(self, raw: bytes) -> Told:
         """Return the ``Told`` that these bytes hold."""
@@ -68,7 +74,8 @@ class Translator:
             return Translated("", "", 0, 0.0, None, raw)
         match envelope.body:
             case [str(schema), *_]:
-                return _translated(envelope, schema, None, envelope.body, heard_s)
+                with suppress(*_UNSPEAKABLE):
+                    return _translated(envelope, schema, None, envelope.body, heard_s)
         return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw)
 
 

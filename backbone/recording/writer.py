@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import IO
 
+import msgspec
 from mcap.writer import CompressionType, Writer
 
 from backbone.bus.interface import Told
@@ -25,6 +26,7 @@ ABOUT = "mission"
 NS = 1_000_000_000
 CHUNK_BYTES = 256 * 1024  # chosen: a chunk is written well before the next flush, and still compresses
 MOST_AWAY_S = 60.0  # chosen: beyond any delay and any difference of clocks that a mission survives
+MOST_CHANNELS = 60_000  # MCAP specification, op 0x04: id is a uint16; the rest is for channels of any sender
 MOST_SEQUENCE = 2**32  # MCAP specification, op 0x05: sequence is a uint32
 MIME_XML = "application/xml"
 
@@ -80,13 +82,14 @@ class RecordingWriter:
 
     def _write(self, key: str, message: Translated, at_s: float) -> None:
         is_credible = message.source and abs(message.stamp_s - at_s) <= MOST_AWAY_S
+        channel, data = self._channel_and_data(key, message)
         sent_ns = _ns(message.stamp_s if is_credible else at_s)
         self._writer.add_message(
-            channel_id=self._channel(key, message),
+            channel_id=channel,
             log_time=sent_ns,
             publish_time=sent_ns,
             sequence=message.sequence % MOST_SEQUENCE,
-            data=message.data,
+            data=data,
         )
         self.written += 1
 
@@ -98,17 +101,27 @@ class RecordingWriter:
         """Write the index, which lets readers begin anywhere; nothing can be written afterwards."""
         self._writer.finish()  # type: ignore[no-untyped-call]
 
-    def _channel(self, key: str, message: Translated) -> int:
+    def _channel_and_data(self, key: str, message: Translated) -> tuple[int, bytes]:
+        """Return the number of the message's channel, and its data, with key and sender where channels are scarce."""
         named = (key, message.source, message.schema)
         known = self._channels.get(named)
         if known is not None:
-            return known
+            return known, message.data
+        if len(self._channels) < MOST_CHANNELS:
+            return self._new_channel(*named, message.kind), message.data
+        shared = self._channels.get(("", "", message.schema)) or self._new_channel("", "", message.schema, message.kind)
+        if not message.schema:
+            return shared, message.data
+        data = msgspec.json.decode(message.data) | {"key": key, "source": message.source}
+        return shared, msgspec.json.encode(data)
+
+    def _new_channel(self, key: str, source: str, schema: str, kind: type[Message] | None) -> int:
         path = "/".join(key.split("/")[2:])
-        topic = f"/{path}/{message.schema.partition('/')[0]}".rstrip("/")
-        schema = self._schema(message.kind) if message.kind is not None else 0
-        about = {"key": key, "source": message.source, "schema": message.schema}
-        made = self._writer.register_channel(topic, "json" if message.schema else "", schema, about)
-        self._channels[named] = made
+        topic = f"/{path}/{schema.partition('/')[0]}".replace("//", "/").rstrip("/")
+        about = {"key": key, "source": source, "schema": schema}
+        number = self._schema(kind) if kind is not None else 0
+        made = self._writer.register_channel(topic, "json" if schema else "", number, about)
+        self._channels[key, source, schema] = made
         return made
 
     def _schema(self, kind: type[Message]) -> int:

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.bus.interface import Told
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import NoRecording, Recorded, Recording, recover, recover_file
@@ -174,3 +175,30 @@ def test_unknown_messages_and_bytes_that_are_none_are_in_the_recording() -> None
 )
 def test_a_pattern_may_leave_the_mission_out(pattern: str, is_so: bool) -> None:
     assert is_meant("scout/night/resource_pool/scout1/log", (pattern,)) is is_so
+
+
+def test_with_more_senders_than_channels_each_message_says_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("backbone.recording.writer.MOST_CHANNELS", 3)
+    file = io.BytesIO()
+    made = writer(file)
+    for number in range(8):
+        source = f"ui_console/console-{number}"
+        made.write(key_of(source), raw(source, number, story(number)), number / 4)
+    made.write("scout/night/x/y/log", b"\xc1", 3.0)
+    made.finish()
+    found = read(file.getvalue())
+    assert [one.source for one in found] == [*(f"ui_console/console-{number}" for number in range(8)), ""]
+    assert [one.key for one in found[:8]] == [key_of(one.source) for one in found[:8]]
+    assert [one.sequence for one in read(file.getvalue(), "*/console-6/log")] == [6]
+    assert len(Recording(io.BytesIO(file.getvalue())).contents().counts) == 5
+
+
+def test_copies_inside_copies_are_not_followed() -> None:
+    inner = write(Envelope(1, "x/y", 1, 0.0, "", Told("x/y", "ask", [])))
+    for _ in range(50):
+        inner = write(Envelope(1, "x/y", 1, 0.0, "", Told("x/y", "ask", [inner, b"\xc1"])))
+    file = io.BytesIO()
+    made = writer(file)
+    made.write("scout/night/x/y/told", inner, 0.0)
+    made.finish()
+    assert [one.schema for one in read(file.getvalue())] == ["Told/1", ""]

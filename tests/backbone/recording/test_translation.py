@@ -7,6 +7,8 @@ from typing import Any
 import jsonschema
 import msgspec
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from message_catalogue import catalogue, honest_body, limit_bodies
 
 from backbone.recording.json_schema import schema_json
@@ -74,3 +76,28 @@ def test_bytes_that_are_no_message_are_kept(raw: bytes) -> None:
 def test_a_body_of_another_form_is_refused() -> None:
     with pytest.raises(OtherForm, match="GiveCommand/1"):
         revived(GiveCommand, {"word": 3})
+
+
+PLAIN = st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats() | st.text() | st.binary()
+ANYTHING = st.recursive(
+    PLAIN | st.just(msgspec.msgpack.Ext(5, b"x")),
+    lambda inner: st.lists(inner) | st.dictionaries(st.integers() | st.text() | st.binary(), inner),
+    max_leaves=20,
+)
+
+
+@given(ANYTHING)
+def test_whatever_a_sender_says_is_recorded_or_kept_as_bytes(value: Any) -> None:
+    for body in (value, ["Newcomer/1", value], ["SetParameter/1", "speed", value, "anna"], [value, value]):
+        try:
+            raw = on_the_wire(body)
+        except (OverflowError, TypeError):
+            continue  # not even the wire can say it
+        found = TRANSLATOR.translate(raw, 12.6)
+        assert found.data == raw if not found.schema else msgspec.json.decode(found.data)["sequence"] == 7
+
+
+def test_a_body_that_is_too_deep_is_kept_as_bytes() -> None:
+    envelope = msgspec.msgpack.encode([1, "resource_pool/scout1", 7, 12.5, "", None])[:-1]
+    raw = envelope + msgspec.msgpack.encode(["Newcomer/1", None])[:-1] + b"\x91" * 100_000 + b"\x90"
+    assert TRANSLATOR.translate(raw, 12.6).data == raw
