@@ -20,7 +20,8 @@ from mcap.writer import CompressionType, Writer
 from zstandard import ZstdError
 
 from backbone.errors import Refusal
-from backbone.recording.writer import ABOUT, CHUNK_BYTES, NS, PROFILE, is_meant
+from backbone.recording.hearing import is_meant
+from backbone.recording.writer import ABOUT, CHUNK_BYTES, NS, PROFILE
 
 MOST_RECORD_BYTES = 64 * 1024 * 1024  # chosen: eight times the largest message; a damaged length asks for terabytes
 _DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)

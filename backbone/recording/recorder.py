@@ -27,11 +27,12 @@ from backbone.component.messages import (
     StoryEvent,
 )
 from backbone.errors import LinkError, Refusal
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import Conversation
 from backbone.keys import key as key_of
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import component_of
 from backbone.rc_manager.messages import AskSchedule
+from backbone.recording.hearing import to_overhear
 from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
@@ -107,7 +108,7 @@ class Recorder:
             BaseException: A bug ended it.
         """
         self._bus.on_bug = self._fail
-        for conversation in _overheard(self._keys):
+        for conversation in to_overhear(self._keys):
             self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
         self._bus.watch_link(self._link_changed)
         self._say(f"{self._who} records the mission to {self._path.name}", LogLevel.NOTICE)
@@ -185,7 +186,7 @@ class Recorder:
     # ------------------------------------------------------------------ what was said before
     async def _ask_all(self) -> None:
         """Ask for what was said before anybody overheard it; the answers come as all others do."""
-        if Conversation.TOLD not in _overheard(self._keys):
+        if Conversation.TOLD not in to_overhear(self._keys):
             return
         listed = await self._asked(NAMESERVER, ListComponents(), Components)
         await self._asked(RC_MANAGER, AskSchedule(), Schedule)
@@ -208,23 +209,3 @@ class Recorder:
             if key in self._tellers:
                 break
         return answer
-
-
-def _overheard(patterns: tuple[str, ...]) -> list[Conversation]:
-    """Return the conversations to overhear for keys that match a pattern, copies first.
-
-    Who publishes something else that is recorded knows by then that copies are, too: what is declared in this order is
-    known everywhere in this order.
-
-    Example:
-        >>> [one.value for one in _overheard(("resource_pool/*/readings",))]
-        ['readings']
-        >>> [one.value for one in _overheard(("*/ask", "*/status", "*/log"))]
-        ['told', 'log']
-    """
-    copied = {*NEVER_DROPPED, Conversation.ASK}
-    direct = [one for one in Conversation if one not in {*copied, Conversation.TOLD, Conversation.ALIVE}]
-    ends = {pattern.rpartition("/")[2] for pattern in patterns}
-    if not ends or not ends <= set(Conversation):
-        return [Conversation.TOLD, *direct]
-    return [*([Conversation.TOLD] if ends & copied else []), *(one for one in direct if one in ends)]

@@ -8,16 +8,14 @@ the recorder got it. What was flushed outlives the recorder's death, see ``reade
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import IO
 
 import msgspec
 from mcap.writer import CompressionType, Writer
 
-from backbone.bus.interface import Told
-from backbone.keys import Conversation
+from backbone.recording.hearing import Hearing
 from backbone.recording.json_schema import schema_json
-from backbone.recording.translation import Translated, Translator
+from backbone.recording.translation import Translated
 from backbone.wire import Message
 
 PROFILE = "scout-backbone"
@@ -51,8 +49,7 @@ class RecordingWriter:
         mission_xml: str = "",
     ) -> None:
         self._writer = Writer(file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._translator = Translator(classes)
-        self._keys = tuple(keys)
+        self._hearing = Hearing(classes, keys)
         self._schemas: dict[type[Message], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
         self.written = 0
@@ -63,22 +60,9 @@ class RecordingWriter:
             self._writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
 
     def write(self, key: str, raw: bytes, at_s: float) -> None:
-        """Add a message as it came over the bus at a mission time; of a ``Told`` those that it tells, if meant."""
-        is_told = key.endswith(f"/{Conversation.TOLD}")
-        if not is_told and not self._is_meant(key):
-            return
-        message = self._translator.translate(raw, at_s)
-        if message.kind is not Told:
-            self._write(key, message, at_s)
-            return
-        told = self._translator.told(raw)
-        told_key = f"{'/'.join(key.split('/')[:2])}/{told.address}/{told.conversation}"
-        if self._is_meant(told_key):
-            for quoted in told.messages:
-                self._write(told_key, self._translator.translate(quoted, at_s), at_s)
-
-    def _is_meant(self, key: str) -> bool:
-        return not self._keys or is_meant(key, self._keys)
+        """Add what came over the bus at a mission time, as far as it is meant."""
+        for said_at, message in self._hearing.heard(key, raw, at_s):
+            self._write(said_at, message, at_s)
 
     def _write(self, key: str, message: Translated, at_s: float) -> None:
         is_credible = message.source and abs(message.stamp_s - at_s) <= MOST_AWAY_S
@@ -130,17 +114,6 @@ class RecordingWriter:
             name = kind.__struct_config__.tag
             known = self._schemas[kind] = self._writer.register_schema(str(name), "jsonschema", schema_json(kind))
         return known
-
-
-def is_meant(key: str, patterns: tuple[str, ...]) -> bool:
-    """Return whether a key matches one of these patterns, with or without ``scout/<mission>/`` before it.
-
-    Example:
-        >>> is_meant("scout/iros2001/resource_pool/scout1/telemetry", ("*/scout1/*",))
-        True
-    """
-    short = key.split("/", 2)[-1]
-    return any(fnmatchcase(key, pattern) or fnmatchcase(short, pattern) for pattern in patterns)
 
 
 def _ns(at_s: float) -> int:

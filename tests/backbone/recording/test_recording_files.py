@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 
 from backbone.bus.interface import Told
 from backbone.component.messages import LogLevel, StoryEvent
+from backbone.recording.hearing import is_meant
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import NoRecording, Recorded, Recording, recover, recover_file
 from backbone.recording.revival import revived
-from backbone.recording.writer import RecordingWriter, is_meant
+from backbone.recording.writer import RecordingWriter
 from backbone.wire import Envelope, Message, write
 
 CLASSES = message_classes()

@@ -1,0 +1,79 @@
+"""From what is overheard on the bus to the messages that are meant. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+
+from backbone.bus.interface import Told
+from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.recording.translation import Translated, Translator
+from backbone.wire import Message
+
+_COPIED = frozenset({*NEVER_DROPPED, Conversation.ASK})
+_DIRECT = tuple(one for one in Conversation if one not in {*_COPIED, Conversation.TOLD, Conversation.ALIVE})
+
+
+class Hearing:
+    """Which messages are meant, and what they say.
+
+    Args:
+        classes: Known message classes, by schema.
+        keys: Patterns of the keys that are meant, see ``is_meant``; none: all.
+    """
+
+    def __init__(self, classes: Mapping[str, type[Message]], keys: Sequence[str] = ()) -> None:
+        self._translator, self._keys = Translator(classes), tuple(keys)
+
+    def heard(self, key: str, raw: bytes, at_s: float) -> Iterator[tuple[str, Translated]]:
+        """Yield key and message; of a ``Told`` those that it tells, with the key that they had.
+
+        Args:
+            key: At which the bytes were overheard.
+            raw: The bytes.
+            at_s: Mission time when they came.
+        """
+        is_told = key.endswith(f"/{Conversation.TOLD}")
+        if not is_told and not self._is_meant(key):
+            return
+        message = self._translator.translate(raw, at_s)
+        if message.kind is not Told:
+            yield key, message
+            return
+        told = self._translator.told(raw)
+        told_key = f"{'/'.join(key.split('/')[:2])}/{told.address}/{told.conversation}"
+        if self._is_meant(told_key):
+            for quoted in told.messages:
+                yield told_key, self._translator.translate(quoted, at_s)
+
+    def _is_meant(self, key: str) -> bool:
+        return not self._keys or is_meant(key, self._keys)
+
+
+def is_meant(key: str, patterns: Sequence[str]) -> bool:
+    """Return whether a key matches one of these patterns, with or without ``scout/<mission>/`` before it.
+
+    Example:
+        >>> is_meant("scout/iros2001/resource_pool/scout1/telemetry", ("*/scout1/*",))
+        True
+    """
+    short = key.split("/", 2)[-1]
+    return any(fnmatchcase(key, pattern) or fnmatchcase(short, pattern) for pattern in patterns)
+
+
+def to_overhear(patterns: Sequence[str]) -> list[Conversation]:
+    """Return the conversations to overhear for keys that match a pattern, copies first.
+
+    Who publishes something else that is heard knows by then that copies are, too: what is declared in this order is
+    known everywhere in this order.
+
+    Example:
+        >>> [one.value for one in to_overhear(("resource_pool/*/readings",))]
+        ['readings']
+        >>> [one.value for one in to_overhear(("*/ask", "*/status", "*/log"))]
+        ['told', 'log']
+    """
+    ends = {pattern.rpartition("/")[2] for pattern in patterns}
+    if not ends or not ends <= set(Conversation):
+        return [Conversation.TOLD, *_DIRECT]
+    return [*([Conversation.TOLD] if ends & _COPIED else []), *(one for one in _DIRECT if one in ends)]
