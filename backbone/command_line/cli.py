@@ -36,7 +36,7 @@ from backbone.command_line.options import (
     named_value,
     run,
 )
-from backbone.command_line.recording_commands import record, recording
+from backbone.command_line.recording_commands import record, recording, top, watch
 from backbone.command_line.tree_commands import tree
 from backbone.component.log_level import LogLevel
 from backbone.launcher.endings import ExitCode, say
@@ -340,6 +340,8 @@ def set_(
 app.add_typer(tree, name="tree")
 app.add_typer(record, name="record")
 app.add_typer(recording, name="recording")
+app.command()(watch)
+app.command()(top)
 
 
 @app.command()

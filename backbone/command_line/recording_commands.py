@@ -1,4 +1,4 @@
-"""``scout-backbone record`` and ``scout-backbone recording``: make recordings, and look into them.
+"""``scout-backbone`` ``record``, ``recording``, ``watch`` and ``top``: recordings, and what is said live.
 
 Rules of this file: as those of ``cli``.
 """
@@ -35,8 +35,12 @@ Keys = Annotated[
 ]
 Since = Annotated[float, typer.Option("--since", min=0.0, help="Not before this mission time, seconds.")]
 Until = Annotated[float | None, typer.Option("--until", min=0.0, help="Not after this mission time, seconds.")]
+KeyGlobs = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="KEY…", help="Keys or patterns, as 'resource_pool/*/readings'; default: all."),
+]
+For = Annotated[float | None, typer.Option("--for", min=0.1, max=1e9, help="End after so many seconds.")]
 MOST_LINES = 1_000_000
-LONGEST_S = 1e9
 
 
 @record.callback(invoke_without_command=True)
@@ -46,9 +50,7 @@ def record_mission(
         Path | None, typer.Option("--to", metavar="FILE.mcap", help="A new file; default: named by mission and time.")
     ] = None,
     keys: Keys = None,
-    for_s: Annotated[
-        float | None, typer.Option("--for", min=0.1, max=LONGEST_S, help="End after so many seconds.")
-    ] = None,
+    for_s: For = None,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
@@ -132,3 +134,46 @@ def print_mission(file: File) -> None:
     from backbone.command_line.recording_work import print_mission_file
 
     run(lambda: print_mission_file(file))
+
+
+def watch(
+    keys: KeyGlobs = None,
+    field: Annotated[str, typer.Option("--field", help="Only this field, as 'x_m' or 'rcs.0.rc'.")] = "",
+    rate: Annotated[
+        bool, typer.Option("--rate", help="Rates and sizes each second instead, as 'top' prints them.")
+    ] = False,
+    most: Annotated[
+        int | None, typer.Option("--most", min=1, max=MOST_LINES, help="End after so many messages.")
+    ] = None,
+    for_s: For = None,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Print what is said at these keys of a mission that is up, questions and answers too, until Ctrl-C."""
+    from backbone.command_line import watching
+
+    where, wanted = (
+        chosen(mission, connect, secret_file),
+        watching.Wanted(tuple(keys or ()), field, most, for_s, as_json),
+    )
+    run(lambda: watching.top(where, wanted, once=False) if rate else watching.watch(where, wanted))
+
+
+def top(
+    keys: KeyGlobs = None,
+    for_s: Annotated[float, typer.Option("--for", min=0.1, max=1e6, help="Seconds to listen.")] = 2.0,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Print rates and sizes of the keys of a mission that is up, the busiest first."""
+    from backbone.command_line import watching
+
+    where, wanted = (
+        chosen(mission, connect, secret_file),
+        watching.Wanted(tuple(keys or ()), for_s=for_s, as_json=as_json),
+    )
+    run(lambda: watching.top(where, wanted, once=True))

@@ -15,13 +15,14 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from backbone.addresses import COMPONENT_DATABASE, LAUNCHER
+from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
+from backbone.command_line.message_lines import message_json, message_line
 from backbone.command_line.options import DISTRIBUTION
+from backbone.command_line.watching import mission_classes
 from backbone.command_line.where import Where
 from backbone.component.messages import StoryEvent
-from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.launcher import mission_connection
@@ -33,14 +34,12 @@ from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.naming import Subsystem, address
-from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import Recorded, Recording, missing_numbers, recover_file
+from backbone.recording.reader import Recording, missing_numbers, recover_file
 from backbone.recording.recorder import Recorder
 from backbone.recording.revival import revived
 from backbone.spoken import counted
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
-LONGEST_BODY = 160  # chosen: a line of a wide terminal
 VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
 
 
@@ -57,7 +56,7 @@ async def record_to(where: Where, to: Path | None, keys: list[str], for_s: float
     source = address(Subsystem.BACKBONE, f"recorder-{os.getpid()}")
     async with mission_connection.connected(where.mission, where.connect, source, where.secret()) as (bus, clock):
         path = to or Path(f"{bus.mission}-{datetime.now():%Y%m%d-%H%M%S}.mcap")
-        mission_xml, classes = await _mission_file(bus), message_classes(await _modules(bus))
+        mission_xml, classes = await _mission_file(bus), await mission_classes(bus)
         with _new_file(path) as file:
             recorder = Recorder(
                 bus,
@@ -100,16 +99,6 @@ async def _mission_file(bus: Bus) -> str:
     except (LinkError, Refusal) as error:
         say(f"the mission file is not in the recording: {error}")
         return ""
-
-
-async def _modules(bus: Bus) -> list[str]:
-    """Return the modules of the mission's component types, whose messages may stand there."""
-    try:
-        types = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
-    except (LinkError, Refusal) as error:
-        say(f"messages of the mission's own types are recorded without names: {error}")
-        return []
-    return sorted({one.component_type.class_path.partition(":")[0] for one in types.types})
 
 
 def _about(bus: Bus, clock: MissionClock, keys: list[str]) -> dict[str, str]:
@@ -215,7 +204,7 @@ async def print_messages(
             if number >= most:
                 left_out += 1
             else:
-                show([json.dumps(_plain(message)) if as_json else _line(message)])
+                show([json.dumps(message_json(message)) if as_json else message_line(message)])
     if left_out:
         say(f"{counted(left_out, 'later message')} left out; see --most, --since and --keys")
     return ExitCode.DONE
@@ -263,25 +252,3 @@ def _opened(path: Path) -> Iterator[Recording]:
         raise RecordingUnusable(f"{path} cannot be read: {error.strerror or error}") from error
     with file:
         yield Recording(file)
-
-
-def _line(message: Recorded) -> str:
-    said = message.body if isinstance(message.body, bytes) else json.dumps(message.body, separators=(",", ":"))
-    body = str(said)
-    shown = body if len(body) <= LONGEST_BODY else f"{body[: LONGEST_BODY - 1]}…"
-    return f"{message.at_s:10.3f} s  {message.key.split('/', 2)[-1]}  {message.schema}  {shown}"
-
-
-def _plain(message: Recorded) -> dict[str, object]:
-    body = message.body.hex() if isinstance(message.body, bytes) else message.body
-    return {
-        "at_s": message.at_s,
-        "key": message.key,
-        "source": message.source,
-        "schema": message.schema,
-        "sequence": message.sequence,
-        "stamp_s": message.stamp_s,
-        "heard_s": message.heard_s,
-        "cause": message.cause,
-        "body": body,
-    }

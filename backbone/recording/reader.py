@@ -21,6 +21,7 @@ from zstandard import ZstdError
 
 from backbone.errors import Refusal
 from backbone.recording.hearing import is_meant
+from backbone.recording.translation import Translated
 from backbone.recording.writer import ABOUT, CHUNK_BYTES, NS, PROFILE
 
 MOST_RECORD_BYTES = 64 * 1024 * 1024  # chosen: eight times the largest message; a damaged length asks for terabytes
@@ -258,11 +259,17 @@ def _named(channel: Channel) -> tuple[str, str, str]:
     return about.get("key", channel.topic), about.get("source", ""), about.get("schema", "")
 
 
+def heard_now(key: str, message: Translated, at_s: float) -> Recorded:
+    """Return a message that was just heard as if it had been recorded."""
+    if not message.schema:
+        return Recorded(key, message.source, "", at_s, at_s, at_s, message.sequence, "", message.data)
+    return Recorded(key, message.source, message.schema, at_s, **msgspec.json.decode(message.data))
+
+
 def _recorded(channel: Channel, message: Message) -> Recorded:
     key, source, schema = _named(channel)
+    at_s = message.log_time / NS
     if channel.message_encoding != "json":
-        at_s = message.log_time / NS
         return Recorded(key, source, schema, at_s, at_s, at_s, message.sequence, "", message.data)
     said = msgspec.json.decode(message.data)
-    at_s = message.log_time / NS
     return Recorded(**({"key": key, "source": source} | said), schema=schema, at_s=at_s)

@@ -28,6 +28,7 @@ class Translated:
         stamp_s: Mission time of sending.
         kind: Its class; None: no installed package has it.
         data: JSON; with an empty schema the bytes as they were.
+        size_bytes: Length on the bus.
     """
 
     schema: str
@@ -36,6 +37,7 @@ class Translated:
     stamp_s: float
     kind: type[Message] | None
     data: bytes
+    size_bytes: int
 
 
 class Translator:
@@ -59,9 +61,9 @@ class Translator:
         kind = type(envelope.body)
         try:
             named = _named(envelope.body)
-            return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, named, heard_s)
+            return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, named, heard_s, len(raw))
         except _UNSPEAKABLE:
-            return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw)
+            return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
 
     def told(self, raw: bytes) -> Told:
         """Return the ``Told`` that these bytes hold."""
@@ -71,20 +73,20 @@ class Translator:
         try:
             envelope = self._any.decode(raw)
         except _UNREADABLE:
-            return Translated("", "", 0, 0.0, None, raw)
+            return Translated("", "", 0, 0.0, None, raw, len(raw))
         match envelope.body:
             case [str(schema), *_]:
                 with suppress(*_UNSPEAKABLE):
-                    return _translated(envelope, schema, None, envelope.body, heard_s)
-        return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw)
+                    return _translated(envelope, schema, None, envelope.body, heard_s, len(raw))
+        return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
 
 
 def _translated(
-    envelope: Envelope[Any], schema: str, kind: type[Message] | None, body: object, heard_s: float
+    envelope: Envelope[Any], schema: str, kind: type[Message] | None, body: object, heard_s: float, size_bytes: int
 ) -> Translated:
     said = {"sequence": envelope.sequence, "stamp_s": envelope.stamp_s, "heard_s": heard_s, "cause": envelope.cause}
     data = msgspec.json.encode({**said, "body": body})
-    return Translated(schema, envelope.source, envelope.sequence, envelope.stamp_s, kind, data)
+    return Translated(schema, envelope.source, envelope.sequence, envelope.stamp_s, kind, data, size_bytes)
 
 
 def _named(body: msgspec.Struct) -> dict[str, Any]:

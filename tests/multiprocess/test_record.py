@@ -151,3 +151,33 @@ def test_what_cannot_be_recorded_is_refused_with_a_remedy(mission: RunningMissio
     assert os.path.getsize(there) == 0
     done = mission.command("scout-backbone", "record", "--mission", "nobody")
     assert done.returncode == 4
+
+
+def printed(mission: RunningMission, *words: str) -> list[dict[str, Any]]:
+    """Return what a command prints as JSON lines."""
+    done = mission.command("scout-backbone", *words, "--json", "--mission", mission.name)
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def test_what_is_said_is_watched_live_with_questions_and_single_fields(mission: RunningMission) -> None:
+    poses = printed(mission, "watch", "*/localizer/poses", "--most", "5", "--for", "20")
+    assert len(poses) == 5
+    assert {one["schema"].partition("/")[0] for one in poses} == {"Pose"}
+    places = printed(mission, "watch", "*/localizer/poses", "--field", "x_m", "--most", "3", "--for", "20")
+    assert all(isinstance(one["value"], float) for one in places)
+    asked = printed(mission, "watch", "*/scout1/ask", "--for", "3")
+    assert {"Move/1", "Applied/1"} <= {one["schema"] for one in asked}
+    done = mission.command("scout-backbone", "watch", "nobody/*", "--for", "1", "--mission", mission.name)
+    assert (done.returncode, done.stdout) == (0, "")
+
+
+def test_the_busiest_keys_are_told_with_rates_and_sizes(mission: RunningMission) -> None:
+    rows = printed(mission, "top", "--for", "3")
+    sizes = [one["bytes_per_s"] for one in rows]
+    assert sizes == sorted(sizes, reverse=True)
+    [clock] = [one for one in rows if one["key"].endswith("/world/clock")]
+    assert 15 < clock["messages_per_s"] < 40
+    assert clock["bytes_per_s"] == pytest.approx(clock["messages_per_s"] * clock["mean_bytes"])
+    lines = mission.command("scout-backbone", "watch", "*/clock", "--rate", "--for", "2.5", "--mission", mission.name)
+    assert lines.stdout.count("world/clock") >= 2, lines.stdout

@@ -1,0 +1,154 @@
+"""The work of ``scout-backbone watch`` and ``scout-backbone top``: what is said on a live mission, now.
+
+Both overhear, as a recorder does: nobody waits for them, and copies are made for them only while they look.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+from backbone.addresses import COMPONENT_DATABASE
+from backbone.bus.interface import Bus, Clock, Overhearing
+from backbone.command_line.connection import connected
+from backbone.command_line.message_lines import (
+    TrafficTable,
+    field_of,
+    message_json,
+    message_line,
+    short_key,
+    traffic_lines,
+)
+from backbone.command_line.where import Where
+from backbone.component_database.messages import ListTypes, Types
+from backbone.errors import LinkError, Refusal
+from backbone.launcher.endings import ExitCode, say, show
+from backbone.recording.hearing import Hearing, to_overhear
+from backbone.recording.known_messages import message_classes
+from backbone.recording.reader import heard_now
+from backbone.recording.translation import Translated
+from backbone.spoken import counted
+from backbone.wire import Message
+
+REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
+MOST_WAITING_BYTES = 16 * 1024 * 1024  # chosen: a person reads far less
+LOOK_EACH_S = 1.0  # chosen: a rate over a second is readable and recent
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a person wants to see.
+
+    Attributes:
+        keys: Patterns of keys; none: all.
+        field: Only this field of a body; empty: all.
+        most: End after so many messages; None: go on.
+        for_s: End after so many seconds of the machine; None: go on.
+        as_json: For programs.
+    """
+
+    keys: tuple[str, ...]
+    field: str = ""
+    most: int | None = None
+    for_s: float | None = None
+    as_json: bool = False
+
+
+async def watch(where: Where, wanted: Wanted) -> ExitCode:
+    """Print messages as they come, until a signal, the time or the number ends it."""
+    ended, shown = asyncio.Event(), 0
+
+    def heard(key: str, message: Translated, at_s: float) -> None:
+        nonlocal shown
+        if ended.is_set():
+            return
+        for line in _lines(key, message, at_s, wanted):
+            show([line])
+            shown += 1
+        if wanted.most is not None and shown >= wanted.most:
+            ended.set()
+
+    async with _listening(where, wanted.keys, heard) as (_clock, _subscribed), _until(ended, wanted.for_s):
+        await ended.wait()
+    return ExitCode.DONE
+
+
+async def top(where: Where, wanted: Wanted, *, once: bool) -> ExitCode:
+    """Print rates and sizes of keys each second, or once, the busiest first."""
+    ended, traffic = asyncio.Event(), TrafficTable()
+
+    def heard(key: str, message: Translated, _at_s: float) -> None:
+        traffic.add(key, message.source, message.schema, message.size_bytes)
+
+    async with _listening(where, wanted.keys, heard) as (clock, subscribed), _until(ended, wanted.for_s):
+        while not ended.is_set():
+            traffic.rows.clear()
+            began_s = clock.now_s()
+            for_s = wanted.for_s if once and wanted.for_s is not None else LOOK_EACH_S
+            await clock.sleep_s(for_s * clock.rate)
+            rows = traffic.busiest((clock.now_s() - began_s) / clock.rate)
+            show(map(json.dumps, rows) if wanted.as_json else [*traffic_lines(rows), ""])
+            if once:
+                ended.set()
+        if dropped := sum(one.dropped for one in subscribed):
+            say(f"incomplete: {counted(dropped, 'message')} came too fast")
+    return ExitCode.DONE
+
+
+async def mission_classes(bus: Bus) -> dict[str, type[Message]]:
+    """Return the message classes of the installed packages and of the mission's component types, by schema."""
+    try:
+        types = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
+    except (LinkError, Refusal) as error:
+        say(f"messages of the mission's own types have no names of fields: {error}")
+        return message_classes()
+    return message_classes(sorted({one.component_type.class_path.partition(":")[0] for one in types.types}))
+
+
+def _lines(key: str, message: Translated, at_s: float, wanted: Wanted) -> Iterator[str]:
+    heard = heard_now(key, message, at_s)
+    if not wanted.field:
+        yield json.dumps(message_json(heard)) if wanted.as_json else message_line(heard)
+        return
+    value = field_of(heard.body, wanted.field)
+    if value is not None:
+        told = {"at_s": heard.at_s, "key": heard.key, "value": value}
+        shown = value if isinstance(value, str) else json.dumps(value)
+        yield json.dumps(told) if wanted.as_json else f"{heard.at_s:10.3f} s  {short_key(heard.key)}  {shown}"
+
+
+@asynccontextmanager
+async def _listening(
+    where: Where, keys: tuple[str, ...], heard: Callable[[str, Translated, float], None]
+) -> AsyncIterator[tuple[Clock, list[Overhearing]]]:
+    """Call ``heard`` with key, message and mission time of all that is meant."""
+    async with connected(where) as (bus, clock):
+        hearing = Hearing(await mission_classes(bus), keys)
+
+        def came(key: str, raw: bytes) -> None:
+            at_s = clock.now_s()
+            for said_at, message in hearing.heard(key, raw, at_s):
+                heard(said_at, message, at_s)
+
+        subscribed = [bus.overhear(one, came, MOST_WAITING_BYTES) for one in to_overhear(keys)]
+        yield clock, subscribed
+        for one in subscribed:
+            one.close()
+
+
+@asynccontextmanager
+async def _until(ended: asyncio.Event, for_s: float | None) -> AsyncIterator[None]:
+    """Set the event at a signal, or after so many seconds of the machine."""
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    timer = loop.call_later(for_s, ended.set) if for_s is not None else None
+    try:
+        yield
+    finally:
+        if timer is not None:
+            timer.cancel()
