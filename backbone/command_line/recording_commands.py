@@ -1,4 +1,4 @@
-"""``scout-backbone`` ``record``, ``recording``, ``watch`` and ``top``: recordings, and what is said live.
+"""``scout-backbone`` ``record``, ``recording``, ``watch``, ``top``, ``inject``: recordings, and what is said live.
 
 Rules of this file: as those of ``cli``.
 """
@@ -177,3 +177,20 @@ def top(
         watching.Wanted(tuple(keys or ()), for_s=for_s, as_json=as_json),
     )
     run(lambda: watching.top(where, wanted, once=True))
+
+
+def inject(
+    key: Annotated[str, typer.Argument(metavar="KEY", help="As 'watch' prints it; a question's ends with '/ask'.")],
+    message: Annotated[str, typer.Argument(metavar="JSON", help="An object with 'schema' and the message's fields.")],
+    within_s: Annotated[
+        float, typer.Option("--within", min=0.1, max=600.0, help="Seconds to wait for the answer to a question.")
+    ] = 5.0,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Say something on the bus of a mission that is up, checked against its schema; the log tells who did."""
+    from backbone.command_line.injecting import inject as inject_message
+
+    where = chosen(mission, connect, secret_file)
+    run(lambda: inject_message(where, key, message, within_s))

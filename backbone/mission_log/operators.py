@@ -41,6 +41,7 @@ class OperatorAction(StrEnum):
     START_COMPONENT = "start_component"
     STOP_COMPONENT = "stop_component"
     CHANGE_TREE = "change_tree"
+    INJECT = "inject"  # said something on the bus in a component's place
 
 
 _SENTENCES = {
@@ -69,6 +70,7 @@ _SENTENCES = {
     OperatorAction.START_COMPONENT: "{user} started it",
     OperatorAction.STOP_COMPONENT: "{user} stopped it",
     OperatorAction.CHANGE_TREE: "{user} changes the behavior tree",
+    OperatorAction.INJECT: "{user} injects a message",
 }
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import msgspec
 from msgspec import inspect
 
 from backbone.errors import Refusal
+from backbone.naming import did_you_mean
 from backbone.recording.json_schema import TAG, fields_of
 from backbone.wire import Message, schema_of
 
+WRITE_ONE = 'Write an object like {"schema": "Halt", "epoch": 3}; "watch KEY --json" shows messages with their fields.'
 Kind = TypeVar("Kind", bound=Message)
 
 
@@ -32,6 +35,31 @@ def revived(kind: type[Kind], body: dict[str, Any]) -> Kind:
         return msgspec.json.decode(msgspec.json.encode(listed), type=kind)
     except (msgspec.DecodeError, LookupError, TypeError, AttributeError) as error:
         raise OtherForm(f"{schema_of(kind)}: {error}") from error
+
+
+def message_from(classes: Mapping[str, type[Message]], said: object) -> Message:
+    """Return the message that a person wrote: an object with ``schema`` and the fields of that message by name.
+
+    Args:
+        classes: Known message classes, by schema.
+        said: The object. ``schema`` may leave the version out.
+
+    Raises:
+        OtherForm: There is no such schema or field, a field is missing, or a value is outside its range.
+    """
+    if not isinstance(said, dict) or not isinstance(said.get(TAG), str):
+        raise OtherForm(f"it is no object with a {TAG!r}", remedy=WRITE_ONE)
+    by_name = {schema.partition("/")[0]: kind for schema, kind in classes.items()}
+    name = said[TAG]
+    kind = classes.get(name) or by_name.get(name)
+    if kind is None:
+        raise OtherForm(f"no message is named {name!r}{did_you_mean(name, by_name)}", remedy=WRITE_ONE)
+    fields = {field.name for field in fields_of(kind)}
+    for unknown in sorted(said.keys() - fields - {TAG}):
+        known = ", ".join(sorted(fields)) or "no fields"
+        told = f"{schema_of(kind)} has no field {unknown!r}{did_you_mean(unknown, fields)}; it has {known}"
+        raise OtherForm(told, remedy=WRITE_ONE)
+    return revived(kind, said)
 
 
 def _listed(kind: inspect.Type, value: Any) -> Any:

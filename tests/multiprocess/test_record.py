@@ -181,3 +181,38 @@ def test_the_busiest_keys_are_told_with_rates_and_sizes(mission: RunningMission)
     assert clock["bytes_per_s"] == pytest.approx(clock["messages_per_s"] * clock["mean_bytes"])
     lines = mission.command("scout-backbone", "watch", "*/clock", "--rate", "--for", "2.5", "--mission", mission.name)
     assert lines.stdout.count("world/clock") >= 2, lines.stdout
+
+
+def injected(mission: RunningMission, key: str, said: str) -> subprocess.CompletedProcess[str]:
+    return mission.command("scout-backbone", "inject", key, said, "--mission", mission.name)
+
+
+def test_a_message_is_injected_and_the_log_tells_who_did(mission: RunningMission) -> None:
+    done = injected(mission, "resource_pool/scout1/ask", '{"schema": "AskState"}')
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert (answer["schema"].partition("/")[0], answer["address"]) == ("ComponentState", "resource_pool/scout1")
+    log = mission.command("scout-backbone", "log", "--robot", "scout1", "--text", "injects", "--mission", mission.name)
+    assert "AskState/1 at resource_pool/scout1/ask" in log.stdout
+    told = '{"schema": "StoryEvent", "at_s": 1, "where": "x/y", "what": "hello", "subject": "rover1", "cause": ""}'
+    assert injected(mission, "resource_pool/rover1/log", told).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("key", "said", "code", "told"),
+    [
+        ("resource_pool/scout1", '{"schema": "AskState"}', 2, "no key"),
+        ("resource_pool/*/ask", '{"schema": "AskState"}', 2, "no key"),
+        ("resource_pool/scout1/asks", '{"schema": "AskState"}', 2, "did you mean 'ask'"),
+        ("resource_pool/scout1/ask", "nonsense", 5, "no JSON"),
+        ("resource_pool/scout1/ask", "[1]", 5, "no object"),
+        ("resource_pool/scout1/ask", '{"schema": "AskStat"}', 5, "did you mean 'AskState'"),
+        ("resource_pool/scout1/ask", '{"schema": "AskStory", "subjet": "x"}', 5, "did you mean 'subject'"),
+        ("resource_pool/scout1/ask", '{"schema": "Move", "forward_m_s": 1e300, "turn_rad_s": 0}', 5, "Move/1"),
+        ("resource_pool/scout1/ask", '{"schema": "SetParameter", "name": "x"}', 5, "no value"),
+        ("resource_pool/nobody/ask", '{"schema": "AskState"}', 4, "no component answered"),
+    ],
+)
+def test_what_does_not_fit_is_not_injected(mission: RunningMission, key: str, said: str, code: int, told: str) -> None:
+    done = injected(mission, key, said)
+    assert (done.returncode, told in done.stderr) == (code, True), done.stderr

@@ -1,0 +1,71 @@
+"""The work of ``scout-backbone inject``: a person says something on the bus, checked, and told in the mission's log."""
+
+from __future__ import annotations
+
+import functools
+import json
+import operator
+from typing import Any
+
+from backbone.command_line.connection import connected
+from backbone.command_line.watching import mission_classes
+from backbone.command_line.where import Where
+from backbone.errors import Refusal
+from backbone.keys import ROOT, Conversation
+from backbone.launcher.endings import ExitCode, say, show
+from backbone.mission_log.operators import OperatorAction, publish_action
+from backbone.naming import component_of, did_you_mean
+from backbone.recording.json_schema import TAG
+from backbone.recording.revival import OtherForm, message_from
+from backbone.wire import plain, schema_of
+
+LEFT_OUT = (Conversation.ALIVE, Conversation.TOLD)
+
+
+class NoKey(Refusal):
+    """Nothing can be said at this key."""
+
+    code = "usage.key"
+    remedy = "Name a key as 'watch' prints it: <subsystem>/<component>/<conversation>; questions go to '/ask'."
+
+
+async def inject(where: Where, key: str, text: str, within_s: float) -> ExitCode:
+    """Send the message, and print the answer to a question.
+
+    Raises:
+        NoKey: The key is none.
+        OtherForm: The text is no message, or one with other fields or values.
+        Refusal: The component refused it.
+    """
+    try:
+        said = json.loads(text)
+    except ValueError as error:
+        raise OtherForm(f"it is no JSON: {error}") from error
+    async with connected(where) as (bus, clock):
+        address, conversation = _place(key, bus.mission)
+        classes = await mission_classes(bus)
+        message = message_from(classes, said)
+        told = f"{schema_of(type(message))} at {address}/{conversation}"
+        publish_action(bus, clock, OperatorAction.INJECT, component_of(address), told)
+        if conversation is not Conversation.ASK:
+            bus.publish(address, conversation, message)
+            say(f"published {told}")
+            return ExitCode.DONE
+        anything: Any = functools.reduce(operator.or_, classes.values())
+        answer = await bus.ask(address, message, anything, within_s=within_s)
+    show([json.dumps({TAG: schema_of(type(answer))} | plain(answer))])
+    return ExitCode.DONE
+
+
+def _place(key: str, mission: str) -> tuple[str, Conversation]:
+    """Return address and conversation of a key, with or without ``scout/<mission>/``.
+
+    Raises:
+        NoKey: It has none.
+    """
+    short = key.removeprefix(f"{ROOT}/{mission}/")
+    address, _, name = short.rpartition("/")
+    known = {one.value: one for one in Conversation if one not in LEFT_OUT}
+    if name not in known or "/" not in address or "*" in address:
+        raise NoKey(f"{key!r} is no key of one component{did_you_mean(name, known)}")
+    return address, known[name]
