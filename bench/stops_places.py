@@ -104,9 +104,9 @@ def _focus(selector: str, reveal: str = "") -> Place:
     return Place(f"focus on {selector}", selector, script, close="document.activeElement.blur()")
 
 
-def _revealed(area: str, selector: str) -> Place:
+def _revealed(area: str, selector: str, more: str = "") -> Place:
     area = f"document.getElementById('{area}')"
-    shown = _focus(selector, f"{area}.hidden = false; ")
+    shown = _focus(selector, f"{area}.hidden = false; {more}")
     return Place(shown.name, shown.of, shown.open, close=f"{shown.close}; {area}.hidden = true")
 
 
@@ -147,6 +147,8 @@ PAGE = (
     *(_focus(f"#seen-{control}", SEEN) for control in ("behavior", "view")),
     *(_revealed("login", selector) for selector in ("#login-token", "#login-user", "#login [type=submit]")),
     *(_revealed("lost", selector) for selector in ("#retake", "#dismiss")),
+    _revealed("kinds", "#kind"),
+    _revealed("kinds", "#take-so", "document.getElementById('take-so').disabled = false; "),
     *(replace(_focus(selector), needs="asked") for selector in ("#consent-yes", "#consent-no")),
     *map(_log_field, LOG_FIELDS),
     *(_card(part, ROBOT) for part in ("take", "stop_robot", "why")),
