@@ -151,6 +151,8 @@ class Recording:
             since_s: Not before this mission time.
             until_s: Not after it; None: to the end.
         """
+        if until_s is not None and until_s < since_s:
+            return
         topics = None
         if patterns:
             channels = self._summary.channels.values()

@@ -136,6 +136,7 @@ def test_keys_and_times_choose_messages() -> None:
     assert [one.sequence for one in read(data, "resource_pool/*/log")] == [0, 2]
     assert [one.sequence for one in read(data, since_s=0.15, until_s=0.4)] == [1, 2]
     assert read(data, "nobody/*") == []
+    assert read(data, since_s=0.4, until_s=0.15) == []
 
 
 @given(st.permutations(range(8)))
