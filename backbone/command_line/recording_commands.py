@@ -51,17 +51,26 @@ def record_mission(
     ] = None,
     keys: Keys = None,
     for_s: For = None,
+    split_s: Annotated[
+        float, typer.Option("--split", min=1.0, max=1e6, help="Go on in a further file after so many seconds.")
+    ] = 3_600.0,
+    split_mb: Annotated[
+        int, typer.Option("--split-mb", min=1, max=1_000_000, help="The same when a file is so large, in megabytes.")
+    ] = 1_000,
+    keep: Annotated[
+        int, typer.Option("--keep", min=0, max=1_000_000, help="Keep so many files, delete older ones; 0: all.")
+    ] = 0,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Record all publications of a mission that is up, until Ctrl-C; a file that exists is refused."""
+    """Record all that is said on a mission that is up, until Ctrl-C; a file that exists is refused."""
     if context.invoked_subcommand is not None:
         return
-    from backbone.command_line.recording_work import record_to
+    from backbone.command_line.recording_work import Splitting, record_to
 
-    where = chosen(mission, connect, secret_file)
-    run(lambda: record_to(where, to, keys or [], for_s))
+    where, splitting = chosen(mission, connect, secret_file), Splitting(split_s, split_mb, keep)
+    run(lambda: record_to(where, to, keys or [], for_s, splitting))
 
 
 @record.command()

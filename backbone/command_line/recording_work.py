@@ -10,10 +10,10 @@ import socket
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
@@ -34,6 +34,7 @@ from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.naming import Subsystem, address
+from backbone.recording.files import RecordingFiles
 from backbone.recording.reader import Recording, missing_numbers, recover_file
 from backbone.recording.recorder import Recorder
 from backbone.recording.revival import revived
@@ -51,18 +52,36 @@ class RecordingUnusable(Refusal):
 
 
 # ---------------------------------------------------------------------- making one
-async def record_to(where: Where, to: Path | None, keys: list[str], for_s: float | None) -> ExitCode:
+@dataclass(frozen=True)
+class Splitting:
+    """When a recording goes on in a further file.
+
+    Attributes:
+        after_s: Longest time in one file, seconds of the machine.
+        megabytes: Largest size.
+        keep: Number of files to keep; 0: all.
+    """
+
+    after_s: float
+    megabytes: int
+    keep: int
+
+
+async def record_to(
+    where: Where, to: Path | None, keys: list[str], for_s: float | None, splitting: Splitting
+) -> ExitCode:
     """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended."""
     source = address(Subsystem.BACKBONE, f"recorder-{os.getpid()}")
     async with mission_connection.connected(where.mission, where.connect, source, where.secret()) as (bus, clock):
         path = to or Path(f"{bus.mission}-{datetime.now():%Y%m%d-%H%M%S}.mcap")
         mission_xml, classes = await _mission_file(bus), await mission_classes(bus)
-        with _new_file(path) as file:
+        with _new_files(path, splitting.keep) as files:
             recorder = Recorder(
                 bus,
                 clock,
-                file=file,
-                path=path,
+                files=files,
+                split_s=splitting.after_s,
+                split_bytes=splitting.megabytes * 1_000_000,
                 classes=classes,
                 about=_about(bus, clock, keys),
                 keys=tuple(keys),
@@ -118,15 +137,18 @@ def _about(bus: Bus, clock: MissionClock, keys: list[str]) -> dict[str, str]:
 
 
 @contextmanager
-def _new_file(path: Path) -> Iterator[Any]:
+def _new_files(path: Path, keep: int) -> Iterator[RecordingFiles]:
     try:
-        file = path.open("xb")
+        files = RecordingFiles(path, keep)
     except FileExistsError as error:
         raise RecordingUnusable(f"{path} exists", remedy="Name a new file.") from error
     except OSError as error:
         raise RecordingUnusable(f"{path} cannot be written: {error.strerror or error}") from error
-    with file:
-        yield file
+    try:
+        yield files
+    finally:
+        with suppress(OSError):  # the disc is full, which the recorder has told
+            files.close()
 
 
 async def recover_to(path: Path, to: Path) -> ExitCode:

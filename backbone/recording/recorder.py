@@ -8,11 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import shutil
 from collections.abc import Mapping
-from pathlib import Path
-from typing import IO
 
 from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Overhearing, Reply
@@ -32,6 +29,7 @@ from backbone.keys import key as key_of
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import component_of
 from backbone.rc_manager.messages import AskSchedule
+from backbone.recording.files import SPLIT_BYTES, SPLIT_S, RecordingFiles
 from backbone.recording.hearing import to_overhear
 from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.views import Schedule
@@ -54,8 +52,9 @@ class Recorder:
 
     Args:
         bus: Not closed.
-        file: Written from its beginning; not closed.
-        path: Of the file.
+        files: Of the recording; closed at the end.
+        split_s: A file gets no longer than so many seconds of the machine.
+        split_bytes: A file gets hardly larger.
         classes: Known message classes, by schema.
         about: Facts about the mission.
         keys: Patterns of the keys to record, without ``scout/<mission>/``; empty: all.
@@ -68,8 +67,9 @@ class Recorder:
         bus: Bus,
         clock: Clock,
         *,
-        file: IO[bytes],
-        path: Path,
+        files: RecordingFiles,
+        split_s: float = SPLIT_S,
+        split_bytes: int = SPLIT_BYTES,
         classes: Mapping[str, type[Message]],
         about: Mapping[str, str],
         keys: tuple[str, ...] = (),
@@ -77,8 +77,11 @@ class Recorder:
         user: str = "",
     ) -> None:
         self._bus, self._clock, self._user = bus, clock, user
-        self._file, self._path, self._keys = file, path, keys
-        self._writer = RecordingWriter(file, classes, about, keys, mission_xml)
+        self._files, self._keys = files, keys
+        self._split_s, self._split_bytes = split_s, split_bytes
+        self._facts = classes, about, keys, mission_xml
+        self._writer, self._before = self._new_writer(), 0
+        self._begun_s = clock.now_s()
         self._subscribed: list[Overhearing] = []
         self._tellers: set[str] = set()
         self._bug: BaseException | None = None
@@ -90,7 +93,7 @@ class Recorder:
     @property
     def written(self) -> int:
         """Messages so far."""
-        return self._writer.written
+        return self._before + self._writer.written
 
     @property
     def dropped(self) -> int:
@@ -111,7 +114,7 @@ class Recorder:
         for conversation in to_overhear(self._keys):
             self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
         self._bus.watch_link(self._link_changed)
-        self._say(f"{self._who} records the mission to {self._path.name}", LogLevel.NOTICE)
+        self._say(f"{self._who} records the mission to {self._files.path.name}", LogLevel.NOTICE)
         asking = asyncio.create_task(self._ask_all(), name="first state")
         try:
             await self._flush_until_end()
@@ -140,18 +143,33 @@ class Recorder:
     def _flush(self) -> None:
         try:
             self._writer.flush()
-            if shutil.disk_usage(self._path.parent).free < LEAST_FREE_BYTES:
+            if shutil.disk_usage(self._files.path.parent).free < LEAST_FREE_BYTES:
                 self._fill(f"less than {LEAST_FREE_BYTES // 1_000_000} MB are free")
+            elif self._is_long:
+                self._split()
         except OSError as error:
             self._fill(str(error))
+
+    @property
+    def _is_long(self) -> bool:
+        lasted_s = (self._clock.now_s() - self._begun_s) / self._clock.rate
+        return lasted_s >= self._split_s or self._files.file.tell() >= self._split_bytes
+
+    def _split(self) -> None:
+        self._writer.finish()
+        self._files.open_next()
+        self._before, self._begun_s = self.written, self._clock.now_s()
+        self._writer = self._new_writer()
+
+    def _new_writer(self) -> RecordingWriter:
+        return RecordingWriter(self._files.file, *self._facts)
 
     def _finish(self) -> None:
         for subscribed in self._subscribed:
             subscribed.close()
         try:
             self._writer.finish()
-            self._file.flush()
-            os.fsync(self._file.fileno())
+            self._files.close()
         except OSError as error:
             self._fill(str(error))
         self._say(f"{self._who} records no more{f': {self.full}' if self.full else ''}", LogLevel.NOTICE)

@@ -13,6 +13,7 @@ import pytest
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.messages import AskStory, LogLevel, Story, StoryEvent
 from backbone.keys import Conversation
+from backbone.recording.files import RecordingFiles
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recorded, Recording, missing_numbers
 from backbone.recording.recorder import FLUSH_EACH_S, LEAST_FREE_BYTES, Recorder
@@ -40,13 +41,13 @@ def recorded(tmp_path: Path, local_mission: Any) -> Callable[..., list[Recorded]
             clock = VirtualClock()
             async with local_mission("local") as network:
                 bus = network.join("backbone/recorder", clock)
-                with path.open("xb") as file:
-                    recorder = Recorder(bus, clock, file=file, path=path, classes=CLASSES, about={}, keys=keys)
-                    running = asyncio.create_task(recorder.run())
-                    await clock.sleep_s(0.01)
-                    await scene(network.join("resource_pool/scout1", clock), clock, recorder)
-                    recorder.end()
-                    await running
+                files = RecordingFiles(path)
+                recorder = Recorder(bus, clock, files=files, classes=CLASSES, about={}, keys=keys)
+                running = asyncio.create_task(recorder.run())
+                await clock.sleep_s(0.01)
+                await scene(network.join("resource_pool/scout1", clock), clock, recorder)
+                recorder.end()
+                await running
                 await bus.close()
 
         run_virtual(play())
@@ -139,16 +140,62 @@ def test_it_ends_when_the_mission_has_ended(tmp_path: Path, local_mission: Any) 
             bus = network.join("backbone/recorder", clock)
             links: list[Any] = []
             bus.watch_link = links.append
-            with (tmp_path / "it.mcap").open("xb") as file:
-                recorder = Recorder(bus, clock, file=file, path=tmp_path / "it.mcap", classes=CLASSES, about={})
-                running = asyncio.create_task(recorder.run())
-                await clock.sleep_s(1.0)
-                for is_up, wait_s in ((False, 3.0), (True, 10.0), (False, 3.0)):
-                    links[0](is_up)
-                    await clock.sleep_s(wait_s)
-                    assert not running.done()
-                await clock.sleep_s(3.0)
-                assert running.done()
+            files = RecordingFiles(tmp_path / "it.mcap")
+            recorder = Recorder(bus, clock, files=files, classes=CLASSES, about={})
+            running = asyncio.create_task(recorder.run())
+            await clock.sleep_s(1.0)
+            for is_up, wait_s in ((False, 3.0), (True, 10.0), (False, 3.0)):
+                links[0](is_up)
+                await clock.sleep_s(wait_s)
+                assert not running.done()
+            await clock.sleep_s(3.0)
+            assert running.done()
             await bus.close()
 
     run_virtual(play())
+
+
+@pytest.mark.parametrize(("split_s", "split_bytes"), [(2.0, 10**9), (1e6, 3_000)])
+@pytest.mark.parametrize("keep", [0, 2])
+def test_a_long_recording_goes_on_in_further_files(
+    tmp_path: Path, local_mission: Any, split_s: float, split_bytes: int, keep: int
+) -> None:
+    (tmp_path / "it-3.mcap").touch()
+    written: list[int] = []
+
+    async def play() -> None:
+        clock = VirtualClock()
+        async with local_mission("local") as network:
+            bus, scout = network.join("backbone/recorder", clock), network.join("resource_pool/scout1", clock)
+            files = RecordingFiles(tmp_path / "it.mcap", keep)
+            recorder = Recorder(
+                bus, clock, files=files, split_s=split_s, split_bytes=split_bytes, classes=CLASSES, about={"a": "b"}
+            )
+            running = asyncio.create_task(recorder.run())
+            for number in range(100):
+                await clock.sleep_s(0.1)
+                scout.publish(scout.source, Conversation.LOG, event(number))
+            recorder.end()
+            await running
+            written.append(recorder.written)
+            await bus.close()
+
+    run_virtual(play())
+    paths = sorted(tmp_path.glob("it*.mcap"), key=lambda path: int(path.stem.partition("-")[2] or 1))
+    assert (tmp_path / "it-3.mcap").read_bytes() == b"", "a name that exists is left out"
+    paths.remove(tmp_path / "it-3.mcap")
+    found: list[int] = []
+    held = 0
+    for path in paths:
+        with path.open("rb") as file:
+            recording = Recording(file)
+            contents = recording.contents()
+            assert contents.about == {"a": "b"}
+            held += contents.messages
+            found += [one.sequence for one in recording.messages() if one.source == "resource_pool/scout1"]
+    assert found == [*range(found[0], 101)], "each message once"
+    if keep:
+        assert len(paths) == keep
+    else:
+        assert (found[0], held) == (1, written[0])
+        assert len(paths) > 3

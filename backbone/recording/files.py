@@ -1,0 +1,66 @@
+"""The files of one recording: the first, and a further one whenever one is long or large."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from pathlib import Path
+from typing import IO
+
+SPLIT_S = 3_600.0  # chosen: an hour is found again by its name, and a recorder's index of it stays small
+SPLIT_BYTES = 1_000_000_000  # chosen: copied in seconds
+
+
+class RecordingFiles:
+    """Opens the files, one after the other: ``night.mcap``, ``night-2.mcap``, ``night-3.mcap``.
+
+    Args:
+        first: Path of the first.
+        keep: Number of files to keep; the oldest is deleted for a further one. 0: all.
+
+    Raises:
+        FileExistsError: The first exists.
+        OSError: It cannot be written.
+    """
+
+    def __init__(self, first: Path, keep: int = 0) -> None:
+        self._first, self._keep = first, keep
+        self._kept: deque[Path] = deque()
+        self._number = 0
+        self.path = first
+        """Of the file that is open."""
+        self.file: IO[bytes] = self._open()
+
+    def open_next(self) -> None:
+        """Close the file and open the next one; names that exist are left out.
+
+        Raises:
+            OSError: It cannot be written; the file before stays closed.
+        """
+        self.close()
+        self.file = self._open()
+
+    def close(self) -> None:
+        """Close the file, once all of it is on the disc."""
+        if not self.file.closed:
+            self.file.flush()
+            os.fsync(self.file.fileno())
+            self.file.close()
+
+    def _open(self) -> IO[bytes]:
+        while True:
+            self._number += 1
+            self.path = self._named(self._number)
+            try:
+                opened = self.path.open("xb")
+            except FileExistsError:
+                if self._number == 1:
+                    raise
+                continue
+            self._kept.append(self.path)
+            if self._keep and len(self._kept) > self._keep:
+                self._kept.popleft().unlink(missing_ok=True)
+            return opened
+
+    def _named(self, number: int) -> Path:
+        return self._first if number == 1 else self._first.with_stem(f"{self._first.stem}-{number}")
