@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-from backbone.bus.interface import Answer, BusStatistics, Clock, Listener, Told, current_cause
+from backbone.bus.interface import Answer, BusStatistics, Clock, Copies, Listener, current_cause
 from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
 from backbone.keys import Conversation
 from backbone.ranges import MOST_QUOTED_BYTES
@@ -108,7 +108,7 @@ class BusBase(ABC):
             return
         if sum(map(len, quoted)) <= 2 * MOST_QUOTED_BYTES and max(map(len, quoted)) <= MOST_QUOTED_BYTES:
             self._sequence -= 1
-            self.publish(self.source, Conversation.TOLD, Told(address, conversation, quoted))
+            self.publish(self.source, Conversation.TOLD, Copies(address, conversation, quoted))
 
     def open_question(self) -> asyncio.Future[Any]:
         """Return the future of an answer; it gets None if this bus is closed first.

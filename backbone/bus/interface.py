@@ -175,7 +175,7 @@ class Bus(Protocol):
         """
 
 
-class Told(Message, frozen=True):
+class Copies(Message, frozen=True):
     """Copies of messages, published by a bus while somebody overhears that; they are dropped rather than block anybody.
 
     A question comes with its answer or refusal, from the bus of the answerer. A publication that is never dropped comes

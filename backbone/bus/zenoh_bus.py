@@ -13,14 +13,21 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections import OrderedDict
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 import zenoh
 
-from backbone.bus.bus_base import BusBase
+from backbone.bus.inbox import (
+    EachSample,
+    InboxBus,
+    LatestSample,
+    OverheardSamples,
+    bytes_of,
+    reader_of,
+    reply_reader_of,
+)
 from backbone.bus.interface import (
     Answer,
     Clock,
@@ -46,12 +53,10 @@ from backbone.wire import (
     Reader,
     Refused,
     UnwritableMessage,
-    refuse_oversized,
     write,
 )
 
 log = logging.getLogger(__name__)
-T = TypeVar("T")
 
 _TIMEOUT_PAYLOAD = b"Timeout"
 
@@ -126,7 +131,7 @@ async def close_session(session: zenoh.Session) -> None:
     await asyncio.get_running_loop().run_in_executor(None, session.close)
 
 
-class ZenohBus(BusBase):
+class ZenohBus(InboxBus):
     """One component's bus on a Zenoh session. Open it inside a running event loop.
 
     Args:
@@ -146,11 +151,8 @@ class ZenohBus(BusBase):
         shared: bool = False,
     ) -> None:
         super().__init__(mission, source, clock)
-        self._loop = asyncio.get_running_loop()
         self._session, self._is_hub, self._shared = session, is_hub, shared
         self._links = None if shared else watch_links(session)
-        self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
-        self._woken = False
         self._declared: set[_Declared] = set()
         self._publishers: OrderedDict[tuple[str, Conversation], zenoh.Publisher] = OrderedDict()
         self._publisher(source, Conversation.TOLD)  # knows who overhears before the first question is answered
@@ -222,7 +224,7 @@ class ZenohBus(BusBase):
         else:
             payload = cast("zenoh.Sample", got.ok).payload.to_bytes()
         try:
-            body = _reply_reader(reply).read(payload).body
+            body = reply_reader_of(reply).read(payload).body
         except Refusal as unreadable:
             self.unreadable += 1
             raise MalformedMessage(
@@ -235,7 +237,7 @@ class ZenohBus(BusBase):
     def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
-        reader = _reader(accepts)
+        reader = reader_of(accepts)
         own = key(self._mission, address, Conversation.ASK)
 
         def arrived(query: zenoh.Query) -> None:
@@ -245,7 +247,7 @@ class ZenohBus(BusBase):
 
     async def _answer(self, reader: Reader[Message], answer: Answer, own: str, query: zenoh.Query) -> None:
         try:
-            question = reader.read(_bytes_of(query.payload))
+            question = reader.read(bytes_of(query.payload))
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
                 query.reply(own, self._write_reply(envelope), express=True)
@@ -311,13 +313,17 @@ class ZenohBus(BusBase):
         """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
         pattern = key(self._mission, address, conversation)
-        receive = _Latest(self, _reader(accepts), listener) if latest else _Each(self, _reader(accepts), listener)
+        receive = (
+            LatestSample(self, reader_of(accepts), listener)
+            if latest
+            else EachSample(self, reader_of(accepts), listener)
+        )
         return self._declare(self._session.declare_subscriber(pattern, receive))
 
     def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
         """Subscribe to whole conversations, unread; see ``Bus.overhear``."""
         self.require_open()
-        heard = _Overheard(self, listener, most_waiting_bytes)
+        heard = OverheardSamples(self, listener, most_waiting_bytes)
         heard.declared = self._declare(self._session.declare_subscriber(key_of_all(self._mission, conversation), heard))
         return heard
 
@@ -392,35 +398,13 @@ class ZenohBus(BusBase):
 
     async def leave(self) -> None:
         """Close the session unless other buses use it; return when its threads have ended."""
-        self._inbox.clear()  # pending questions: their requesters get ``NoResponder``
+        self.empty_inbox()  # pending questions: their requesters get ``NoResponder``
         if not self._shared:
             await close_session(self._session)
             return
         for publisher in self._publishers.values():
             publisher.undeclare()  # type: ignore[no-untyped-call]
         self._publishers.clear()
-
-    # ------------------------------------------------------------------ from zenoh's threads into the loop
-    def push(self, act: Callable[[T], None], what: T) -> None:
-        """Make the loop call ``act(what)``; called from zenoh's threads."""
-        self._inbox.append((act, what))
-        if not self._woken:
-            self._woken = True
-            try:
-                self._loop.call_soon_threadsafe(self._drain)
-            except RuntimeError:  # the loop is closed
-                log.debug("inbox dropped after the loop's end")
-
-    def _drain(self) -> None:
-        self._woken = False
-        for _ in range(len(self._inbox)):
-            act, what = self._inbox.popleft()
-            if self.closed:
-                continue
-            try:
-                act(what)
-            except Exception as bug:  # one bad arrival must not lose the rest of the burst
-                self.on_bug(bug)
 
     def _declare(self, entity: Any) -> _Declared:
         declared = _Declared(entity, self._declared)
@@ -465,112 +449,6 @@ class _Arrived:
 
     def _settle(self, got: zenoh.Reply | None) -> None:
         settle(self._answered, got)
-
-
-class _Each:
-    """Receives every sample of a subscriber, in order."""
-
-    def __init__(self, bus: ZenohBus, reader: Reader[Message], listener: Listener) -> None:
-        self._bus, self._reader, self._listener = bus, reader, listener
-
-    def __call__(self, sample: zenoh.Sample) -> None:
-        self._bus.push(self.hand_over, sample)
-
-    def hand_over(self, sample: zenoh.Sample) -> None:
-        try:
-            envelope = self._reader.read(_bytes_of(sample.payload))
-        except Refusal as unreadable:
-            self._bus.unreadable += 1
-            log.warning("unreadable publication on %s: %s", sample.key_expr, unreadable.detail)
-            return
-        self._bus.hear(self._listener, envelope)
-
-
-class _Overheard:
-    """Receives every sample of a subscriber, in order, as long as few of them wait."""
-
-    def __init__(self, bus: ZenohBus, listener: Overhearer, most_waiting_bytes: int) -> None:
-        self._bus, self._listener, self._most = bus, listener, most_waiting_bytes
-        self._came = self._went = 0  # bytes; each is written by one thread only
-        self._dropped = 0
-        self.declared: _Declared | None = None
-
-    @property
-    def dropped(self) -> int:
-        return self._dropped
-
-    def __call__(self, sample: zenoh.Sample) -> None:
-        length = len(sample.payload)
-        if self._came - self._went + length > self._most:
-            self._dropped += 1
-            return
-        self._came += length
-        self._bus.push(self._hand_over, sample)
-
-    def _hand_over(self, sample: zenoh.Sample) -> None:
-        raw = sample.payload.to_bytes()
-        self._went += len(raw)
-        self._bus.heard += 1
-        self._bus.call("", self._listener, str(sample.key_expr), raw)
-
-    def close(self) -> None:
-        if self.declared is not None:
-            self.declared.close()
-
-
-class _Latest(_Each):
-    """Receives only the newest undelivered sample of each key.
-
-    Two threads share a dictionary and a flag, in atomic steps. Their order makes this safe: zenoh's thread stores
-    before it reads the flag, and the loop clears the flag before it takes samples out.
-    """
-
-    def __init__(self, bus: ZenohBus, reader: Reader[Message], listener: Listener) -> None:
-        super().__init__(bus, reader, listener)
-        self._newest: dict[str, zenoh.Sample] = {}
-        self._pushed = False
-
-    def __call__(self, sample: zenoh.Sample) -> None:
-        self._newest[str(sample.key_expr)] = sample
-        if not self._pushed:
-            self._pushed = True
-            self._bus.push(self._hand_over_newest, None)
-
-    def _hand_over_newest(self, _nothing: None) -> None:
-        self._pushed = False
-        taken = [self._newest.popitem()[1] for _ in range(len(self._newest))]
-        for sample in reversed(taken):
-            self.hand_over(sample)
-
-
-def _bytes_of(payload: zenoh.ZBytes | None) -> bytes:
-    """Return the payload; a payload that is too long is not copied.
-
-    Raises:
-        OversizedMessage: The payload is too long for a message.
-    """
-    if payload is None:
-        return b""
-    refuse_oversized(len(payload))
-    return payload.to_bytes()
-
-
-_readers: dict[Accepts, Reader[Message]] = {}
-_reply_readers: dict[type[Message], Reader[Message]] = {}
-
-
-def _reader(accepts: Accepts) -> Reader[Message]:
-    reader = _readers.get(accepts)
-    if reader is None:
-        reader = _readers[accepts] = Reader(accepts)
-    return reader
-
-
-def _reply_reader(reply: type[Message]) -> Reader[Message]:
-    reader = _reply_readers.get(reply)
-    if reader is None:
-        reader = _reply_readers[reply] = Reader(reply | Refused)
-    return reader
 
 
 def _close_unwanted(opening: Future[zenoh.Session]) -> None:

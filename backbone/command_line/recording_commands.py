@@ -165,7 +165,7 @@ def watch(
 
     where, wanted = (
         chosen(mission, connect, secret_file),
-        watching.Wanted(tuple(keys or ()), field, most, for_s, as_json),
+        watching.Watched(tuple(keys or ()), field, most, for_s, as_json),
     )
     run(lambda: watching.top(where, wanted, once=False) if rate else watching.watch(where, wanted))
 
@@ -183,7 +183,7 @@ def top(
 
     where, wanted = (
         chosen(mission, connect, secret_file),
-        watching.Wanted(tuple(keys or ()), for_s=for_s, as_json=as_json),
+        watching.Watched(tuple(keys or ()), for_s=for_s, as_json=as_json),
     )
     run(lambda: watching.top(where, wanted, once=True))
 

@@ -40,7 +40,7 @@ LOOK_EACH_S = 1.0  # chosen: a rate over a second is readable and recent
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Watched:
     """What a person wants to see.
 
     Attributes:
@@ -58,7 +58,7 @@ class Wanted:
     as_json: bool = False
 
 
-async def watch(where: Where, wanted: Wanted) -> ExitCode:
+async def watch(where: Where, wanted: Watched) -> ExitCode:
     """Print messages as they come, until a signal, the time or the number ends it."""
     ended, shown = asyncio.Event(), 0
 
@@ -77,7 +77,7 @@ async def watch(where: Where, wanted: Wanted) -> ExitCode:
     return ExitCode.DONE
 
 
-async def top(where: Where, wanted: Wanted, *, once: bool) -> ExitCode:
+async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
     """Print rates and sizes of keys each second, or once, the busiest first."""
     ended, traffic = asyncio.Event(), TrafficTable()
 
@@ -109,7 +109,7 @@ async def mission_classes(bus: Bus) -> dict[str, type[Message]]:
     return message_classes(sorted({one.component_type.class_path.partition(":")[0] for one in types.types}))
 
 
-def _lines(key: str, message: Translated, at_s: float, wanted: Wanted) -> Iterator[str]:
+def _lines(key: str, message: Translated, at_s: float, wanted: Watched) -> Iterator[str]:
     heard = heard_now(key, message, at_s)
     if not wanted.field:
         yield json.dumps(message_json(heard)) if wanted.as_json else message_line(heard)

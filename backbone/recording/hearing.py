@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
-from backbone.bus.interface import Told
+from backbone.bus.interface import Copies
 from backbone.keys import NEVER_DROPPED, Conversation
 from backbone.recording.translation import Translated, Translator
 from backbone.wire import Message
@@ -26,7 +26,7 @@ class Hearing:
         self._translator, self._keys = Translator(classes), tuple(keys)
 
     def heard(self, key: str, raw: bytes, at_s: float) -> Iterator[tuple[str, Translated]]:
-        """Yield key and message; of a ``Told`` those that it tells, with the key that they had.
+        """Yield key and message; of a ``Copies`` those that it tells, with the key that they had.
 
         Args:
             key: At which the bytes were overheard.
@@ -37,7 +37,7 @@ class Hearing:
         if not is_told and not self._is_meant(key):
             return
         message = self._translator.translate(raw, at_s)
-        if message.kind is not Told:
+        if message.kind is not Copies:
             yield key, message
             return
         told = self._translator.told(raw)

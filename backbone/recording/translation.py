@@ -9,7 +9,7 @@ from typing import Any, Union, cast
 
 import msgspec
 
-from backbone.bus.interface import Told
+from backbone.bus.interface import Copies
 from backbone.recording.json_schema import TAG
 from backbone.wire import Envelope, Message, schema_of
 
@@ -65,9 +65,9 @@ class Translator:
         except _UNSPEAKABLE:
             return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
 
-    def told(self, raw: bytes) -> Told:
-        """Return the ``Told`` that these bytes hold."""
-        return cast("Told", self._known.decode(raw).body)
+    def told(self, raw: bytes) -> Copies:
+        """Return the ``Copies`` that these bytes hold."""
+        return cast("Copies", self._known.decode(raw).body)
 
     def _unknown(self, raw: bytes, heard_s: float) -> Translated:
         try:

@@ -18,7 +18,7 @@ import uvloop
 from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock, VirtualClock, VirtualLoop
-from backbone.bus.interface import Bus, BusStatistics, Clock, Told, current_cause
+from backbone.bus.interface import Bus, BusStatistics, Clock, Copies, current_cause
 from backbone.bus.local_bus import LocalNetwork
 from backbone.bus.shared_bus import SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
@@ -632,11 +632,11 @@ def test_who_overhears_too_slowly_loses_messages_and_knows_how_many(on_bus: Runn
 def test_what_is_never_dropped_is_told_in_copies_without_a_number_of_their_own(on_bus: Runner) -> None:
     async def law(net: Net) -> None:
         source, listener = net.join(SERVER), net.join(ASKER)
-        told, heard = list[Told](), Heard()
+        told, heard = list[Copies](), Heard()
         came = asyncio.Event()
 
         def overheard(_key: str, raw: bytes) -> None:
-            told.append(Reader(Told).read(raw).body)
+            told.append(Reader(Copies).read(raw).body)
             came.set()
 
         listener.overhear(Conversation.TOLD, overheard, 1_000_000)
@@ -675,11 +675,11 @@ def test_questions_are_told_with_their_answers_while_somebody_overhears_that(on_
         async with pair(net, answer) as (asker, server):
             await asker.ask(SERVER, Echo("before"), Echoed, within_s=ASK_S)
             published = server.statistics().published
-            listener, told = net.join(THIRD), list[tuple[str, Told]]()
+            listener, told = net.join(THIRD), list[tuple[str, Copies]]()
             came = asyncio.Event()
 
             def overheard(key: str, raw: bytes) -> None:
-                told.append((key, Reader(Told).read(raw).body))
+                told.append((key, Reader(Copies).read(raw).body))
                 came.set()
 
             subscribed = listener.overhear(Conversation.TOLD, overheard, 1_000_000)

@@ -1,0 +1,187 @@
+"""Inbox: what arrives in other threads is handed to the event loop, which is woken once for a whole burst."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+from backbone.bus.bus_base import BusBase
+from backbone.bus.interface import Clock, Listener, Overhearer, Subscription
+from backbone.errors import Refusal
+from backbone.wire import Accepts, Message, Reader, Refused, refuse_oversized
+
+log = logging.getLogger(__name__)
+T = TypeVar("T")
+
+
+class Payload(Protocol):
+    """Bytes that are not copied yet."""
+
+    def __len__(self) -> int: ...
+
+    def to_bytes(self) -> bytes:
+        """Return a copy."""
+
+
+class Sample(Protocol):
+    """A publication as it arrives."""
+
+    @property
+    def key_expr(self) -> object:
+        """Its key."""
+
+    @property
+    def payload(self) -> Payload:
+        """Its bytes."""
+
+
+class InboxBus(BusBase):
+    """Base of a bus whose arrivals come in other threads. Make it inside a running event loop."""
+
+    def __init__(self, mission: str, source: str, clock: Clock) -> None:
+        super().__init__(mission, source, clock)
+        self._loop = asyncio.get_running_loop()
+        self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
+        self._woken = False
+
+    def push(self, act: Callable[[T], None], what: T) -> None:
+        """Make the loop call ``act(what)``; called from any thread."""
+        self._inbox.append((act, what))
+        if not self._woken:
+            self._woken = True
+            try:
+                self._loop.call_soon_threadsafe(self._drain)
+            except RuntimeError:  # the loop is closed
+                log.debug("inbox dropped after the loop's end")
+
+    def _drain(self) -> None:
+        self._woken = False
+        for _ in range(len(self._inbox)):
+            act, what = self._inbox.popleft()
+            if self.closed:
+                continue
+            try:
+                act(what)
+            except Exception as bug:  # one bad arrival must not lose the rest of the burst
+                self.on_bug(bug)
+
+    def empty_inbox(self) -> None:
+        """Forget what has arrived and is not handed over yet."""
+        self._inbox.clear()
+
+
+class EachSample:
+    """Receives every sample of a subscriber, in order."""
+
+    def __init__(self, bus: InboxBus, reader: Reader[Message], listener: Listener) -> None:
+        self._bus, self._reader, self._listener = bus, reader, listener
+
+    def __call__(self, sample: Sample) -> None:
+        """Take a sample in; called from another thread."""
+        self._bus.push(self.hand_over, sample)
+
+    def hand_over(self, sample: Sample) -> None:
+        """Read the sample and call the listener."""
+        try:
+            envelope = self._reader.read(bytes_of(sample.payload))
+        except Refusal as unreadable:
+            self._bus.unreadable += 1
+            log.warning("unreadable publication on %s: %s", sample.key_expr, unreadable.detail)
+            return
+        self._bus.hear(self._listener, envelope)
+
+
+class OverheardSamples:
+    """Receives every sample of a subscriber, in order, as long as few of them wait."""
+
+    def __init__(self, bus: InboxBus, listener: Overhearer, most_waiting_bytes: int) -> None:
+        self._bus, self._listener, self._most = bus, listener, most_waiting_bytes
+        self._came = self._went = 0  # bytes; each is written by one thread only
+        self._dropped = 0
+        self.declared: Subscription | None = None
+
+    @property
+    def dropped(self) -> int:
+        """Number of samples that came while too many waited."""
+        return self._dropped
+
+    def __call__(self, sample: Sample) -> None:
+        """Take a sample in; called from another thread."""
+        length = len(sample.payload)
+        if self._came - self._went + length > self._most:
+            self._dropped += 1
+            return
+        self._came += length
+        self._bus.push(self._hand_over, sample)
+
+    def _hand_over(self, sample: Sample) -> None:
+        raw = sample.payload.to_bytes()
+        self._went += len(raw)
+        self._bus.heard += 1
+        self._bus.call("", self._listener, str(sample.key_expr), raw)
+
+    def close(self) -> None:
+        """Withdraw the subscription."""
+        if self.declared is not None:
+            self.declared.close()
+
+
+class LatestSample(EachSample):
+    """Receives only the newest undelivered sample of each key.
+
+    Two threads share a dictionary and a flag, in atomic steps. Their order makes this safe: zenoh's thread stores
+    before it reads the flag, and the loop clears the flag before it takes samples out.
+    """
+
+    def __init__(self, bus: InboxBus, reader: Reader[Message], listener: Listener) -> None:
+        super().__init__(bus, reader, listener)
+        self._newest: dict[str, Sample] = {}
+        self._pushed = False
+
+    def __call__(self, sample: Sample) -> None:
+        """Take a sample in; called from another thread."""
+        self._newest[str(sample.key_expr)] = sample
+        if not self._pushed:
+            self._pushed = True
+            self._bus.push(self._hand_over_newest, None)
+
+    def _hand_over_newest(self, _nothing: None) -> None:
+        self._pushed = False
+        taken = [self._newest.popitem()[1] for _ in range(len(self._newest))]
+        for sample in reversed(taken):
+            self.hand_over(sample)
+
+
+def bytes_of(payload: Payload | None) -> bytes:
+    """Return the payload; a payload that is too long is not copied.
+
+    Raises:
+        OversizedMessage: The payload is too long for a message.
+    """
+    if payload is None:
+        return b""
+    refuse_oversized(len(payload))
+    return payload.to_bytes()
+
+
+_readers: dict[Accepts, Reader[Message]] = {}
+_reply_readers: dict[type[Message], Reader[Message]] = {}
+
+
+def reader_of(accepts: Accepts) -> Reader[Message]:
+    """Return the reader of these messages."""
+    reader = _readers.get(accepts)
+    if reader is None:
+        reader = _readers[accepts] = Reader(accepts)
+    return reader
+
+
+def reply_reader_of(reply: type[Message]) -> Reader[Message]:
+    """Return the reader of this answer or a refusal."""
+    reader = _reply_readers.get(reply)
+    if reader is None:
+        reader = _reply_readers[reply] = Reader(reply | Refused)
+    return reader
