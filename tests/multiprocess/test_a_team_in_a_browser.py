@@ -69,7 +69,7 @@ async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Ser
         await page.get_by_role("combobox", name="Taken with").select_option("lit_drive")
         await page.get_by_role("button", name="Take anew").click()
         await page.get_by_role("slider", name="brightness").fill("0.8")
-        await page.get_by_role("button", name="Shine").click()
+        await page.locator("#commands").get_by_role("button", name="Shine", exact=True).click()
         await page.locator("#applied", has_text="shine brightness 0.8").wait_for()
 
         await take(page, "rover1")
