@@ -27,7 +27,7 @@ from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
 from backbone.wire import Message
 
-LOOK_TIME_S = 1.0  # chosen: a person waits this long for a picture
+LOOK_TIME_S = 0.8  # chosen: a hung service is shown within 1 s; a starved one answers sooner
 TYPES_WITHIN_S = 4.0  # chosen: the component database waits 3 s for the nameserver
 NAMES_SHOWN = 8  # chosen: a line of a terminal
 
