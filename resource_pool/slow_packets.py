@@ -15,7 +15,8 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from backbone.rc_manager.messages import LONGEST_PACKET_S, MeasuredPackets
+from backbone.rc_manager.messages import LONGEST_PACKET_S
+from backbone.scheduling.requests import MeasuredPackets
 
 EVERY_S = 1.0  # chosen: each longer time makes an ARC ask anew; no plan changes faster than slices end
 STEP_S = 1e-4  # chosen: a byte on the air at 115.2 kbit/s

@@ -23,7 +23,6 @@ from backbone.ranges import (
     Instant,
     LeaseSeconds,
     Mention,
-    Period,
     Priority,
     Rank,
     RunTime,
@@ -31,7 +30,7 @@ from backbone.ranges import (
     Text,
     Values,
 )
-from backbone.scheduling.requests import Holder, Lease, PathNode, RcUse, SchedulingRequest
+from backbone.scheduling.requests import Holder, Lease, MeasuredPackets, PathNode, RcUse, SchedulingRequest
 from backbone.wire import Message
 
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
@@ -209,19 +208,6 @@ class Disconnected(Message, frozen=True):
 
 class AskRc(Message, frozen=True):
     """Ask an RC for its state."""
-
-
-class MeasuredPackets(Message, frozen=True):
-    """Packets that take longer on the air than their ARC declared.
-
-    Attributes:
-        kind: Of their stream, as the request names it.
-        packet_time_s: The longest time of one of them until now, above 0, at most ``LONGEST_PACKET_S``.
-    """
-
-    arc: Mention
-    kind: Mention
-    packet_time_s: Period
 
 
 class RcState(Message, frozen=True):

@@ -395,8 +395,7 @@ class RcManager(Component[RcManagerParameters]):
     def _heard_of_packets(self, state: RcState) -> None:
         """Pass on which packets take longer than declared."""
         if state.measured:
-            times = {(one.arc, one.kind): one.packet_time_s for one in state.measured}
-            self.happened(PacketsMeasured(state.name, times))
+            self.happened(PacketsMeasured(state.name, state.measured))
 
     def _leases(self) -> list[Lease]:
         """Return what is to be renewed: all that is held, but for what is just being given back."""

@@ -23,10 +23,10 @@ from backbone.scheduling.damping import Damping
 from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry
 from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
 from backbone.scheduling.master_schedule import MasterSchedule
-from backbone.scheduling.packet_times import Measured, PacketTimes
+from backbone.scheduling.packet_times import PacketTimes
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
-from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
+from backbone.scheduling.requests import MeasuredPackets, RcUse, RequestState, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.transitions import Transitions, because
 
@@ -199,13 +199,14 @@ class ArcEvents:
 
     # Packets that take longer than declared.
 
-    def packets_measured(self, rc: str, times: Measured) -> None:
+    def packets_measured(self, rc: str, packets: Sequence[MeasuredPackets]) -> None:
         """Count packets as long as an RC measured them; an ARC that waits asks anew."""
-        for (name, kind), packet_time_s in times.items():
+        for measured in packets:
+            name, kind = measured.arc, measured.kind
             arc = self._state.arcs.get(name)
             if arc is None or not any(usage.kind == kind for usage in arc.uses.get(rc, _NO_USE).streams):
                 continue
-            if not self._packet_times.take(rc, name, kind, packet_time_s):
+            if not self._packet_times.take(rc, name, kind, measured.packet_time_s):
                 continue
             counted = self._packet_times.counted(name, arc.uses)
             if counted != arc.uses:

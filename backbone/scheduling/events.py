@@ -2,21 +2,23 @@
 
 Rules of this file: plain frozen data; no bus, no clock. Times are mission seconds.
 An event reports a fact of the past; instructions are carried out in the order given, and their outcomes
-come back as events.
+come back as events. Events are messages, because a recording has them: from the same events come the same decisions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
-from backbone.scheduling.requests import SchedulingRequest
+from backbone.ranges import FEW, MANY, Duration, Epoch, Instant, Mention, Priority, RunTime, Share, Text
+from backbone.scheduling.requests import MeasuredPackets, SchedulingRequest
 from backbone.scheduling.trace import Line
+from backbone.wire import Message
 
 
 # ---------------------------------------------------------------------- events
-@dataclass(frozen=True, slots=True)
-class RcKnown:
+class RcKnown(Message, frozen=True):
     """An RC exists; repeated after its restart.
 
     Attributes:
@@ -29,168 +31,150 @@ class RcKnown:
         is_robot: True if it is a robot, for people.
     """
 
-    rc: str
-    kind: str
+    rc: Mention
+    kind: Mention
     sharable: bool
-    capacity: float
-    connect_s: float
-    disconnect_s: float
+    capacity: Share
+    connect_s: Duration
+    disconnect_s: Duration
     up: bool
-    last_epoch: int
+    last_epoch: Epoch
     is_robot: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class RcWentDown:
+class RcWentDown(Message, frozen=True):
     """The RC does not answer any more, or cannot be believed.
 
     Attributes:
         fault: Its contradiction; empty: it does not answer.
     """
 
-    rc: str
-    fault: str = ""
+    rc: Mention
+    fault: Text = ""
 
 
-@dataclass(frozen=True, slots=True)
-class RcRemoved:
+class RcRemoved(Message, frozen=True):
     """The RC is no longer among the hardware. It counts until it is down and no request names it."""
 
-    rc: str
+    rc: Mention
 
 
-@dataclass(frozen=True, slots=True)
-class RcCameBack:
+class RcCameBack(Message, frozen=True):
     """The RC answers again, without holders."""
 
-    rc: str
-    last_epoch: int
+    rc: Mention
+    last_epoch: Epoch
 
 
-@dataclass(frozen=True, slots=True)
-class CapacityChanged:
+class CapacityChanged(Message, frozen=True):
     """The capacity of a sharable RC has changed."""
 
-    rc: str
-    capacity: float
+    rc: Mention
+    capacity: Share
 
 
-@dataclass(frozen=True, slots=True)
-class PacketsMeasured:
+class PacketsMeasured(Message, frozen=True):
     """A sharable RC measured packets that take longer than their ARCs declared.
 
     Attributes:
-        times: ARC and kind of packets → the longest time of one of them, in seconds.
+        packets: Each kind of packets of an ARC at most once.
     """
 
-    rc: str
-    times: Mapping[tuple[str, str], float]
+    rc: Mention
+    packets: Annotated[list[MeasuredPackets], MANY]
 
 
-@dataclass(frozen=True, slots=True)
-class Requested:
+class Requested(Message, frozen=True):
     """An ARC sent a request; the set of RCs is already chosen (``choose`` in the schedule manager)."""
 
     request: SchedulingRequest
-    rcs: tuple[str, ...]
+    rcs: Annotated[tuple[Mention, ...], FEW]
 
 
-@dataclass(frozen=True, slots=True)
-class Adopted:
+class Adopted(Message, frozen=True):
     """A restarted RC manager found an ARC that holds its RCs under a standing lease, since it was connected to them."""
 
     request: SchedulingRequest
-    epochs: Mapping[str, int]
-    granted_s: float
+    epochs: Annotated[dict[Mention, Epoch], FEW]
+    granted_s: Instant
 
 
-@dataclass(frozen=True, slots=True)
-class Wanted:
+class Wanted(Message, frozen=True):
     """An idle ARC wants time again."""
 
-    arc: str
+    arc: Mention
 
 
-@dataclass(frozen=True, slots=True)
-class Idled:
+class Idled(Message, frozen=True):
     """An ARC wants no time now but stays."""
 
-    arc: str
+    arc: Mention
 
 
-@dataclass(frozen=True, slots=True)
-class Departed:
+class Departed(Message, frozen=True):
     """An ARC withdrew or died.
 
     Attributes:
         why: For the record: ``self``, ``owner``, ``dead``.
     """
 
-    arc: str
-    why: str = "self"
+    arc: Mention
+    why: Mention = "self"
 
 
-@dataclass(frozen=True, slots=True)
-class RuntimeChanged:
+class RuntimeChanged(Message, frozen=True):
     """An ARC asked for other run times."""
 
-    arc: str
-    minimum_runtime_s: float
-    maximum_runtime_s: float
+    arc: Mention
+    minimum_runtime_s: RunTime
+    maximum_runtime_s: RunTime
 
 
-@dataclass(frozen=True, slots=True)
-class Extended:
+class Extended(Message, frozen=True):
     """A running ARC asked to go on until this time."""
 
-    arc: str
-    until_s: float
+    arc: Mention
+    until_s: Instant
 
 
-@dataclass(frozen=True, slots=True)
-class PriorityChanged:
+class PriorityChanged(Message, frozen=True):
     """A node of the tree, or a console, has another priority."""
 
-    node: str
-    priority: int
+    node: Mention
+    priority: Priority
 
 
-@dataclass(frozen=True, slots=True)
-class NodeMoved:
+class NodeMoved(Message, frozen=True):
     """A node of the tree stands below another parent, with all below it."""
 
-    node: str
-    parent: str
+    node: Mention
+    parent: Mention
 
 
-@dataclass(frozen=True, slots=True)
-class Opened:
+class Opened(Message, frozen=True):
     """The ARC's RCs are connected and settled, its gate is open."""
 
-    arc: str
+    arc: Mention
 
 
-@dataclass(frozen=True, slots=True)
-class OpenFailed:
+class OpenFailed(Message, frozen=True):
     """The ARC's RCs could not all be connected; all of them were disconnected again.
 
     Attributes:
         rc: The RC that failed, empty if it was the ARC.
     """
 
-    arc: str
-    rc: str
+    arc: Mention
+    rc: Mention
 
 
-@dataclass(frozen=True, slots=True)
-class Freed:
+class Freed(Message, frozen=True):
     """All RCs of the ARC are disconnected, in their safe states."""
 
-    arc: str
+    arc: Mention
 
 
-@dataclass(frozen=True, slots=True)
-class Woken:
+class Woken(Message, frozen=True):
     """The time of the last ``WakeAt`` has come."""
 
 

@@ -18,9 +18,6 @@ import msgspec
 from backbone.ranges import A_DAY_S
 from backbone.scheduling.requests import RcUse, Usage
 
-Measured = Mapping[tuple[str, str], float]
-"""ARC and kind of packets → the longest time of one of them, in seconds."""
-
 
 class PacketTimes:
     """The measured times of all ARCs with a request."""

@@ -45,6 +45,19 @@ class Usage(Message, frozen=True):
     kind: Mention = ""
 
 
+class MeasuredPackets(Message, frozen=True):
+    """Packets that take longer on the air than their ARC declared.
+
+    Attributes:
+        kind: Of their stream, as the request names it.
+        packet_time_s: The longest time of one of them until now, above 0, seconds.
+    """
+
+    arc: Mention
+    kind: Mention
+    packet_time_s: Period
+
+
 class RcUse(Message, frozen=True):
     """How an ARC uses one RC: exclusively, or by streams on a sharable one.
 

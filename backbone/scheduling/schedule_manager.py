@@ -149,8 +149,8 @@ class ScheduleManager:
                 self._rcs.came_back(rc, last_epoch)
             case CapacityChanged(rc=rc, capacity=capacity):
                 self._rcs.capacity_changed(rc, capacity)
-            case PacketsMeasured(rc=rc, times=times):
-                self._arcs.packets_measured(rc, times)
+            case PacketsMeasured(rc=rc, packets=packets):
+                self._arcs.packets_measured(rc, packets)
             case Requested():
                 self._arcs.requested(event)
             case Adopted():

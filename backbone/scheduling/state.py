@@ -17,7 +17,6 @@ examine those only, and raises ``version``: results for an earlier version are o
 from __future__ import annotations
 
 import heapq
-import itertools
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from backbone.scheduling.compatibility import Compatibility
@@ -66,8 +65,8 @@ class ScheduleState:
         self._levels: dict[Level, Level] = {}
         self._held_alone = 0
         self._ends: list[tuple[float, int, ArcEntry]] = []
-        self._pushes = itertools.count()
-        self._stamps = itertools.count(1)
+        self._pushed = 0
+        self._stamped = 0
 
     # Changes since the last decision.
 
@@ -231,7 +230,7 @@ class ScheduleState:
         """Place a waiting ARC before all equals until it is connected; note if others were preempted for it."""
         arc.has_forced |= forced
         if arc.reservation is None:
-            arc.reservation = next(self._stamps)
+            arc.reservation = self._next_stamp()
             self._concerns(arc.uses)
 
     def connect(self, arc: ArcEntry, now_s: float) -> None:
@@ -370,7 +369,8 @@ class ScheduleState:
     def _await_end(self, arc: ArcEntry) -> None:
         if not arc.awaited:
             arc.awaited = True
-            heapq.heappush(self._ends, (arc.look_s, next(self._pushes), arc))
+            self._pushed += 1
+            heapq.heappush(self._ends, (arc.look_s, self._pushed, arc))
 
     # Questions.
 
@@ -418,7 +418,11 @@ class ScheduleState:
         return list(members.values())
 
     def _stamp(self, now_s: float) -> tuple[float, int]:
-        return (now_s, next(self._stamps))
+        return (now_s, self._next_stamp())
+
+    def _next_stamp(self) -> int:
+        self._stamped += 1
+        return self._stamped
 
     def _level_of(self, path: Path) -> Level:
         level = (path[:-1], path[-1][1])

@@ -11,7 +11,8 @@ from test_radio_at_work import ASK, DRIVE, RADIO, connect, disconnect, load
 from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.keys import Conversation
-from backbone.rc_manager.messages import AskAttributes, AskRc, AskWhy, MeasuredPackets, RcState, TraceLine
+from backbone.rc_manager.messages import AskAttributes, AskRc, AskWhy, RcState, TraceLine
+from backbone.scheduling.requests import MeasuredPackets
 from backbone.scheduling.views import Attributes, Why
 from resource_pool.messages import SwappedOut
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.rc_manager.messages import LONGEST_PACKET_S, MeasuredPackets
+from backbone.rc_manager.messages import LONGEST_PACKET_S
+from backbone.scheduling.requests import MeasuredPackets
 from resource_pool.slow_packets import EVERY_S, STEP_S, SlowPackets
 
 TIMES = st.lists(st.tuples(st.floats(0.0, 0.5), st.floats(0.0, 0.02)), max_size=40)

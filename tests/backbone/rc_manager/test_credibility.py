@@ -16,8 +16,8 @@ from backbone.bus.clock import run_virtual
 from backbone.dependency_database.messages import Resource
 from backbone.keys import Conversation
 from backbone.rc_manager.credibility import contradiction
-from backbone.rc_manager.messages import LONGEST_PACKET_S, AskWhy, MeasuredPackets, RcState, most_epoch
-from backbone.scheduling.requests import Holder, RequestState, Scheduled
+from backbone.rc_manager.messages import LONGEST_PACKET_S, AskWhy, RcState, most_epoch
+from backbone.scheduling.requests import Holder, MeasuredPackets, RequestState, Scheduled
 from backbone.scheduling.views import Why
 from backbone.wire import MalformedMessage
 

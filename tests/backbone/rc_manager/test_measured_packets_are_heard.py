@@ -14,8 +14,8 @@ from test_rc_manager_service import PlainArc, Pool, a_pool, request
 
 from backbone.bus.clock import run_virtual
 from backbone.keys import Conversation
-from backbone.rc_manager.messages import LONGEST_PACKET_S, MeasuredPackets, RcState
-from backbone.scheduling.requests import Holder
+from backbone.rc_manager.messages import LONGEST_PACKET_S, RcState
+from backbone.scheduling.requests import Holder, MeasuredPackets
 
 Scene = Callable[[Pool], Awaitable[None]]
 LINE = "its packets on radio take 30 ms, it declared 2: the longer time counts"

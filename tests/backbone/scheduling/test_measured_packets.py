@@ -34,7 +34,7 @@ from backbone.scheduling.events import (
 )
 from backbone.scheduling.packet_times import PacketTimes
 from backbone.scheduling.priority import by_precedence
-from backbone.scheduling.requests import CapacityExceeded, RcUse, Usage
+from backbone.scheduling.requests import CapacityExceeded, MeasuredPackets, RcUse, Usage
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.shares import Shares
 
@@ -43,7 +43,7 @@ RULES: list[dict[str, Any]] = [{}, {}, {"tolerance_s": 0.05}, {"grid_s": 2.0}, {
 
 
 def measured(arc: str, packet_s: float, *, rc: str = "r", kind: str = "") -> PacketsMeasured:
-    return PacketsMeasured(rc, {(arc, kind): packet_s})
+    return PacketsMeasured(rc, [MeasuredPackets(arc, kind, packet_s)])
 
 
 def uses_of(bench: Bench, arc: str) -> dict[str, RcUse]:
@@ -178,7 +178,8 @@ def test_only_the_measured_kind_of_packets_is_longer():
     bench = Bench(manager(), sharable("r"))
     streams = [Usage(0.1, 0.002, kind="drive"), Usage(0.2, 0.003, kind="transmitter")]
     bench.tell(ask("a", {"r": RcUse(streams)}, idle=True))
-    bench.tell(PacketsMeasured("r", {("a", "transmitter"): 0.004, ("a", "jump"): 0.9, ("nobody", "drive"): 0.9}))
+    told = [("a", "transmitter", 0.004), ("a", "jump", 0.9), ("nobody", "drive", 0.9)]
+    bench.tell(PacketsMeasured("r", [MeasuredPackets(*one) for one in told]))
     bench.tell(Wanted("a"))
     assert [usage.packet_time_s for usage in uses_of(bench, "a")["r"].streams] == [0.002, 0.004]
 
@@ -233,9 +234,11 @@ class Watched:
         match event:
             case Departed(arc=gone):
                 self._longest_s = {key: longest_s for key, longest_s in self._longest_s.items() if key[0] != gone}
-            case PacketsMeasured(rc=rc, times=times):
-                for arc, _ in times.keys() & {(arc, "") for arc in self._of.master_schedule.state.arcs}:
-                    self._longest_s[arc, rc] = max(times[arc, ""], self._longest_s.get((arc, rc), 0.0))
+            case PacketsMeasured(rc=rc, packets=packets):
+                for one in packets:
+                    if not one.kind and one.arc in self._of.master_schedule.state.arcs:
+                        longest_s = self._longest_s.get((one.arc, rc), 0.0)
+                        self._longest_s[one.arc, rc] = max(one.packet_time_s, longest_s)
         return self._of.handle(event, now_s)
 
     def check(self) -> None:
@@ -278,7 +281,7 @@ def with_measurements(seed: int, *, factors: tuple[float, ...] = (1.2, 1.5, 2.0)
         takes_s = round(declared_s * rng.choice(factors), 6)
         if not _fits_alone(bench, happens, arc, rc, takes_s):
             continue  # the bound of a wait is stated for those that can run
-        happens.append((rng.randint(0, int(END_S * 4)) / 4, PacketsMeasured(rc, {(arc, ""): takes_s})))
+        happens.append((rng.randint(0, int(END_S * 4)) / 4, PacketsMeasured(rc, [MeasuredPackets(arc, "", takes_s)])))
     return play(watched(bench), sorted(happens, key=lambda item: item[0]))
 
 
