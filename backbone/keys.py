@@ -35,6 +35,7 @@ class Conversation(StrEnum):
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each
     SCHEDULE = "schedule"  # the RC manager's decisions and leases
+    DECISIONS = "decisions"  # all that the RC manager decided on, for recorders
     LEASES = "leases"  # the RC manager's renewals of holds
     BEAT = "beat"  # heartbeats of ARCs: their event loop and their owner's run
     HEALTH = "health"  # the launcher's verdict on the whole mission

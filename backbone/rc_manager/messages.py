@@ -24,12 +24,14 @@ from backbone.ranges import (
     LeaseSeconds,
     Mention,
     Priority,
+    Quoted,
     Rank,
     RunTime,
     Share,
     Text,
     Values,
 )
+from backbone.scheduling.events import Event
 from backbone.scheduling.requests import Holder, Lease, MeasuredPackets, PathNode, RcUse, SchedulingRequest
 from backbone.wire import Message
 
@@ -279,10 +281,46 @@ class AskAttributes(Message, frozen=True):
     name: Mention
 
 
-class TraceLine(Message, frozen=True):
-    """Published as an event: one decision, in the trace format of the schedule."""
+class TraceLine(Message, frozen=True, tag="TraceLine/2"):
+    """Published as an event: one decision, in the trace format of the schedule.
+
+    Attributes:
+        cause: One line for people, of the rule that decided.
+    """
 
     line: Values
+    cause: Text = ""
+
+
+class Decided(Message, frozen=True):
+    """The schedule manager decided on an event. From the same events in the same order it decides the same.
+
+    Attributes:
+        number: Grows by one with each; 1 is the first of an RC manager.
+        at_s: Mission time of the decision.
+    """
+
+    number: Count
+    at_s: Instant
+    event: Event
+
+
+class AskSnapshot(Message, frozen=True):
+    """Ask for all that the schedule manager decides by."""
+
+
+class ScheduleSnapshot(Message, frozen=True):
+    """Answer to ``AskSnapshot``; also published before the first decision of an RC manager.
+
+    Attributes:
+        number: Of the last decision; 0: there was none.
+        at_s: Mission time.
+        state: See ``backbone.scheduling.snapshot``.
+    """
+
+    number: Count
+    at_s: Instant
+    state: Quoted
 
 
 class FixedRules(Refusal):
@@ -328,4 +366,5 @@ RcManagerQuestion = (
     | AskWhy
     | AskAttributes
     | AskUtilization
+    | AskSnapshot
 )

@@ -29,12 +29,14 @@ from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.beats import Beats
 from backbone.rc_manager.context_switch import ContextSwitch, in_pool
+from backbone.rc_manager.decision_log import DecisionLog
 from backbone.rc_manager.hardware import Hardware
 from backbone.rc_manager.messages import (
     RENEW_EVERY_S,
     AskAttributes,
     AskRequest,
     AskSchedule,
+    AskSnapshot,
     AskUtilization,
     AskWhy,
     Beat,
@@ -50,13 +52,11 @@ from backbone.rc_manager.messages import (
     SetIdle,
     SetPriority,
     TakePath,
-    TraceLine,
     Withdraw,
 )
 from backbone.rc_manager.rc_watch import RcWatch
 from backbone.rc_manager.recovery import Found, Recovery, rc_known
 from backbone.rc_manager.switch_times import SwitchTimes
-from backbone.rc_manager.trace_file import TraceFile
 from backbone.scheduling.events import (
     CapacityChanged,
     ConnectArc,
@@ -95,7 +95,6 @@ from backbone.scheduling.requests import (
 )
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
-from backbone.scheduling.shares import Shares
 from backbone.scheduling.views import Utilization
 from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope, Message
@@ -119,6 +118,10 @@ class RcManagerParameters(SchedulingRules, frozen=True, forbid_unknown_fields=Tr
     mission_priority: int = 0
     trace: str = ""
 
+    def rules(self) -> SchedulingRules:
+        """Return the rules alone."""
+        return SchedulingRules(**{rule: getattr(self, rule) for rule in SchedulingRules.__struct_fields__})
+
 
 class RcManager(Component[RcManagerParameters]):
     """Grants whole sets of RCs by priority and in turns, and says why."""
@@ -130,7 +133,7 @@ class RcManager(Component[RcManagerParameters]):
         super().__init__(launch, bus, clock)
         given = self.parameters
         self.manager = ScheduleManager(
-            given,
+            given.rules(),
             tolerance_s=TOLERANCE_S,
             mission=given.mission,
             mission_priority=given.mission_priority,
@@ -144,8 +147,8 @@ class RcManager(Component[RcManagerParameters]):
         self._switches: dict[str, asyncio.Task[None]] = {}
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
-        self._trace = TraceFile("")
-        self.shares = Shares()
+        self._log = DecisionLog(bus, clock, self.manager, self.story.note, self._trace_stopped)
+        self.shares = self._log.shares
         self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
         self._recovery = Recovery(bus, clock)
         self._rcs = RcWatch(self, self._context_switch, self._recovery)
@@ -157,11 +160,7 @@ class RcManager(Component[RcManagerParameters]):
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
         """Learn the hardware and, after a restart, who holds it; then watch the nameserver for changes."""
-        self._trace = TraceFile(self.parameters.trace)
-        if self._trace.stopped_by:
-            self._trace_stopped()
-        for record in self.manager.opening_lines():
-            self._record(record)
+        self._log.begin(self.parameters.trace)
         await self._hardware.learn()
         self._found = self._rcs.believed(await self._recovery.find(self._resources))
         await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
@@ -189,8 +188,7 @@ class RcManager(Component[RcManagerParameters]):
     async def drain(self) -> None:
         """End all switches; what is held ends by lease, or is taken over by the next RC manager."""
         await end_tasks(*self._switches.values(), *self._rcs.starts)
-        self._trace.write({"ev": "end", "t": round(self.clock.now_s(), 6)})
-        self._trace.close()
+        self._log.end()
 
     def statistics(self) -> dict[str, float]:
         """Count decisions and switches; switch times are from revoke to grant, settling not counted."""
@@ -228,6 +226,8 @@ class RcManager(Component[RcManagerParameters]):
             case AskUtilization(periods=periods):
                 now_s = self.clock.now_s()
                 return Utilization(now_s, self.shares.utilizations(now_s, periods=periods))
+            case AskSnapshot():
+                return self._log.snapshot()
             case _:
                 return await super().answer(asked)
         return Done()
@@ -269,7 +269,9 @@ class RcManager(Component[RcManagerParameters]):
     # ------------------------------------------------------------------ decide, then do
     def happened(self, event: Event, at_s: float | None = None) -> None:
         """Let the schedule manager decide on what happened, now unless told, and begin to carry out what it says."""
-        instructions = self.manager.handle(event, self.clock.now_s() if at_s is None else at_s)
+        at_s = self.clock.now_s() if at_s is None else at_s
+        self._log.decides_on(event, at_s)
+        instructions = self.manager.handle(event, at_s)
         for instruction in instructions:
             self._carry_out(instruction)
         if instructions:
@@ -278,7 +280,7 @@ class RcManager(Component[RcManagerParameters]):
     def _carry_out(self, instruction: Instruction) -> None:
         match instruction:
             case Record():
-                self._record(instruction)
+                self._log.record(instruction)
             case WakeAt(at_s=at_s):
                 self._wake_at_s = at_s
                 self._wake.set()
@@ -305,22 +307,10 @@ class RcManager(Component[RcManagerParameters]):
 
         self._switches[arc] = self.start_task(in_turn(), f"switch {arc}")
 
-    def _record(self, record: Record) -> None:
-        line = dict(record.line)
-        self.shares.take(line)
-        if not self._trace.write(line):
-            self._trace_stopped()
-        subject = str(line.get("arc") or line.get("id") or "")
-        self.story.note(subject, f"{line['ev']}{': ' + record.cause if record.cause else ''}")
-        self.bus.publish(self.address, Conversation.EVENTS, TraceLine(line))
-
     def _trace_stopped(self) -> None:
         """Let people know; the mission goes on without a trace."""
-        self.publish_event(self.name, self._why_no_trace(), LogLevel.WARNING)
+        self.publish_event(self.name, self._log.why_no_trace, LogLevel.WARNING)
         self.changed()
-
-    def _why_no_trace(self) -> str:
-        return f"the trace of the schedule stopped: {self._trace.stopped_by}"
 
     # ------------------------------------------------------------------ context switches
     async def _connect(self, order: ConnectArc) -> None:
@@ -455,8 +445,8 @@ class RcManager(Component[RcManagerParameters]):
         schedule = self.answers.schedule(self.clock.now_s())
         running = sum(1 for request in schedule.requests if request.state == "running")
         feedback = f"{running} of {len(schedule.requests)} ARCs run"
-        if self._trace.stopped_by:
-            feedback += f"; {self._why_no_trace()}"
+        if self._log.why_no_trace:
+            feedback += f"; {self._log.why_no_trace}"
         if feedback != self.feedback:
             self.feedback = feedback
             super().publish_news()

@@ -79,7 +79,7 @@ class Schedule(Message, frozen=True):
     groups: Annotated[list[Annotated[list[Mention], MANY]], MANY]
 
 
-class Why(Message, frozen=True):
+class Why(Message, frozen=True, tag="Why/2"):
     """Answer to ``AskWhy``.
 
     Attributes:
@@ -90,6 +90,7 @@ class Why(Message, frozen=True):
         blockers: ARCs that cause this; without them a waiting ARC starts as soon as its RCs are up and free.
         expected_start_s: Predicted grant; negative if none.
         would_change: The event that would end the wait, for people.
+        at_s: Mission time of the answer; negative: not told.
     """
 
     name: Mention
@@ -99,6 +100,7 @@ class Why(Message, frozen=True):
     blockers: Annotated[list[Mention], MANY]
     expected_start_s: Instant
     would_change: Text
+    at_s: Instant = -1.0
 
 
 class Period(Message, frozen=True):

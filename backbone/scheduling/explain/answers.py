@@ -8,6 +8,8 @@ from __future__ import annotations
 import copy
 import math
 
+import msgspec
+
 from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.events import Freed, Opened
 from backbone.scheduling.explain.attributes import attributes
@@ -54,7 +56,8 @@ class Answers:
         Raises:
             UnknownRequest: There is none of this name.
         """
-        return self._explanation.why(name, self._not_before(now_s))
+        at_s = self._not_before(now_s)
+        return msgspec.structs.replace(self._explanation.why(name, at_s), at_s=at_s)
 
     def attributes(self, name: str) -> Attributes:
         """Return what an ARC, an owner (name or address), or all at and below a node ask for.

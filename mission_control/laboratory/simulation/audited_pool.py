@@ -12,7 +12,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.rc_manager.service import RcManager
-from backbone.scheduling.events import Event, Record
+from backbone.scheduling.events import Event, Instruction, Record
 from mission_control.laboratory.simulation.audit import Audit, current_audit
 from resource_pool.aggregate_resource_controller import AggregateResourceController
 from resource_pool.arcs.capture import CaptureArc
@@ -191,7 +191,8 @@ class AuditedRcManager(RcManager):
         except AssertionError as broken:
             self._audit.note(self.name, "promise broken", promise=str(broken))
 
-    def _record(self, record: Record) -> None:
-        line = {name: value for name, value in record.line.items() if name not in {"ev", "t"}}
-        self._audit.note(self.name, str(record.line["ev"]), **line)
-        super()._record(record)
+    def _carry_out(self, instruction: Instruction) -> None:
+        if isinstance(instruction, Record):
+            line = {name: value for name, value in instruction.line.items() if name not in {"ev", "t"}}
+            self._audit.note(self.name, str(instruction.line["ev"]), **line)
+        super()._carry_out(instruction)
