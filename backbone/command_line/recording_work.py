@@ -20,6 +20,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.command_line.message_lines import message_json, message_line
 from backbone.command_line.options import DISTRIBUTION
+from backbone.command_line.unusable_file import FileUnusable
 from backbone.command_line.watching import mission_classes
 from backbone.command_line.where import Where
 from backbone.component.messages import StoryEvent
@@ -42,13 +43,6 @@ from backbone.spoken import counted
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
-
-
-class RecordingUnusable(Refusal):
-    """A recording cannot be written or read there."""
-
-    code = "usage.recording"
-    remedy = "Name a recording that this user may read, or a new file in a folder where this user may write."
 
 
 # ---------------------------------------------------------------------- making one
@@ -141,9 +135,9 @@ def _new_files(path: Path, keep: int) -> Iterator[RecordingFiles]:
     try:
         files = RecordingFiles(path, keep)
     except FileExistsError as error:
-        raise RecordingUnusable(f"{path} exists", remedy="Name a new file.") from error
+        raise FileUnusable(f"{path} exists", remedy="Name a new file.") from error
     except OSError as error:
-        raise RecordingUnusable(f"{path} cannot be written: {error.strerror or error}") from error
+        raise FileUnusable(f"{path} cannot be written: {error.strerror or error}") from error
     try:
         yield files
     finally:
@@ -156,10 +150,10 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
     try:
         count = recover_file(path, to)
     except FileExistsError as error:
-        raise RecordingUnusable(f"{to} exists", remedy="Name a new file.") from error
+        raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
     except OSError as error:
-        raise RecordingUnusable(f"{error.filename or path}: {error.strerror or error}") from error
-    with _opened(to) as made:
+        raise FileUnusable(f"{error.filename or path}: {error.strerror or error}") from error
+    with opened(to) as made:
         assert made.contents().messages == count  # noqa: S101  what was written can be read
     say(f"{to}: {counted(count, 'message')}")
     return ExitCode.DONE
@@ -168,7 +162,7 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
 # ---------------------------------------------------------------------- looking into one
 async def print_info(path: Path, *, as_json: bool) -> ExitCode:
     """Print facts, times and numbers."""
-    with _opened(path) as recording:
+    with opened(path) as recording:
         found = recording.contents()
     facts = found.about | {
         "begin_s": found.begin_s,
@@ -187,7 +181,7 @@ async def print_info(path: Path, *, as_json: bool) -> ExitCode:
 
 async def check_whole(path: Path, *, as_json: bool) -> ExitCode:
     """Print whose messages are missing, and how many."""
-    with _opened(path) as recording:
+    with opened(path) as recording:
         found, missing = recording.contents(), missing_numbers(recording.messages())
     if as_json:
         show([json.dumps({"messages": found.messages, "missing": missing})])
@@ -199,7 +193,7 @@ async def check_whole(path: Path, *, as_json: bool) -> ExitCode:
 
 async def print_keys(path: Path, *, as_json: bool) -> ExitCode:
     """Print a line for each key, sender and schema."""
-    with _opened(path) as recording:
+    with opened(path) as recording:
         found = recording.contents()
     lasted_s = max(found.end_s - found.begin_s, 1e-9)
     rows = [
@@ -221,7 +215,7 @@ async def print_messages(
 ) -> ExitCode:
     """Print a line for each message, at most so many."""
     left_out = 0
-    with _opened(path) as recording:
+    with opened(path) as recording:
         for number, message in enumerate(recording.messages(keys, since_s, until_s)):
             if number >= most:
                 left_out += 1
@@ -235,7 +229,7 @@ async def print_messages(
 async def print_events(path: Path, name: str, since_s: float, until_s: float | None, *, as_json: bool) -> ExitCode:
     """Print the events about a name, as the live mission would."""
     log = MissionLog()
-    with _opened(path) as recording:
+    with opened(path) as recording:
         for message in recording.messages((f"*/{Conversation.LOG}", f"*/{Conversation.OPERATORS}")):
             if message.schema == "StoryEvent/1":
                 log.add(revived(StoryEvent, message.body))
@@ -253,7 +247,7 @@ async def print_events(path: Path, name: str, since_s: float, until_s: float | N
 
 async def print_mission_file(path: Path) -> ExitCode:
     """Print the mission file."""
-    with _opened(path) as recording:
+    with opened(path) as recording:
         text = recording.mission_xml()
     if not text:
         say("the recording has no mission file")
@@ -267,10 +261,16 @@ def _size(path: Path) -> int:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Recording]:
+def opened(path: Path) -> Iterator[Recording]:
+    """Yield the recording in this file.
+
+    Raises:
+        FileUnusable: It cannot be read.
+        NoRecording: It is none, or its recorder was killed.
+    """
     try:
         file = path.open("rb")
     except OSError as error:
-        raise RecordingUnusable(f"{path} cannot be read: {error.strerror or error}") from error
+        raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
     with file:
         yield Recording(file)

@@ -11,9 +11,9 @@ from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.atomic_file import replace_file
 from backbone.bus.interface import Bus
 from backbone.command_line.connection import connected
+from backbone.command_line.unusable_file import FileUnusable
 from backbone.command_line.where import Where
 from backbone.component.messages import ComponentState
-from backbone.errors import Refusal
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.messages import (
     AddBranch,
@@ -34,13 +34,6 @@ from backbone.spoken import value_text
 
 REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
 CHANGED_WITHIN_S = 240.0  # chosen: a new root whose start takes as long as it may
-
-
-class FileUnusable(Refusal):
-    """A file of the command cannot be read or written."""
-
-    code = "usage.file"
-    remedy = "Name a file that this user may read, or a folder where this user may write."
 
 
 async def print_tree(where: Where, *, as_json: bool) -> ExitCode:

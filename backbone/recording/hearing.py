@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
-from backbone.bus.interface import Copies
 from backbone.keys import NEVER_DROPPED, Conversation
 from backbone.recording.translation import Translated, Translator
 from backbone.wire import Message
@@ -33,14 +32,11 @@ class Hearing:
             raw: The bytes.
             at_s: Mission time when they came.
         """
-        is_told = key.endswith(f"/{Conversation.TOLD}")
-        if not is_told and not self._is_meant(key):
+        told = self._translator.copies(raw) if key.endswith(f"/{Conversation.TOLD}") else None
+        if told is None:
+            if self._is_meant(key):
+                yield key, self._translator.translate(raw, at_s)
             return
-        message = self._translator.translate(raw, at_s)
-        if message.kind is not Copies:
-            yield key, message
-            return
-        told = self._translator.told(raw)
         told_key = f"{'/'.join(key.split('/')[:2])}/{told.address}/{told.conversation}"
         if self._is_meant(told_key):
             for quoted in told.messages:

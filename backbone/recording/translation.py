@@ -50,6 +50,7 @@ class Translator:
     def __init__(self, classes: Mapping[str, type[Message]]) -> None:
         known: Any = Union[tuple(classes.values())]  # noqa: UP007  made at run time
         self._known = msgspec.msgpack.Decoder(Envelope[known])
+        self._copies = msgspec.msgpack.Decoder(Envelope[Copies])
         self._any: Any = msgspec.msgpack.Decoder(Envelope[Any])
 
     def translate(self, raw: bytes, heard_s: float) -> Translated:
@@ -65,9 +66,12 @@ class Translator:
         except _UNSPEAKABLE:
             return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
 
-    def told(self, raw: bytes) -> Copies:
-        """Return the ``Copies`` that these bytes hold."""
-        return cast("Copies", self._known.decode(raw).body)
+    def copies(self, raw: bytes) -> Copies | None:
+        """Return the copies that these bytes hold; None if they are no copies."""
+        try:
+            return self._copies.decode(raw).body
+        except _UNREADABLE:
+            return None
 
     def _unknown(self, raw: bytes, heard_s: float) -> Translated:
         try:

@@ -77,8 +77,10 @@ async def test_a_mission_recovers_from_the_death_of_each_of_its_processes(tmp_pa
                 await wait_until(mission, bus, "both watchers ask", lambda s: both_watchers_ask(s) and somebody_runs(s))
             )
             for victim in VICTIMS:
-                before = mission.component(victim)["pid"]
-                os.kill(before, signal.SIGKILL)
+                there = await wait_until(mission, bus, f"{victim} is there", lambda s, v=victim: v in names(s))
+                before = next(c["pid"] for c in there["components"] if c["name"] == victim)
+                with contextlib.suppress(ProcessLookupError):  # the ARC of a behavior that was killed just now
+                    os.kill(before, signal.SIGKILL)
 
                 def recovered(status: dict, victim: str = victim, before: int = before) -> bool:
                     pids = {c["name"]: c["pid"] for c in status["components"]}
