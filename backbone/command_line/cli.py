@@ -36,7 +36,7 @@ from backbone.command_line.options import (
     named_value,
     run,
 )
-from backbone.command_line.recording_commands import inject, record, recording, top, watch
+from backbone.command_line.recording_commands import inject, record, recording, replay, top, watch
 from backbone.command_line.tree_commands import tree
 from backbone.component.log_level import LogLevel
 from backbone.launcher.endings import ExitCode, say
@@ -343,6 +343,7 @@ app.add_typer(recording, name="recording")
 app.command()(watch)
 app.command()(top)
 app.command()(inject)
+app.command()(replay)
 
 
 @app.command()

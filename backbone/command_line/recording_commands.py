@@ -17,6 +17,7 @@ from backbone.command_line.options import (
     MissionName,
     SecretFile,
     chosen,
+    named_value,
     run,
 )
 
@@ -137,12 +138,49 @@ def print_story(
     run(lambda: print_events(file, name, since, until, as_json=as_json))
 
 
+@recording.command()
+def why(
+    file: File,
+    name: Annotated[str, typer.Argument(help="An ARC, behavior, console, resource or component.")],
+    at_s: Annotated[
+        float | None, typer.Option("--at", min=0.0, help="Mission time, seconds; default: the end of the recording.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print why something was as it was at any instant, as 'why' printed it live."""
+    from backbone.command_line.replaying import print_reasons_at
+
+    run(lambda: print_reasons_at(file, name, at_s, as_json=as_json))
+
+
 @recording.command("mission")
 def print_mission(file: File) -> None:
     """Print the mission file that was up."""
     from backbone.command_line.recording_work import print_mission_file
 
     run(lambda: print_mission_file(file))
+
+
+def replay(
+    file: File,
+    without: Annotated[
+        list[str],
+        typer.Option("--without", metavar="NAME", help="Run this component instead of its recording: rc_manager."),
+    ],
+    rules: Annotated[
+        list[str] | None,
+        typer.Option("--rule", metavar="NAME=VALUE", help="Another rule, as 'policy=strict'; repeatable."),
+    ] = None,
+    since: Annotated[float, typer.Option("--from", min=0.0, help="Not before this mission time, seconds.")] = 0.0,
+    as_json: AsJson = False,
+) -> None:
+    """Let today's scheduler decide on what was recorded, and tell the first decision that is not as recorded."""
+    from backbone.command_line.replaying import decide_anew
+
+    if without != ["rc_manager"]:
+        raise typer.BadParameter("only the rc_manager can be run on a recording: --without rc_manager")
+    chosen_rules = dict(named_value(rule) for rule in rules or [])
+    run(lambda: decide_anew(file, since, chosen_rules, as_json=as_json))
 
 
 def watch(

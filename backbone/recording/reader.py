@@ -142,7 +142,7 @@ class Recording:
         return found.data.decode() if found is not None else ""
 
     def messages(
-        self, patterns: tuple[str, ...] = (), since_s: float = 0.0, until_s: float | None = None
+        self, patterns: tuple[str, ...] = (), since_s: float = 0.0, until_s: float | None = None, source: str = ""
     ) -> Iterator[Recorded]:
         """Yield the messages in the order of sending.
 
@@ -150,19 +150,22 @@ class Recording:
             patterns: Only of keys that match one of these; none: all. ``scout/<mission>/`` may be left out.
             since_s: Not before this mission time.
             until_s: Not after it; None: to the end.
+            source: Only of this sender; empty: of all.
         """
         if until_s is not None and until_s < since_s:
             return
-        topics = None
-        if patterns:
-            channels = self._summary.channels.values()
-            topics = [one.topic for one in channels if not _named(one)[0] or is_meant(_named(one)[0], patterns)]
+        named = [(channel.topic, *_named(channel)[:2]) for channel in self._summary.channels.values()]
+        topics = [
+            topic
+            for topic, key, sender in named
+            if not key or ((not patterns or is_meant(key, patterns)) and source in ("", sender))
+        ]
         end_ns = None if until_s is None else round(until_s * NS)
         found = self._reader.iter_messages(topics, starting_at=max(0, round(since_s * NS)), ending_at=end_ns)
         try:
             for _schema, channel, message in found:
                 recorded = _recorded(channel, message)
-                if not patterns or is_meant(recorded.key, patterns):
+                if (not patterns or is_meant(recorded.key, patterns)) and source in ("", recorded.source):
                     yield recorded
         except _DAMAGED as error:
             raise NoRecording(f"the recording is damaged: {error}") from error

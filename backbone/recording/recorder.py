@@ -28,18 +28,21 @@ from backbone.keys import Conversation
 from backbone.keys import key as key_of
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import component_of
-from backbone.rc_manager.messages import AskSchedule
+from backbone.rc_manager.messages import AskSchedule, AskSnapshot, ScheduleSnapshot
 from backbone.recording.files import SPLIT_BYTES, SPLIT_S, RecordingFiles
 from backbone.recording.hearing import to_overhear
 from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
+from backbone.waiting import set_within
 from backbone.wire import Message
 
 FLUSH_EACH_S = 0.4  # chosen: below the half second that a killed recorder may lose; seconds of the machine
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 OVERHEARD_WITHIN_S = 0.02  # measured: a publisher knows of its first subscriber after 7 ms; seconds of the machine
 MOST_ATTEMPTS = 5  # chosen: together ten times as long
+SNAPSHOT_EACH_S = 10.0  # chosen: a replay from the middle decides on few events that are not shown
+SNAPSHOT_S_PER_BYTE = 1.5e-4  # measured: a kilobyte is written in 0.15 ms; so it takes a thousandth of the time
 GONE_AFTER_S = 5.0  # chosen: a restarted hub is back within two; seconds of the machine
 LEAST_FREE_BYTES = 100 * 1000 * 1000  # B-Human's logger: it stops below 100 MB
 MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: a second of four cameras in color
@@ -83,8 +86,9 @@ class Recorder:
         self._writer, self._before = self._new_writer(), 0
         self._begun_s = clock.now_s()
         self._subscribed: list[Overhearing] = []
-        self._tellers: set[str] = set()
+        self._awaited, self._was_told = "", asyncio.Event()
         self._bug: BaseException | None = None
+        self._one_at_a_time, self._new_file = asyncio.Lock(), asyncio.Event()
         self._ended = asyncio.Event()
         self._has_link = True
         self.full = ""
@@ -115,7 +119,7 @@ class Recorder:
             self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
         self._bus.watch_link(self._link_changed)
         self._say(f"{self._who} records the mission to {self._files.path.name}", LogLevel.NOTICE)
-        asking = asyncio.create_task(self._ask_all(), name="first state")
+        asking = asyncio.create_task(self._ask(), name="what was said before")
         try:
             await self._flush_until_end()
         finally:
@@ -160,6 +164,7 @@ class Recorder:
         self._files.open_next()
         self._before, self._begun_s = self.written, self._clock.now_s()
         self._writer = self._new_writer()
+        self._new_file.set()
 
     def _new_writer(self) -> RecordingWriter:
         return RecordingWriter(self._files.file, *self._facts)
@@ -193,7 +198,8 @@ class Recorder:
         self._bus.publish(self._bus.source, Conversation.LOG, event)
 
     def _heard(self, key: str, raw: bytes) -> None:
-        self._tellers.add(key)
+        if key == self._awaited:
+            self._was_told.set()
         if self.full:
             return
         try:
@@ -202,10 +208,20 @@ class Recorder:
             self._fill(str(error))
 
     # ------------------------------------------------------------------ what was said before
-    async def _ask_all(self) -> None:
+    async def _ask(self) -> None:
         """Ask for what was said before anybody overheard it; the answers come as all others do."""
-        if Conversation.TOLD not in to_overhear(self._keys):
-            return
+        if Conversation.TOLD in to_overhear(self._keys):
+            await asyncio.gather(self._ask_for_snapshots(), self._ask_all())
+
+    async def _ask_for_snapshots(self) -> None:
+        """Ask for the state of the schedule again and again, and at the begin of each file."""
+        while True:
+            self._new_file.clear()
+            answer = await self._asked(RC_MANAGER, AskSnapshot(), ScheduleSnapshot)
+            size_bytes = len(answer.state) if answer is not None else 0
+            await set_within(self._new_file, max(SNAPSHOT_EACH_S, size_bytes * SNAPSHOT_S_PER_BYTE))
+
+    async def _ask_all(self) -> None:
         listed = await self._asked(NAMESERVER, ListComponents(), Components)
         await self._asked(RC_MANAGER, AskSchedule(), Schedule)
         for component in listed.components if listed is not None else ():
@@ -215,15 +231,15 @@ class Recorder:
 
     async def _asked(self, address: str, question: Message, reply: type[Reply]) -> Reply | None:
         """Return the answer once it was overheard too; None: there is none."""
-        key = key_of(self._bus.mission, address, Conversation.TOLD)
-        for _attempt in range(MOST_ATTEMPTS):
-            self._tellers.discard(key)
-            try:
-                answer = await self._bus.ask(address, question, reply, within_s=REPLY_TIME_S)
-            except (LinkError, Refusal) as error:
-                log.info("%s is not in the recording: %s", address, error)
-                return None
-            await self._clock.sleep_s(OVERHEARD_WITHIN_S * self._clock.rate)
-            if key in self._tellers:
-                break
-        return answer
+        async with self._one_at_a_time:
+            self._awaited = key_of(self._bus.mission, address, Conversation.TOLD)
+            for _attempt in range(MOST_ATTEMPTS):
+                self._was_told.clear()
+                try:
+                    answer = await self._bus.ask(address, question, reply, within_s=REPLY_TIME_S)
+                except (LinkError, Refusal) as error:
+                    log.info("%s is not in the recording: %s", address, error)
+                    return None
+                if await set_within(self._was_told, OVERHEARD_WITHIN_S):
+                    break
+            return answer

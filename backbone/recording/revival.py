@@ -24,14 +24,17 @@ class OtherForm(Refusal):
     remedy = "Look into the recording with the release that made it, see 'scout-backbone recording info'."
 
 
-def revived(kind: type[Kind], body: dict[str, Any]) -> Kind:
+def revived(kind: type[Kind], body: dict[str, Any] | list[Any]) -> Kind:
     """Return the message of this class that a recorded body holds; fields that are newer have their defaults.
+
+    Args:
+        body: With the names of its fields, or as a list where the recorder did not know the class.
 
     Raises:
         OtherForm: The body is of another form.
     """
     try:
-        listed = _listed_struct(kind, body)
+        listed = body if isinstance(body, list) else _listed_struct(kind, body)
         return msgspec.json.decode(msgspec.json.encode(listed), type=kind)
     except (msgspec.DecodeError, LookupError, TypeError, AttributeError) as error:
         raise OtherForm(f"{schema_of(kind)}: {error}") from error

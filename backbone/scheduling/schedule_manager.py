@@ -90,6 +90,7 @@ class ScheduleManager:
             planner: Plans all groups; None: those of this package do.
         """
         self.rules = rules
+        self._beginning = (tolerance_s, exact_up_to, mission, mission_priority, goes_on)
         self._state = ScheduleState(
             discipline=rules.discipline, admission=rules.admission, tolerance_s=tolerance_s, exact_up_to=exact_up_to
         )
@@ -106,6 +107,19 @@ class ScheduleManager:
         self._arcs = ArcEvents(self._transitions, self.master_schedule, self.tree, self._priorities, rules)
         self._rcs = RcEvents(self._transitions, self.master_schedule)
         self.wake_s: float | None = None
+
+    def begun_anew(self, rules: SchedulingRules, planner: PlannerType | None = None) -> ScheduleManager:
+        """Return another one that begins as this one began, with these rules."""
+        tolerance_s, exact_up_to, mission, mission_priority, goes_on = self._beginning
+        return ScheduleManager(
+            rules,
+            tolerance_s=tolerance_s,
+            exact_up_to=exact_up_to,
+            mission=mission,
+            mission_priority=mission_priority,
+            goes_on=goes_on,
+            planner=planner,
+        )
 
     @property
     def decided_s(self) -> float:

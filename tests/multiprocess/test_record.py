@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import random
@@ -19,13 +20,19 @@ import pytest
 from running_mission import BIN, MISSION_XML, RunningMission, mission_up
 from tutorial_commands import run_all
 
+from backbone.addresses import RC_MANAGER
+from backbone.rc_manager.messages import AskSchedule, AskWhy
+from backbone.recording.decisions import decided_anew
 from backbone.recording.reader import Recorded, Recording
+from backbone.recording.reasons import reasons_at
+from backbone.scheduling.views import Schedule, Why
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
 
 GUIDE = MISSION_XML.parent / "docs" / "how-to" / "record-a-mission.md"
 MIXED = Path(__file__).parents[2] / "docs" / "examples" / "mixed.xml"
 LOST_AT_MOST_S = 0.5
+ASKED = 200
 UNANSWERED = 4  # an ARC that ends is asked once more by creator, placer and RC manager
 
 
@@ -124,6 +131,28 @@ def test_of_a_killed_recorder_at_most_half_a_second_is_lost(mission: RunningMiss
     assert messages(whole)[-1].at_s > killed_s - LOST_AT_MOST_S
     again = mission.command("scout-backbone", "record", "recover", str(path), str(whole))
     assert (again.returncode, "exists" in again.stderr) == (2, True)
+
+
+async def test_reasons_of_any_instant_are_those_that_were_given_then(tmp_path: Path) -> None:
+    path = tmp_path / "it.mcap"
+    drawn, given = random.Random(1), []
+    with mission_up() as mission, recording_to(mission, path) as recorder:
+        async with mission.bus() as bus:
+            await asyncio.sleep(1.0)
+            schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=2.0)
+            names = [*(one.arc for one in schedule.requests), *(one.rc for one in schedule.rcs)]
+            for _question in range(ASKED):
+                given.append(await bus.ask(RC_MANAGER, AskWhy(drawn.choice(names)), Why, within_s=2.0))
+                await asyncio.sleep(drawn.uniform(0.0, 0.1))
+        await asyncio.to_thread(ended, recorder)
+    assert len({why.state for why in given}) > 1
+    with path.open("rb") as file:
+        recording = Recording(file)
+        for why in drawn.sample(given, 40):
+            assert reasons_at(recording, why.name, why.at_s).why == why
+        found = decided_anew(recording)
+    assert (found.difference, found.missing) == (None, 0)
+    assert found.decisions > 5
 
 
 def test_a_recorder_that_hangs_delays_nobody(mission: RunningMission, tmp_path: Path) -> None:

@@ -1,0 +1,225 @@
+"""The schedule of a recording: at any instant, and decided anew.
+
+The RC manager tells recorders each event that it decides on. From a snapshot and the events after it a schedule manager
+decides again: so the schedule of each instant is known with all its reasons, and the recorded decisions can be compared
+with those of today's release, or of other rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import Any
+
+import msgspec
+
+from backbone.addresses import RC_MANAGER
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from backbone.rc_manager.messages import Decided, ScheduleSnapshot, TraceLine
+from backbone.recording.reader import Recorded, Recording
+from backbone.recording.revival import revived
+from backbone.scheduling import snapshot
+from backbone.scheduling.events import Event, Record
+from backbone.scheduling.own_planner import load_planner
+from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.schedule_manager import ScheduleManager
+
+_DECISIONS = tuple(f"{RC_MANAGER}/{conversation}" for conversation in (Conversation.DECISIONS, Conversation.ASK))
+
+
+class NotRecorded(Refusal):
+    """The recording does not have the schedule of that time."""
+
+    code = "recording.no_schedule"
+    remedy = "Choose a later time, or record from the begin: scout-backbone up MISSION.xml --record FILE.mcap."
+
+
+class NoSuchRule(Refusal):
+    """A rule of the scheduler is not known, or has no such value."""
+
+    code = "usage.rule"
+    remedy = "Name a rule and its value as the mission file does, such as policy=strict."
+
+
+def schedule_at(recording: Recording, at_s: float) -> ScheduleManager:
+    """Return a schedule manager in the state that the recorded one had at this mission time.
+
+    Raises:
+        NotRecorded: The recording has no snapshot before, or a decision is missing since.
+        NoSnapshot, OtherForm: The recording is of another release.
+    """
+    manager: ScheduleManager | None = None
+    number, lacks = 0, ""
+    for message in _in_order(recording.messages(_DECISIONS, 0.0, at_s, RC_MANAGER)):
+        match _told(message):
+            case ScheduleSnapshot() as begin:
+                manager, number, lacks = snapshot.read(begin.state), begin.number, ""
+            case Decided() as decided if manager is not None and decided.number > number:
+                if decided.number > number + 1:
+                    lacks = lacks or f"decisions are missing in the recording before {message.at_s:.3f} s"
+                number = decided.number
+                manager.handle(decided.event, decided.at_s)
+    if manager is None:
+        raise NotRecorded(f"the recording has no state of the schedule before {at_s:.3f} s")
+    if lacks:
+        raise NotRecorded(lacks)
+    return manager
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """The first decision that is not as recorded.
+
+    Attributes:
+        number: Of the decision.
+        at_s: Its mission time.
+        event: On which it was made.
+        recorded: Its lines and their causes, as recorded.
+        decided: The same, as decided now.
+    """
+
+    number: int
+    at_s: float
+    event: Event
+    recorded: tuple[Record, ...]
+    decided: tuple[Record, ...]
+
+
+@dataclass(slots=True)
+class Comparison:
+    """Decisions that were made anew, beside the recorded ones.
+
+    Attributes:
+        decisions: That were compared.
+        grants: Among their lines.
+        missing: Decisions of which the recording lacks the event or lines; nothing is said of these.
+        difference: The first one; None: all are the same.
+    """
+
+    decisions: int = 0
+    grants: int = 0
+    missing: int = 0
+    difference: Difference | None = None
+
+
+@dataclass(slots=True)
+class _Step:
+    """One recorded decision.
+
+    Attributes:
+        last: Number of the RC manager's message with its last line.
+        heard: Numbers of all its messages from the event on, with the first of the next decision.
+    """
+
+    decided: Decided
+    last: int
+    heard: list[int]
+    records: list[Record] = field(default_factory=list)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether no message is missing from the event to the one after the last line."""
+        return {*range(self.heard[0], self.last + 2)} <= {*self.heard}
+
+
+def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> Comparison:
+    """Let today's schedule manager decide on the recorded events, up to the first difference.
+
+    Args:
+        since_s: From the first snapshot after this mission time on.
+        rules: Other rules, by name, see ``SchedulingRules``; only for a recording from an RC manager's begin on.
+
+    Raises:
+        NotRecorded: The recording has no snapshot since, or rules were given and it has no begin.
+        NoSuchRule: There is none of this name, or it has no such value.
+        WrongPlanner: The planner among the rules is none.
+        NoSnapshot, OtherForm: The recording is of another release.
+    """
+    found = Comparison()
+    manager: ScheduleManager | None = None
+    number, began = 0, False
+    for step in _steps(recording, since_s):
+        if isinstance(step, ScheduleSnapshot):
+            if manager is None or step.number == 0:
+                manager, number, began = _first(step, rules), step.number, True
+            continue
+        if manager is None or step.decided.number <= number:
+            continue
+        found.missing += step.decided.number - number - 1
+        if step.decided.number != number + 1:
+            manager = None  # until the next snapshot
+            continue
+        number = step.decided.number
+        decided = [one for one in manager.handle(step.decided.event, step.decided.at_s) if isinstance(one, Record)]
+        recorded = step.records
+        if rules:  # they stand in the lines that begin a section
+            recorded, decided = ([one for one in lines if one.line["ev"] != "meta"] for lines in (recorded, decided))
+        is_same = [one.line for one in recorded] == [one.line for one in decided]
+        if not is_same and not step.is_whole:
+            found.missing += 1
+            continue
+        found.decisions += 1
+        found.grants += sum(one.line["ev"] == "grant" for one in recorded)
+        if not is_same:
+            of = step.decided
+            found.difference = Difference(number, of.at_s, of.event, tuple(recorded), tuple(decided))
+            return found
+    if not began:
+        raise NotRecorded("the recording has no state of the schedule")
+    return found
+
+
+def _first(begin: ScheduleSnapshot, rules: dict[str, Any]) -> ScheduleManager:
+    """Return the manager with which to decide anew."""
+    manager = snapshot.read(begin.state)
+    if not rules:
+        return manager
+    if begin.number:
+        raise NotRecorded("other rules need a recording from the begin of the mission on")
+    try:
+        chosen = msgspec.convert(msgspec.to_builtins(manager.rules) | rules, SchedulingRules)
+    except msgspec.ValidationError as error:
+        raise NoSuchRule(f"{error}; rules are {', '.join(SchedulingRules.__struct_fields__)}") from error
+    return manager.begun_anew(chosen, load_planner(chosen.planner))
+
+
+def _steps(recording: Recording, since_s: float) -> Iterator[ScheduleSnapshot | _Step]:
+    """Yield the snapshots, and the decisions with their lines."""
+    step: _Step | None = None
+    for message in _in_order(recording.messages(since_s=since_s, source=RC_MANAGER)):
+        told = _told(message)
+        if step is not None:
+            step.heard.append(message.sequence)
+            if isinstance(told, ScheduleSnapshot | Decided):
+                yield step
+                step = None
+        match told:
+            case ScheduleSnapshot():
+                yield told
+            case Decided():
+                step = _Step(told, message.sequence, [message.sequence])
+            case TraceLine() if step is not None:
+                step.last = message.sequence
+                step.records.append(Record(told.line, told.cause))
+    if step is not None:
+        yield step
+
+
+def _in_order(messages: Iterable[Recorded]) -> Iterator[Recorded]:
+    """Yield the messages of one sender in its order, also those of one instant."""
+    for _at_s, together in groupby(messages, lambda message: message.at_s):
+        yield from sorted(together, key=lambda message: message.sequence)
+
+
+def _told(message: Recorded) -> Decided | ScheduleSnapshot | TraceLine | None:
+    """Return the message if it is about decisions, else None."""
+    match message.schema:
+        case "Decided/1":
+            return revived(Decided, message.body)
+        case "ScheduleSnapshot/1":
+            return revived(ScheduleSnapshot, message.body)
+        case "TraceLine/2":
+            return revived(TraceLine, message.body)
+    return None

@@ -1,0 +1,130 @@
+"""The schedule of a recording: decided anew it is the same, and gives the reasons that were given live."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import pytest
+
+from backbone.addresses import RC_MANAGER
+from backbone.bus.clock import VirtualClock
+from backbone.keys import Conversation
+from backbone.recording.decisions import NoSuchRule, NotRecorded, decided_anew, schedule_at
+from backbone.recording.hearing import to_overhear
+from backbone.recording.known_messages import message_classes
+from backbone.recording.reader import Recorded, Recording
+from backbone.recording.reasons import reasons_at
+from backbone.recording.revival import revived
+from backbone.recording.writer import RecordingWriter
+from backbone.scheduling.explain.answers import Answers
+from backbone.scheduling.fairness import Turns
+from backbone.scheduling.own_planner import WrongPlanner
+from backbone.scheduling.views import Schedule
+from mission_control.laboratory.simulation import mission_run
+from mission_control.laboratory.simulation.mission_run import run_mission
+from mission_control.laboratory.simulation.unreliable_network import UnreliableNetwork
+
+CLASSES = message_classes()
+MOST_BYTES = 2**30
+SEEDS = range(20)
+
+RecordMission = Callable[..., Recording]
+
+
+@pytest.fixture
+def recorded(monkeypatch: pytest.MonkeyPatch) -> RecordMission:
+    """Return what plays the chaotic mission of a seed and returns the recording of it."""
+
+    def play(seed: int, leave_out: Callable[[str, bytes], bool] = lambda _key, _raw: False) -> Recording:
+        file = io.BytesIO()
+        writer = RecordingWriter(file, CLASSES, {})
+
+        class OverheardNetwork(UnreliableNetwork):
+            def __init__(self, *args: Any) -> None:
+                super().__init__(*args)
+                self._recorder = self.join("backbone/recorder", VirtualClock())
+                for conversation in to_overhear(()):
+                    self._recorder.overhear(conversation, self._heard, MOST_BYTES)
+
+            def _heard(self, key: str, raw: bytes) -> None:
+                if not leave_out(key, raw):
+                    writer.write(key, raw, 0.0)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(mission_run, "UnreliableNetwork", OverheardNetwork)
+            run_mission(seed, chaos=True)
+        writer.finish()
+        return Recording(file)
+
+    return play
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_decided_anew_all_decisions_are_as_recorded(recorded: RecordMission, seed: int):
+    found = decided_anew(recorded(seed))
+    assert found.difference is None
+    assert found.decisions > 10
+    assert found.missing == 0
+
+
+def test_the_first_decision_of_another_scheduler_is_named(recorded: RecordMission, monkeypatch: pytest.MonkeyPatch):
+    recordings = [recorded(seed) for seed in SEEDS]
+    monkeypatch.setattr(Turns, "seniority", lambda _self, arc, _now_s: (False, 0.0, -arc.stamp[0], -arc.stamp[1]))
+    found = [decided_anew(recording) for recording in recordings]
+    named = [one.difference for one in found if one.difference is not None]
+    assert named
+    assert all(one.recorded != one.decided for one in named)
+
+
+def test_with_other_rules_the_first_decision_that_differs_has_both_reasons(recorded: RecordMission):
+    found = [decided_anew(recorded(seed), policy="strict").difference for seed in SEEDS]
+    named = [one for one in found if one is not None]
+    assert named
+    lines = [line for one in named for line in (*one.recorded, *one.decided)]
+    assert any(line.cause for line in lines)
+
+
+def test_a_rule_that_is_none_is_refused(recorded: RecordMission):
+    recording = recorded(1)
+    for wrong in ({"polciy": "strict"}, {"policy": "lenient"}, {"aging_s": "soon"}, {"grace_s": -1}):
+        with pytest.raises(NoSuchRule):
+            decided_anew(recording, **wrong)
+    with pytest.raises(WrongPlanner):
+        decided_anew(recording, planner="os:path")
+
+
+def test_what_is_missing_is_counted_and_no_difference(recorded: RecordMission):
+    drawn = Random(1)
+
+    def lost(key: str, _raw: bytes) -> bool:
+        return f"/{RC_MANAGER}/" in key and drawn.random() < 0.05
+
+    found = [decided_anew(recorded(seed, lost)) for seed in (1, 2, 3)]
+    assert all(one.difference is None for one in found)
+    assert sum(one.missing for one in found) > 0
+
+
+def test_the_schedule_of_each_instant_is_the_one_that_was_published_then(recorded: RecordMission):
+    recording = recorded(4)
+    published = [one for one in recording.messages((f"{RC_MANAGER}/schedule",)) if one.schema == "Schedule/1"]
+    assert len(published) > 10
+    for message in Random(4).sample(published, 10):
+        assert schedule_then(recording, message) == revived(Schedule, message.body)
+
+
+def schedule_then(recording: Recording, message: Recorded) -> Schedule:
+    manager = schedule_at(recording, message.at_s)
+    return Answers(manager).schedule(message.body["at_s"])
+
+
+def test_without_a_snapshot_there_is_no_schedule(recorded: RecordMission):
+    recording = recorded(1, lambda key, _raw: key.endswith(f"/{Conversation.DECISIONS}"))
+    with pytest.raises(NotRecorded):
+        schedule_at(recording, 10.0)
+    with pytest.raises(NotRecorded):
+        reasons_at(recording, "nobody", 10.0)
+    with pytest.raises(NotRecorded):
+        decided_anew(recording)
