@@ -139,19 +139,23 @@ def up(
         float | None,
         typer.Option("--for", min=0.0, max=LONGEST_MISSION_S, callback=finite, help="End after these mission seconds."),
     ] = None,
+    record_to: Annotated[
+        Path | None, typer.Option("--record", metavar="FILE.mcap", help="Record all from the first message on.")
+    ] = None,
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
     description, text = read_or_exit(mission_file)
+    from backbone.launcher.core_launches import UpOptions
+
+    options = UpOptions(speed=speed, trace=trace, for_s=for_s, text=text, record=record_to)
     if detach:
         from backbone.launcher.detached import up_detached
 
-        raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
+        raise typer.Exit(up_detached(description.name, mission_file, options))
     from backbone.command_line.mission_console import bring_up_on_console
-    from backbone.launcher.core_launches import UpOptions
     from backbone.launcher.verdict import VerdictPipe
 
-    options = UpOptions(speed=speed, trace=trace, for_s=for_s, text=text)
     live = not headless and sys.stdout.isatty()
     verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
     run(lambda: bring_up_on_console(description, options, live=live, verdict=verdict))

@@ -61,6 +61,7 @@ def record_mission(
     keep: Annotated[
         int, typer.Option("--keep", min=0, max=1_000_000, help="Keep so many files, delete older ones; 0: all.")
     ] = 0,
+    is_described: Annotated[bool, typer.Option("--described", hidden=True)] = False,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
@@ -71,7 +72,7 @@ def record_mission(
     from backbone.command_line.recording_work import Splitting, record_to
 
     where, splitting = chosen(mission, connect, secret_file), Splitting(split_s, split_mb, keep)
-    run(lambda: record_to(where, to, keys or [], for_s, splitting))
+    run(lambda: record_to(where, to, keys or [], for_s, splitting, is_described=is_described))
 
 
 @record.command()

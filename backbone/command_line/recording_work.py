@@ -36,6 +36,7 @@ from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.naming import Subsystem, address
 from backbone.recording.files import RecordingFiles
+from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recording, missing_numbers, recover_file
 from backbone.recording.recorder import Recorder
 from backbone.recording.revival import revived
@@ -62,13 +63,21 @@ class Splitting:
 
 
 async def record_to(
-    where: Where, to: Path | None, keys: list[str], for_s: float | None, splitting: Splitting
+    where: Where, to: Path | None, keys: list[str], for_s: float | None, splitting: Splitting, *, is_described: bool
 ) -> ExitCode:
-    """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended."""
+    """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended.
+
+    Args:
+        is_described: True: the mission is described on standard input, because it cannot be asked yet.
+    """
     source = address(Subsystem.BACKBONE, f"recorder-{os.getpid()}")
     async with mission_connection.connected(where.mission, where.connect, source, where.secret()) as (bus, clock):
         path = to or Path(f"{bus.mission}-{datetime.now():%Y%m%d-%H%M%S}.mcap")
-        mission_xml, classes = await _mission_file(bus), await mission_classes(bus)
+        if is_described:
+            said = json.load(sys.stdin)
+            mission_xml, classes = said["mission_xml"], message_classes(said["modules"])
+        else:
+            mission_xml, classes = await _mission_file(bus), await mission_classes(bus)
         with _new_files(path, splitting.keep) as files:
             recorder = Recorder(
                 bus,

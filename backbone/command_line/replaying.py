@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -41,12 +42,14 @@ async def decide_anew(path: Path, since_s: float, rules: dict[str, Any], *, as_j
 
 def _lines(difference: Difference) -> list[str]:
     event = f"{type(difference.event).__name__} {json.dumps(plain(difference.event))}"
+    pairs = zip(difference.recorded, difference.decided, strict=False)
+    count = sum(1 for _pair in takewhile(lambda pair: pair[0].line == pair[1].line, pairs))
     return [
         f"decision {difference.number} at {difference.at_s:.3f} s, on {event}",
-        "  recorded:",
-        *map(_line, difference.recorded),
+        f"  recorded, after {counted(count, 'line')} that both have:",
+        *(map(_line, difference.recorded[count:]) if difference.recorded[count:] else ["    nothing"]),
         "  decided now:",
-        *map(_line, difference.decided),
+        *(map(_line, difference.decided[count:]) if difference.decided[count:] else ["    nothing"]),
     ]
 
 

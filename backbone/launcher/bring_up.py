@@ -29,6 +29,7 @@ from backbone.heaps import share_heaps
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, launcher_launch, service_launch
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.launcher.launcher import LISTING_TIME_S, Launcher
+from backbone.launcher.mission_recorder import MissionRecorder, require_new
 from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up
@@ -44,6 +45,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
         MissionAlreadyUp: A mission of this name runs on this machine.
         RunFolderUnusable: The run folder is not writable.
         TraceUnwritable: The trace is not writable.
+        RecorderFailed: The file of the recording exists, or cannot be written.
         BackboneError: The nameserver did not start.
     """
     began_s = time.monotonic()
@@ -51,6 +53,8 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     refuse_if_up(description.name)
     if options.trace is not None:
         run_files.require_writable(options.trace)
+    if options.record is not None:
+        require_new(options.record)
     directory = run_files.prepare(description.name)
     try:
         endpoint = prepare_endpoint(description, directory)
@@ -96,19 +100,33 @@ async def _with_hub(
             source=description.source,
         )
     )
+    recorder = MissionRecorder(description, options.text, options.record, clock) if options.record else None
     launcher = Launcher(
-        own, bus, clock, keeper=keeper, description=description, options=options, observer=observer, began_s=began_s
+        own,
+        bus,
+        clock,
+        keeper=keeper,
+        description=description,
+        options=options,
+        observer=observer,
+        began_s=began_s,
+        recorder=recorder,
     )
     loop = asyncio.get_running_loop()
     loop.add_signal_handler(signal.SIGTERM, launcher.end, signal.SIGTERM.name)
     loop.add_signal_handler(signal.SIGINT, launcher.interrupted)
     try:
+        if recorder is not None:
+            await recorder.begin()
         await run_with_heartbeat(own, clock, launcher.run(), lambda: launcher.feedback or str(launcher.state))
     except BackboneError as error:
         launcher.outcome.failure = launcher.outcome.failure or error
     finally:
+        await bus.close()  # if the launcher did not come to it
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.remove_signal_handler(number)
+        if recorder is not None:
+            await recorder.end()
         launcher.outcome.ended += await keeper.close()
     return launcher.outcome
 

@@ -30,12 +30,14 @@ class UpOptions:
         trace: File for the schedule trace, or None.
         for_s: Mission seconds from readiness to the end; None: until an order ends it.
         text: What the mission file holds: its tree is changed there. Empty: its tree cannot be changed.
+        record: File of the recording, or None.
     """
 
     speed: float = 1.0
     trace: Path | None = None
     for_s: float | None = None
     text: bytes = b""
+    record: Path | None = None
 
 
 def core_launches(description: MissionDescription, own: Launch, options: UpOptions) -> list[Launch]:

@@ -18,6 +18,7 @@ from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.errors import LinkError
 from backbone.launcher.bring_up import end_mission
+from backbone.launcher.core_launches import UpOptions
 from backbone.launcher.ending_messages import AwaitLastBranch, LastBranchOver
 from backbone.launcher.endings import ExitCode, say
 from backbone.launcher.verdict import await_verdict
@@ -28,16 +29,17 @@ ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty component
 SKIP_S = 0.5  # chosen: two signals in quick succession may become one
 
 
-def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path | None, for_s: float | None) -> int:
+def up_detached(mission: str, mission_file: Path, options: UpOptions) -> int:
     """Start a launcher in a session of its own; return 0 when all is ready, else the exit code of its failure.
 
     Only the launcher's verdict decides, because its process still lives while it cleans up after a failure.
     """
     told, telling = os.pipe()
     command = [sys.executable, "-m", "backbone.command_line.cli", "up", str(mission_file.absolute()), "--headless"]
-    command += ["--tell-fd", str(telling), "--speed", str(speed)]
-    command += ["--trace", str(trace.absolute())] if trace else []
-    command += ["--for", str(for_s)] if for_s is not None else []
+    command += ["--tell-fd", str(telling), "--speed", str(options.speed)]
+    command += ["--trace", str(options.trace.absolute())] if options.trace else []
+    command += ["--for", str(options.for_s)] if options.for_s is not None else []
+    command += ["--record", str(options.record.absolute())] if options.record else []
     launcher = subprocess.Popen(  # noqa: S603  our own command line
         command,
         stdin=subprocess.DEVNULL,

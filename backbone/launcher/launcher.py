@@ -29,6 +29,7 @@ from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch
 from backbone.launcher.last_run import run_last
 from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
+from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
@@ -70,8 +71,10 @@ class Launcher(Component[NoParameters]):
         options: UpOptions,
         observer: BringUpObserver,
         began_s: float,
+        recorder: MissionRecorder | None = None,
     ) -> None:
         super().__init__(launch, bus, clock)
+        self._recorder = recorder
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
         self._wishes: list[Wish] = []
@@ -109,6 +112,9 @@ class Launcher(Component[NoParameters]):
     async def serve(self) -> None:
         """Start the mission through the placer and keep it running; publish its health."""
         self.start_task(self._health_watch.run(), "health")
+        if self._recorder is not None:
+            self._recorder.on_changed = self._recorder_changed
+            self.start_task(self._recorder.keep(), "recorder")
         if self.launch.run_directory:
             self.start_task(NamesKeeper(self.bus, self.clock, Path(self.launch.run_directory)).run(), "names")
         try:
@@ -127,6 +133,10 @@ class Launcher(Component[NoParameters]):
         await first_of(watching, self._last_begins.wait())
         if not watching.cancelled():
             watching.result()
+
+    def _recorder_changed(self, line: str) -> None:
+        self.publish_event(self._description.name, line, LogLevel.WARNING)
+        self.changed()
 
     async def _end_after(self, mission_s: float) -> None:
         await self.clock.sleep_s(mission_s)
@@ -182,7 +192,8 @@ class Launcher(Component[NoParameters]):
         mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
         if self.outcome.ready_after_s is None:
             mission.append(Absence(self._description.name, 0.0, "the mission is coming up", self._being_started()))
-        return [*core, *mission, *self._others.absences()]
+        lost = self._recorder.absence() if self._recorder is not None else None
+        return [*core, *mission, *self._others.absences(), *([lost] if lost is not None else [])]
 
     def _being_started(self) -> str:
         """Return the components for which the start waits, with their feedback."""

@@ -11,7 +11,7 @@ import logging
 import shutil
 from collections.abc import Mapping
 
-from backbone.addresses import NAMESERVER, RC_MANAGER
+from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Overhearing, Reply
 from backbone.component.messages import (
     AskParameters,
@@ -26,16 +26,16 @@ from backbone.component.messages import (
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.keys import key as key_of
-from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import component_of
 from backbone.rc_manager.messages import AskSchedule, AskSnapshot, ScheduleSnapshot
 from backbone.recording.files import SPLIT_BYTES, SPLIT_S, RecordingFiles
 from backbone.recording.hearing import to_overhear
+from backbone.recording.presence import Presence
 from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
 from backbone.waiting import set_within
-from backbone.wire import Message
+from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
 FLUSH_EACH_S = 0.4  # chosen: below the half second that a killed recorder may lose; seconds of the machine
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
@@ -86,9 +86,10 @@ class Recorder:
         self._writer, self._before = self._new_writer(), 0
         self._begun_s = clock.now_s()
         self._subscribed: list[Overhearing] = []
+        self._appeared: asyncio.Queue[str] = asyncio.Queue()
         self._awaited, self._was_told = "", asyncio.Event()
         self._bug: BaseException | None = None
-        self._one_at_a_time, self._new_file = asyncio.Lock(), asyncio.Event()
+        self._one_at_a_time, self._needs_snapshot = asyncio.Lock(), asyncio.Event()
         self._ended = asyncio.Event()
         self._has_link = True
         self.full = ""
@@ -117,6 +118,7 @@ class Recorder:
         self._bus.on_bug = self._fail
         for conversation in to_overhear(self._keys):
             self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
+        self._bus.watch_alive("*/*", self._alive_changed)
         self._bus.watch_link(self._link_changed)
         self._say(f"{self._who} records the mission to {self._files.path.name}", LogLevel.NOTICE)
         asking = asyncio.create_task(self._ask(), name="what was said before")
@@ -164,7 +166,7 @@ class Recorder:
         self._files.open_next()
         self._before, self._begun_s = self.written, self._clock.now_s()
         self._writer = self._new_writer()
-        self._new_file.set()
+        self._needs_snapshot.set()
 
     def _new_writer(self) -> RecordingWriter:
         return RecordingWriter(self._files.file, *self._facts)
@@ -189,6 +191,13 @@ class Recorder:
     def _link_changed(self, is_up: bool) -> None:
         self._has_link = is_up
 
+    def _alive_changed(self, address: str, alive: bool) -> None:
+        now_s = self._clock.now_s()
+        raw = write(Envelope(WIRE_VERSION, "", 0, now_s, "", Presence(alive)))
+        self._heard(key_of(self._bus.mission, address, Conversation.ALIVE), raw)
+        if alive:
+            self._appeared.put_nowait(address)
+
     @property
     def _who(self) -> str:
         return self._user or component_of(self._bus.source)
@@ -211,23 +220,25 @@ class Recorder:
     async def _ask(self) -> None:
         """Ask for what was said before anybody overheard it; the answers come as all others do."""
         if Conversation.TOLD in to_overhear(self._keys):
-            await asyncio.gather(self._ask_for_snapshots(), self._ask_all())
+            await asyncio.gather(self._ask_for_snapshots(), self._ask_who_appears())
 
     async def _ask_for_snapshots(self) -> None:
         """Ask for the state of the schedule again and again, and at the begin of each file."""
         while True:
-            self._new_file.clear()
+            self._needs_snapshot.clear()
             answer = await self._asked(RC_MANAGER, AskSnapshot(), ScheduleSnapshot)
             size_bytes = len(answer.state) if answer is not None else 0
-            await set_within(self._new_file, max(SNAPSHOT_EACH_S, size_bytes * SNAPSHOT_S_PER_BYTE))
+            await set_within(self._needs_snapshot, max(SNAPSHOT_EACH_S, size_bytes * SNAPSHOT_S_PER_BYTE))
 
-    async def _ask_all(self) -> None:
-        listed = await self._asked(NAMESERVER, ListComponents(), Components)
-        await self._asked(RC_MANAGER, AskSchedule(), Schedule)
-        for component in listed.components if listed is not None else ():
-            await self._asked(component.address, AskState(), ComponentState)
-            await self._asked(component.address, AskParameters(), Parameters)
-            await self._asked(component.address, AskStory(), Story)
+    async def _ask_who_appears(self) -> None:
+        while True:
+            address = await self._appeared.get()
+            if address == RC_MANAGER:
+                self._needs_snapshot.set()
+                await self._asked(address, AskSchedule(), Schedule)
+            await self._asked(address, AskState(), ComponentState)
+            await self._asked(address, AskParameters(), Parameters)
+            await self._asked(address, AskStory(), Story)
 
     async def _asked(self, address: str, question: Message, reply: type[Reply]) -> Reply | None:
         """Return the answer once it was overheard too; None: there is none."""

@@ -11,11 +11,12 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from running_mission import BIN, MISSION_XML, RunningMission, mission_up
 from tutorial_commands import run_all
@@ -153,6 +154,49 @@ async def test_reasons_of_any_instant_are_those_that_were_given_then(tmp_path: P
         found = decided_anew(recording)
     assert (found.difference, found.missing) == (None, 0)
     assert found.decisions > 5
+
+
+def test_a_mission_that_was_brought_up_with_a_recording_has_it_from_the_first_decision_on(tmp_path: Path) -> None:
+    path = tmp_path / "it.mcap"
+    with mission_up("--record", str(path)) as mission:
+        time.sleep(2.0)
+        assert mission.down() == 0, mission.story()
+    with path.open("rb") as file:
+        recording = Recording(file)
+        assert decided_anew(recording, policy="strict").decisions > 5
+        for alive in (True, False):
+            seen = {one.key.split("/")[3] for one in recording.messages(("*/alive",)) if one.body["alive"] is alive}
+            assert seen >= {"rc_manager", "placer", "scout1", "watch-scout1"}, alive
+        assert "<mission" in recording.mission_xml()
+
+
+def test_a_recorder_that_is_killed_is_absent_until_the_recording_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "it.mcap"
+    with mission_up("--record", str(path)) as mission:
+        [recorder] = [one for one in psutil.Process(mission.launcher.pid).children() if "record" in one.cmdline()]
+        recorder.kill()
+        wait_for(lambda: "recorder" in {one["name"] for one in mission.status()["absent"]}, mission)
+        wait_for(lambda: mission.status()["health"] == "ok", mission)
+        assert mission.down() == 0, mission.story()
+    assert path.with_stem("it-2").stat().st_size > 0
+    assert messages(path.with_stem("it-2"))
+
+
+def test_a_recording_that_exists_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    path = tmp_path / "it.mcap"
+    path.write_bytes(b"another")
+    words = [str(BIN / "scout-backbone"), "up", str(MIXED), "--headless", "--record", str(path)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (4, "")
+    assert "exists" in done.stderr
+    assert path.read_bytes() == b"another"
+
+
+def wait_for(holds: Callable[[], bool], mission: RunningMission) -> None:
+    until_s = time.monotonic() + 15.0
+    while not holds():
+        assert time.monotonic() < until_s, mission.story()
+        time.sleep(0.05)
 
 
 def test_a_recorder_that_hangs_delays_nobody(mission: RunningMission, tmp_path: Path) -> None:

@@ -1,0 +1,166 @@
+"""The recorder of a mission that was brought up with ``--record``: a process of its own, which the launcher wants.
+
+It begins before the first component and ends after the last. If it ends early, the recording goes on in a further file;
+if its file can grow no more, it is absent with the reason.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import os
+import sys
+from asyncio.subprocess import DEVNULL, PIPE, Process
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from backbone.bus.interface import Clock
+from backbone.component.messages import Absence
+from backbone.errors import Refusal
+from backbone.launcher.endings import ExitCode
+from backbone.mission.model import MissionDescription
+
+BEGUN_WITHIN_S = 20.0  # chosen: as long as a component has to become ready
+ENDED_WITHIN_S = 10.0  # chosen: it writes the index of an hour in less than a second
+AGAIN_AFTER_S = 1.0  # chosen: what killed it may be over; seconds of the machine
+NAME = "recorder"
+
+log = logging.getLogger(__name__)
+
+
+class RecorderFailed(Refusal):
+    """The mission cannot be recorded to this file."""
+
+    code = "run.recorder"
+    remedy = "Name a new file in a folder where this user may write, or bring the mission up without --record."
+
+
+def require_new(path: Path) -> None:
+    """Return if a recording can begin in this file.
+
+    Raises:
+        RecorderFailed: It exists, or this user may not write in its folder.
+    """
+    if path.exists():
+        raise RecorderFailed(f"{path} exists")
+    if not os.access(path.absolute().parent, os.W_OK):
+        raise RecorderFailed(f"{path.absolute().parent} cannot be written")
+
+
+class MissionRecorder:
+    """Keeps one recorder running.
+
+    Args:
+        description: The mission.
+        text: Its file.
+        path: Of the recording.
+
+    Attributes:
+        on_changed: Called with one line for people when the recorder was lost, or goes on.
+    """
+
+    def __init__(self, description: MissionDescription, text: bytes, path: Path, clock: Clock) -> None:
+        self.on_changed: Callable[[str], None] = lambda _line: None
+        self._mission, self._path, self._clock = description.name, path.absolute(), clock
+        modules = sorted({kind.class_path.partition(":")[0] for kind in description.types})
+        self._facts = json.dumps({"mission_xml": text.decode(), "modules": modules}).encode()
+        self._process: Process | None = None
+        self._reading: asyncio.Task[str] | None = None
+        self._absence: Absence | None = None
+        self._files = 0
+
+    def absence(self) -> Absence | None:
+        """Return the recorder as absent while it does not run."""
+        return self._absence
+
+    async def begin(self) -> None:
+        """Start the recorder; return when it listens.
+
+        Raises:
+            RecorderFailed: It did not begin; the detail says why.
+        """
+        self._files += 1
+        number = f"-{self._files}" if self._files > 1 else ""
+        path = self._path.with_stem(f"{self._path.stem}{number}")
+        command = ["-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
+        self._process = process = await asyncio.create_subprocess_exec(
+            *(sys.executable, *command, "--described"),
+            stdin=PIPE,
+            stdout=DEVNULL,
+            stderr=PIPE,
+            start_new_session=True,  # Ctrl-C at the terminal ends the launcher, which ends the recorder last
+        )
+        try:
+            async with asyncio.timeout(BEGUN_WITHIN_S):
+                said = await self._tell_facts(process)
+        except TimeoutError:
+            said = f"it did not begin within {BEGUN_WITHIN_S:g} s"
+        self._reading = asyncio.create_task(_last_line(process), name="what the recorder says")
+        if not said.startswith("records to"):
+            await self.end()
+            raise RecorderFailed(f"the recorder did not begin: {said.strip() or 'it ended without a word'}")
+
+    async def keep(self) -> None:
+        """Start the recorder again whenever it ended, until cancelled."""
+        while self._process is not None:
+            process, last = self._process, await self._ended()
+            if process.returncode == ExitCode.REFUSED:
+                self._lost(last, "", "Free disc space, or bring the mission up with another file.")
+                return
+            self._lost(last, "the recording goes on in a further file")
+            await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+            try:
+                await self.begin()
+            except RecorderFailed as error:
+                self._lost(error.detail, "", error.remedy)
+                return
+            self._absence = None
+            self.on_changed("the recording goes on")
+
+    async def end(self) -> None:
+        """End the recorder once its file is whole. Idempotent."""
+        process = self._process
+        if process is None:
+            return
+        with suppress(ProcessLookupError):
+            process.terminate()
+        try:
+            async with asyncio.timeout(ENDED_WITHIN_S):
+                await self._ended()
+        except TimeoutError:
+            log.warning("the recorder did not end; its file can be recovered")
+            process.kill()
+            await self._ended()
+        self._process = None
+
+    async def _tell_facts(self, process: Process) -> str:
+        """Tell it what it cannot ask for yet; return the first line that it says."""
+        assert process.stdin is not None and process.stderr is not None  # noqa: S101, PT018  both are pipes
+        with suppress(ConnectionError):
+            process.stdin.write(self._facts)
+            await process.stdin.drain()
+        process.stdin.close()
+        return (await process.stderr.readline()).decode(errors="replace")
+
+    async def _ended(self) -> str:
+        """Return the last line that it said, or its exit code, when it has ended."""
+        assert self._process is not None and self._reading is not None  # noqa: S101, PT018  it was begun
+        last = await asyncio.shield(self._reading)
+        return last or f"exit code {await self._process.wait()}"
+
+    def _lost(self, cause: str, doing: str, remedy: str = "") -> None:
+        self._absence = Absence(NAME, self._clock.now_s(), cause, doing, remedy)
+        self.on_changed(f"lost its recorder: {cause}{f'; {doing}' if doing else ''}")
+
+
+async def _last_line(process: Process) -> str:
+    """Return the last line that the process says, when it has ended."""
+    assert process.stderr is not None  # noqa: S101  a pipe
+    last = ""
+    async for line in process.stderr:
+        last = line.decode(errors="replace").strip()
+        log.info("recorder: %s", last)
+    await process.wait()
+    return last
