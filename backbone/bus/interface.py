@@ -109,6 +109,9 @@ class Bus(Protocol):
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Send the message to all present subscribers. Never waits, and needs no subscriber."""
 
+    def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
+        """Send a message of another sender to all present subscribers, as it was: for replays."""
+
     @overload
     def subscribe(
         self,

@@ -326,6 +326,12 @@ class LocalBus(Neighbor):
         if conversation in NEVER_DROPPED:
             self.tell(address, conversation, envelope)
 
+    def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
+        """Send a message of another sender; see ``Bus.pass_on``."""
+        if not self.closed:
+            _check(self.mission, address)
+            self.publish_to_neighbors(address, conversation, envelope)
+
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Listening:

@@ -28,7 +28,7 @@ from backbone.bus.interface import (
 from backbone.bus.local_bus import LocalNetwork, Neighbor
 from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session, watch_links
 from backbone.keys import NEVER_DROPPED, Conversation
-from backbone.wire import Accepts, Message
+from backbone.wire import Accepts, Envelope, Message
 
 AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
 
@@ -83,6 +83,11 @@ class SharedBus(Neighbor, ZenohBus):
             self.publish_to_neighbors(address, conversation, envelope)
             if conversation in NEVER_DROPPED:
                 self.tell(address, conversation, envelope)
+
+    def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
+        """Send a message of another sender, to neighbors too; see ``Bus.pass_on``."""
+        super().pass_on(address, conversation, envelope)
+        self.publish_to_neighbors(address, conversation, envelope)
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False

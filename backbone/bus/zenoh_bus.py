@@ -284,6 +284,11 @@ class ZenohBus(InboxBus):
         publisher.put(write(envelope))
         return envelope
 
+    def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
+        """Send a message of another sender; see ``Bus.pass_on``."""
+        if not self.closed:
+            self._publisher(address, conversation).put(write(envelope))
+
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether another process hears this conversation of its own address; 0.5 µs."""
         publisher = cast("Any", self._publisher(self.source, conversation))  # zenoh's stubs say bool of its status

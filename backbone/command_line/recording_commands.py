@@ -17,6 +17,7 @@ from backbone.command_line.options import (
     MissionName,
     SecretFile,
     chosen,
+    finite,
     named_value,
     run,
 )
@@ -164,24 +165,41 @@ def print_mission(file: File) -> None:
 
 def replay(
     file: File,
+    speed: Annotated[
+        float, typer.Option("--speed", min=0.01, max=100.0, callback=finite, help="Mission seconds a second.")
+    ] = 1.0,
+    is_stepped: Annotated[
+        bool, typer.Option("--step", help="Message by message: a line of input plays the one that is shown.")
+    ] = False,
+    since_s: Annotated[
+        float | None, typer.Option("--from", min=0.0, help="Begin at this mission time; default: at the begin.")
+    ] = None,
+    keys: Keys = None,
     without: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option("--without", metavar="NAME", help="Run this component instead of its recording: rc_manager."),
-    ],
+    ] = None,
     rules: Annotated[
         list[str] | None,
-        typer.Option("--rule", metavar="NAME=VALUE", help="Another rule, as 'policy=strict'; repeatable."),
+        typer.Option("--rule", metavar="NAME=VALUE", help="Another rule of the rc_manager, as 'policy=strict'."),
     ] = None,
-    since: Annotated[float, typer.Option("--from", min=0.0, help="Not before this mission time, seconds.")] = 0.0,
     as_json: AsJson = False,
+    mission: Annotated[
+        str | None, typer.Option("--mission", help="Name under which it is up; default: that of the recording.")
+    ] = None,
 ) -> None:
-    """Let today's scheduler decide on what was recorded, and tell the first decision that is not as recorded."""
-    from backbone.command_line.replaying import decide_anew
+    """Play a recording as a mission that is up; --without rc_manager lets today's scheduler decide on it instead."""
+    from backbone.command_line import replaying
 
-    if without != ["rc_manager"]:
-        raise typer.BadParameter("only the rc_manager can be run on a recording: --without rc_manager")
-    chosen_rules = dict(named_value(rule) for rule in rules or [])
-    run(lambda: decide_anew(file, since, chosen_rules, as_json=as_json))
+    if without:
+        if without != ["rc_manager"]:
+            raise typer.BadParameter("only the rc_manager can be run on a recording: --without rc_manager")
+        chosen_rules = dict(named_value(rule) for rule in rules or [])
+        run(lambda: replaying.decide_anew(file, since_s or 0.0, chosen_rules, as_json=as_json))
+    if rules or as_json:
+        raise typer.BadParameter("--rule and --json are for --without rc_manager")
+    wanted = replaying.Playing(mission, since_s, speed, is_stepped, tuple(keys or ()))
+    run(lambda: replaying.play(file, wanted))
 
 
 def watch(

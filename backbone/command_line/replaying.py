@@ -1,18 +1,36 @@
-"""The work of ``scout-backbone replay`` and ``scout-backbone recording why``: the decisions of a recording."""
+"""The work of ``scout-backbone replay`` and ``scout-backbone recording why``."""
 
 from __future__ import annotations
 
+import asyncio
 import json
+import os
+import signal
+import socket
+import sys
+import time
+from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
+from backbone import run_files
+from backbone.authentication import socket_endpoint
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, hub_config
+from backbone.command_line.message_lines import message_line
 from backbone.command_line.recording_work import opened
 from backbone.launcher.endings import ExitCode, say, show
+from backbone.launcher.preconditions import refuse_if_up
+from backbone.naming import Subsystem, legal
 from backbone.recording.decisions import Comparison, Difference, decided_anew
+from backbone.recording.known_messages import message_classes
+from backbone.recording.player import Player
+from backbone.recording.reader import Contents, Recorded, Recording
 from backbone.recording.reasons import reasons_at
 from backbone.scheduling.events import Record
 from backbone.spoken import counted
+from backbone.waiting import first_of
 from backbone.wire import plain
 
 
@@ -38,6 +56,92 @@ async def decide_anew(path: Path, since_s: float, rules: dict[str, Any], *, as_j
     if found.missing:
         say(f"nothing is said of {counted(found.missing, 'decision')} that the recording does not have whole")
     return ExitCode.DONE if found.difference is None else ExitCode.REFUSED
+
+
+@dataclass(frozen=True)
+class Playing:
+    """How a recording is played.
+
+    Attributes:
+        mission: Name under which it is up; None: as it was.
+        since_s: Mission time at which it begins; None: with its first message.
+        speed: Mission seconds per second of the machine.
+        is_stepped: True: message by message, each after a line from standard input.
+        keys: Patterns of the keys whose publications are played; none: all.
+    """
+
+    mission: str | None
+    since_s: float | None
+    speed: float
+    is_stepped: bool
+    keys: tuple[str, ...]
+
+
+async def play(path: Path, wanted: Playing) -> ExitCode:
+    """Play a recording as a mission that is up, until a person ends it."""
+    with opened(path) as recording:
+        found = recording.contents()
+        name = wanted.mission or legal(found.about.get("mission", "recording"))
+        refuse_if_up(name)
+        directory = run_files.prepare(name)
+        try:
+            await _play_in(directory, name, path, recording, found, wanted)
+        finally:
+            run_files.remove(name)
+    return ExitCode.DONE
+
+
+async def _play_in(
+    directory: Path, name: str, path: Path, recording: Recording, found: Contents, wanted: Playing
+) -> None:
+    since_s = found.begin_s if wanted.since_s is None else wanted.since_s
+    endpoint, clock = socket_endpoint(directory), MissionClock(time.monotonic() - since_s / wanted.speed, wanted.speed)
+    bus = await ZenohBus.open_when_up(name, f"{Subsystem.BACKBONE}/replay", clock, hub_config([endpoint]))
+    ended = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    player = Player(
+        bus,
+        clock,
+        recording,
+        message_classes(),
+        since_s=since_s,
+        keys=wanted.keys,
+        next_step=_asked_for_step if wanted.is_stepped else None,
+    )
+    player.ends = ended.set
+    try:
+        player.begin()
+        clock.origin_monotonic_s = time.monotonic() - since_s / wanted.speed
+        run_files.write(
+            run_files.RunFile(
+                mission=name,
+                endpoint=endpoint,
+                launcher_pid=os.getpid(),
+                clock_origin_monotonic_s=clock.origin_monotonic_s,
+                clock_rate=clock.rate,
+                host=socket.gethostname(),
+                source=str(path),
+            )
+        )
+        say(f"plays {path} from {since_s:.3f} s on as mission {name}; Ctrl-C ends it")
+        await first_of(_play_to_end(player), ended.wait())
+    finally:
+        await bus.close()
+
+
+async def _play_to_end(player: Player) -> None:
+    await player.run()
+    say(f"that was all, {counted(player.played, 'publication')}; questions are still answered")
+    await asyncio.Event().wait()
+
+
+async def _asked_for_step(message: Recorded) -> None:
+    """Print the message that comes next, and return when a line was read."""
+    show([message_line(message)])
+    line = await asyncio.to_thread(sys.stdin.readline)
+    if not line:
+        await asyncio.Event().wait()
 
 
 def _lines(difference: Difference) -> list[str]:

@@ -43,6 +43,37 @@ class NoSuchRule(Refusal):
     remedy = "Name a rule and its value as the mission file does, such as policy=strict."
 
 
+class RecordedSchedule:
+    """The schedule by what the RC manager told recorders.
+
+    Attributes:
+        manager: In the state that the recorded one had; None: not known.
+        lacks: Why it is not known.
+    """
+
+    def __init__(self) -> None:
+        self.manager: ScheduleManager | None = None
+        self.lacks = "the recording has no state of the schedule"
+        self._number = 0
+
+    def take(self, told: Decided | ScheduleSnapshot) -> None:
+        """Go on to the next event, or to the state of a snapshot.
+
+        Raises:
+            NoSnapshot: The snapshot is of another release.
+        """
+        match told:
+            case ScheduleSnapshot():
+                if self.manager is None or told.number != self._number:
+                    self.manager, self._number = snapshot.read(told.state), told.number
+            case Decided() if self.manager is not None and told.number == self._number + 1:
+                self._number += 1
+                self.manager.handle(told.event, told.at_s)
+            case Decided() if self.manager is not None and told.number > self._number:
+                self.manager = None
+                self.lacks = f"decisions are missing in the recording before {told.at_s:.3f} s"
+
+
 def schedule_at(recording: Recording, at_s: float) -> ScheduleManager:
     """Return a schedule manager in the state that the recorded one had at this mission time.
 
@@ -50,22 +81,14 @@ def schedule_at(recording: Recording, at_s: float) -> ScheduleManager:
         NotRecorded: The recording has no snapshot before, or a decision is missing since.
         NoSnapshot, OtherForm: The recording is of another release.
     """
-    manager: ScheduleManager | None = None
-    number, lacks = 0, ""
+    schedule = RecordedSchedule()
     for message in _in_order(recording.messages(_DECISIONS, 0.0, at_s, RC_MANAGER)):
-        match _told(message):
-            case ScheduleSnapshot() as begin:
-                manager, number, lacks = snapshot.read(begin.state), begin.number, ""
-            case Decided() as decided if manager is not None and decided.number > number:
-                if decided.number > number + 1:
-                    lacks = lacks or f"decisions are missing in the recording before {message.at_s:.3f} s"
-                number = decided.number
-                manager.handle(decided.event, decided.at_s)
-    if manager is None:
-        raise NotRecorded(f"the recording has no state of the schedule before {at_s:.3f} s")
-    if lacks:
-        raise NotRecorded(lacks)
-    return manager
+        told = _told(message)
+        if isinstance(told, Decided | ScheduleSnapshot):
+            schedule.take(told)
+    if schedule.manager is None:
+        raise NotRecorded(f"{schedule.lacks}, asked for {at_s:.3f} s")
+    return schedule.manager
 
 
 @dataclass(frozen=True, slots=True)

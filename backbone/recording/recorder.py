@@ -11,7 +11,7 @@ import logging
 import shutil
 from collections.abc import Mapping
 
-from backbone.addresses import RC_MANAGER
+from backbone.addresses import COMPONENT_DATABASE, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Overhearing, Reply
 from backbone.component.messages import (
     AskParameters,
@@ -23,6 +23,7 @@ from backbone.component.messages import (
     Story,
     StoryEvent,
 )
+from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.keys import key as key_of
@@ -236,6 +237,8 @@ class Recorder:
             if address == RC_MANAGER:
                 self._needs_snapshot.set()
                 await self._asked(address, AskSchedule(), Schedule)
+            if address == COMPONENT_DATABASE:
+                await self._asked(address, ListTypes(), Types)
             await self._asked(address, AskState(), ComponentState)
             await self._asked(address, AskParameters(), Parameters)
             await self._asked(address, AskStory(), Story)

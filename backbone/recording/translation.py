@@ -61,8 +61,8 @@ class Translator:
             return self._unknown(raw, heard_s)
         kind = type(envelope.body)
         try:
-            named = _named(envelope.body)
-            return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, named, heard_s, len(raw))
+            fields = named(envelope.body)
+            return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, fields, heard_s, len(raw))
         except _UNSPEAKABLE:
             return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
 
@@ -93,15 +93,15 @@ def _translated(
     return Translated(schema, envelope.source, envelope.sequence, envelope.stamp_s, kind, data, size_bytes)
 
 
-def _named(body: msgspec.Struct) -> dict[str, Any]:
+def named(body: msgspec.Struct) -> dict[str, Any]:
     """Return the fields of a message by name; a message inside it has its schema beside them."""
     return {name: _value(getattr(body, name)) for name in body.__struct_fields__}
 
 
 def _value(value: object) -> Any:
     if isinstance(value, msgspec.Struct):
-        named = _named(value)
-        return {TAG: schema_of(type(value)), **named} if isinstance(value, Message) else named
+        fields = named(value)
+        return {TAG: schema_of(type(value)), **fields} if isinstance(value, Message) else fields
     if isinstance(value, list | tuple | set | frozenset):
         return [_value(each) for each in value]
     if isinstance(value, dict):

@@ -1,0 +1,127 @@
+"""Player: a recording on a bus, as if its mission were up.
+
+Each publication comes as it was sent, at its own mission time; questions get the answers that the recorded mission
+gave; tokens of liveliness rise and fall. Nothing can be commanded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial, reduce
+from operator import or_
+
+from backbone.addresses import LAUNCHER, NAMESERVER
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.keys import Conversation, address_of
+from backbone.launcher.ending_messages import EndMission, MissionEnding
+from backbone.recording.hearing import is_meant
+from backbone.recording.reader import Recorded, Recording
+from backbone.recording.recorded_mission import RecordedMission
+from backbone.wire import WIRE_VERSION, Envelope, Message
+
+_PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, Conversation.TOLD}
+
+
+class Player:
+    """Plays one recording from a mission time on.
+
+    Args:
+        bus: Of a hub of its own.
+        clock: Shows ``since_s`` when ``run`` begins.
+        recording: Read while it runs.
+        classes: Known message classes, by schema.
+        since_s: Mission time at which it begins; what was said before is known.
+        keys: Patterns of the keys whose publications are played; none: all.
+        next_step: Awaited before each publication, with the message; None: play in the recorded time.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        recording: Recording,
+        classes: Mapping[str, type[Message]],
+        *,
+        since_s: float,
+        keys: tuple[str, ...] = (),
+        next_step: Callable[[Recorded], Awaitable[None]] | None = None,
+    ) -> None:
+        self._bus, self._clock, self._recording = bus, clock, recording
+        self._since_s, self._keys, self._next_step = since_s, keys, next_step
+        self._mission = RecordedMission(classes, clock.rate)
+        self._accepts = reduce(or_, classes.values())
+        self._tokens: dict[str, Subscription] = {}
+        self._served: dict[str, Subscription] = {}
+        self.ends: Callable[[], None] = lambda: None
+        """Called when a person orders the mission to end."""
+        self.played = 0
+        """Publications so far."""
+
+    def begin(self) -> None:
+        """Take in what was said before, answer questions, and say what a newcomer must know.
+
+        Raises:
+            NoRecording: The recording is damaged.
+        """
+        for address in (NAMESERVER, LAUNCHER):
+            self._serve(address)
+        for message in self._recording.messages(until_s=math.nextafter(self._since_s, -math.inf)):
+            self._mission.take(message)
+            self._serve(address_of(message.key))
+        for address in self._mission.present:
+            self._tokens[address] = self._bus.declare_alive(address)
+        for message in self._mission.newest():
+            said = self._mission.message_of(message)
+            if said is not None:
+                self._publish(message, said)
+
+    async def run(self) -> None:
+        """Play to the end of the recording; then what was last said goes on being answered.
+
+        Raises:
+            NoRecording: The recording is damaged from here on.
+        """
+        for message in self._recording.messages(since_s=self._since_s):
+            await self._play(message)
+
+    async def _play(self, message: Recorded) -> None:
+        if self._next_step is None:
+            await self._clock.sleep_until_s(message.at_s)
+        elif self._is_published(message):
+            await self._next_step(message)
+        said = self._mission.take(message)
+        address = address_of(message.key)
+        self._serve(address)
+        if message.key.endswith(f"/{Conversation.ALIVE}"):
+            self._token_changed(address)
+        elif said is not None and self._is_published(message):
+            self._publish(message, said)
+            self.played += 1
+
+    def _is_published(self, message: Recorded) -> bool:
+        is_wanted = not self._keys or is_meant(message.key, self._keys)
+        return is_wanted and message.key.rpartition("/")[2] in _PUBLISHED
+
+    def _publish(self, message: Recorded, said: Message) -> None:
+        envelope = Envelope(WIRE_VERSION, message.source, message.sequence, message.stamp_s, message.cause, said)
+        self._bus.pass_on(address_of(message.key), Conversation(message.key.rpartition("/")[2]), envelope)
+
+    def _token_changed(self, address: str) -> None:
+        if address in self._mission.present and address not in self._tokens:
+            self._tokens[address] = self._bus.declare_alive(address)
+        elif address not in self._mission.present and address in self._tokens:
+            self._tokens.pop(address).close()
+            self._served.pop(address).close()
+
+    def _serve(self, address: str) -> None:
+        if address not in self._served:
+            self._served[address] = self._bus.serve(address, self._accepts, partial(self._answer, address))
+
+    async def _answer(self, address: str, asked: Envelope[Message]) -> Message:
+        if isinstance(asked.body, EndMission) and address == LAUNCHER:
+            self.ends()
+            return MissionEnding("", 0.0)
+        if self._next_step is None:
+            self._mission.now_s = max(self._mission.now_s, self._clock.now_s())
+        return self._mission.answer(address, asked.body)

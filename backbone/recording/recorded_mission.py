@@ -1,0 +1,171 @@
+"""A mission as a recording has it at one instant: who is there, and what its components answer. Pure."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+
+import msgspec
+
+from backbone.addresses import NAMESERVER
+from backbone.component.messages import (
+    AskState,
+    AskTime,
+    ComponentState,
+    MissionTime,
+    Register,
+    Registered,
+    StoryEvent,
+)
+from backbone.errors import Refusal
+from backbone.keys import Conversation, address_of
+from backbone.mission_log.log import AskLog, MissionLog
+from backbone.mission_log.operators import OperatorActed
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.naming import component_of
+from backbone.rc_manager.messages import AskSchedule, AskWhy, Decided, ScheduleSnapshot
+from backbone.recording.decisions import RecordedSchedule
+from backbone.recording.presence import Presence
+from backbone.recording.reader import Recorded
+from backbone.recording.revival import OtherForm, revived
+from backbone.recording.translation import named
+from backbone.scheduling.explain.answers import Answers
+from backbone.wire import Message, schema_of
+
+READS = ("Ask", "List", "Resolve")
+"""First words of questions that change nothing."""
+STATES = frozenset({Conversation.STATUS, Conversation.SCHEDULE, Conversation.HEALTH, Conversation.POSES})
+"""Conversations whose newest message is what a newcomer must know."""
+MOST_OPEN = 1000  # chosen: questions under way at one time; the others were never answered
+
+
+class TakesNoCommands(Refusal):
+    """What happened cannot be commanded."""
+
+    code = "recording.only"
+    remedy = "Bring the mission up to command it: scout-backbone recording mission FILE > mission.xml, then 'up'."
+
+
+class NotAnswered(Refusal):
+    """The component did not answer this question until then."""
+
+    code = "recording.not_answered"
+    remedy = "Go to a later time of the recording."
+
+
+class RecordedMission:
+    """Takes the messages of a recording in their order.
+
+    Args:
+        classes: Known message classes, by schema.
+        rate: Mission seconds per second of the machine, as its clock is to be told.
+
+    Attributes:
+        now_s: Mission time.
+        present: Addresses of the components that are ready.
+    """
+
+    def __init__(self, classes: Mapping[str, type[Message]], rate: float = 1.0) -> None:
+        self.now_s = 0.0
+        self.present: dict[str, None] = {}
+        self._classes, self._rate = classes, rate
+        self._states: dict[str, ComponentState] = {}
+        self._newest: dict[tuple[str, str], Recorded] = {}
+        self._open: OrderedDict[str, tuple[str, str, bytes]] = OrderedDict()
+        self._answers: dict[tuple[str, str, bytes], Message] = {}
+        self._log = MissionLog()
+        self._schedule = RecordedSchedule()
+
+    def message_of(self, message: Recorded) -> Message | None:
+        """Return the message as it was sent; None: its class is not known, or has another form in this release."""
+        kind = self._classes.get(message.schema)
+        if kind is None or isinstance(message.body, bytes):
+            return None
+        try:
+            return revived(kind, message.body)
+        except OtherForm:
+            return None
+
+    def take(self, message: Recorded) -> Message | None:
+        """Let it have been said; return it as it was sent, see ``message_of``."""
+        self.now_s = max(self.now_s, message.at_s)
+        said = self.message_of(message)
+        address, conversation = address_of(message.key), message.key.rpartition("/")[2]
+        if conversation in STATES:
+            self._newest[message.key, message.schema] = message
+        match said:
+            case Presence(alive=alive):
+                self._presence_changed(address, alive)
+            case ComponentState() if conversation != Conversation.ASK or message.source == said.address:
+                self._states[said.address] = said
+            case StoryEvent() if conversation == Conversation.LOG:
+                self._log.add(said)
+            case OperatorActed():
+                self._log.add(said.event(message.source, message.cause))
+            case Decided() | ScheduleSnapshot():
+                self._schedule.take(said)
+        if conversation == Conversation.ASK and said is not None:
+            self._asked_or_answered(address, message, said)
+        return said
+
+    def newest(self) -> Iterator[Recorded]:
+        """Yield the newest message of each key that tells a state."""
+        yield from self._newest.values()
+
+    def answer(self, address: str, question: Message) -> Message:
+        """Return what the component answers.
+
+        Raises:
+            TakesNoCommands: The question would change something.
+            NotAnswered: It did not answer this until now.
+            UnknownName: No component has this name.
+            UnknownRequest: The schedule has nothing of this name.
+        """
+        match question:
+            case AskTime():
+                return MissionTime(self.now_s, self._rate)
+            case Register():
+                return Registered()
+            case ListComponents(subsystem=subsystem, type=kind) if address == NAMESERVER:
+                states = [self._states[at] for at in sorted(self._states.keys() & self.present.keys())]
+                of = [one for one in states if one.address.startswith(subsystem) and kind in ("", one.type)]
+                return Components(of, True, 0.0)
+            case Resolve(name=name):
+                found = [one for one in self._states.values() if component_of(one.address) == name]
+                if not found:
+                    raise UnknownName(f"no component is named {name!r} at {self.now_s:.3f} s", name=name)
+                return Resolved(found[-1])
+            case AskState() if address in self._states:
+                return self._states[address]
+            case AskLog():
+                return self._log.answer(question)
+            case AskSchedule() if self._schedule.manager is not None:
+                return Answers(self._schedule.manager).schedule(self.now_s)
+            case AskWhy(name=name) if self._schedule.manager is not None:
+                return Answers(self._schedule.manager).why(name, self.now_s)
+        if not type(question).__name__.startswith(READS):
+            raise TakesNoCommands(f"{type(question).__name__} is a command, and {address} is a recording")
+        known = self._answers.get(_asked(address, question))
+        if known is None:
+            raise NotAnswered(f"{address} did not answer {type(question).__name__} until {self.now_s:.3f} s")
+        return known
+
+    def _presence_changed(self, address: str, alive: bool) -> None:
+        if alive:
+            self.present[address] = None
+        else:
+            self.present.pop(address, None)
+            self._states.pop(address, None)
+
+    def _asked_or_answered(self, address: str, message: Recorded, said: Message) -> None:
+        asked = self._open.pop(message.cause, None)
+        if asked is not None and asked[0] == address:
+            self._answers[asked] = said
+            return
+        self._open[message.id] = _asked(address, said)
+        if len(self._open) > MOST_OPEN:
+            self._open.popitem(last=False)
+
+
+def _asked(address: str, question: Message) -> tuple[str, str, bytes]:
+    return address, schema_of(type(question)), msgspec.json.encode(named(question))

@@ -1,0 +1,230 @@
+"""A recording is played as it was said, and its mission answers what it answered."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, NamedTuple
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from backbone.addresses import LAUNCHER, NAMESERVER
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.component.messages import (
+    AskParameters,
+    AskState,
+    ComponentState,
+    LifeState,
+    LogLevel,
+    Parameters,
+    Register,
+    Registered,
+    Story,
+    StoryEvent,
+)
+from backbone.errors import NoResponder
+from backbone.keys import Conversation
+from backbone.keys import key as key_of
+from backbone.launcher.ending_messages import EndMission, MissionEnding
+from backbone.mission_log.log import AskLog, Log
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.recording.known_messages import message_classes
+from backbone.recording.player import Player
+from backbone.recording.presence import Presence
+from backbone.recording.reader import Recorded, Recording
+from backbone.recording.recorded_mission import NotAnswered, TakesNoCommands
+from backbone.recording.writer import RecordingWriter
+from backbone.wire import WIRE_VERSION, Envelope, Message, write
+from resource_pool.commands import Move
+
+CLASSES = message_classes()
+SCOUT = "resource_pool/scout1"
+
+
+class Said(NamedTuple):
+    at_s: float
+    address: str
+    conversation: Conversation
+    body: Message
+    source: str = SCOUT
+    cause: str = ""
+
+
+def event(number: int) -> StoryEvent:
+    return StoryEvent(float(number), SCOUT, f"event {number}", "scout1", "", LogLevel.INFO)
+
+
+def state(doing: str) -> ComponentState:
+    return ComponentState(SCOUT, "scout", "base", 7, LifeState.READY, 0.5, doing)
+
+
+def recording_of(*said: Said) -> Recording:
+    """Return a recording; the messages of each sender are numbered in their order."""
+    file, numbers = io.BytesIO(), dict.fromkeys((one.source for one in said), 0)
+    writer = RecordingWriter(file, CLASSES, {})
+    for one in said:
+        numbers[one.source] += 1
+        envelope = Envelope(WIRE_VERSION, one.source, numbers[one.source], one.at_s, one.cause, one.body)
+        writer.write(key_of("night", one.address, one.conversation), write(envelope), one.at_s)
+    writer.finish()
+    return Recording(file)
+
+
+MORNING = (
+    Said(1.0, SCOUT, Conversation.ALIVE, Presence(True), ""),
+    Said(1.1, SCOUT, Conversation.STATUS, state("drives")),
+    Said(1.2, SCOUT, Conversation.ASK, AskParameters(), "ui_console/anna"),
+    Said(1.3, SCOUT, Conversation.ASK, Parameters({"speed": 1}), SCOUT, "ui_console/anna#1"),
+    Said(2.0, SCOUT, Conversation.LOG, event(2)),
+    Said(3.0, SCOUT, Conversation.STATUS, state("stands")),
+    Said(4.0, SCOUT, Conversation.LOG, event(4)),
+    Said(5.0, SCOUT, Conversation.ALIVE, Presence(False), ""),
+)
+
+
+def played(
+    recording: Recording,
+    scene: Callable[[LocalBus, VirtualClock, Player], Awaitable[None]] | None = None,
+    *,
+    since_s: float = 0.0,
+    classes: Mapping[str, type[Message]] = CLASSES,
+    **options: Any,
+) -> list[tuple[float, str, Envelope[Message]]]:
+    """Return what was heard, with times, while the recording was played beside the scene."""
+    heard: list[tuple[float, str, Envelope[Message]]] = []
+
+    async def play() -> None:
+        clock = VirtualClock()
+        await clock.sleep_s(since_s)
+        network = LocalNetwork("night")
+        bus, ear = network.join("backbone/replay", clock), network.join("ui_console/ear", clock)
+        for conversation in (Conversation.LOG, Conversation.STATUS):
+            ear.subscribe(
+                "*/*",
+                conversation,
+                StoryEvent | ComponentState,
+                lambda envelope, said=conversation: heard.append((clock.now_s(), said, envelope)),
+            )
+        ear.watch_alive("*/*", lambda address, alive: tokens.append((address, alive)))
+        player = Player(bus, clock, recording, classes, since_s=since_s, **options)
+        player.begin()
+        running = asyncio.create_task(player.run())
+        if scene is not None:
+            await scene(ear, clock, player)
+        await running
+        await clock.sleep_s(0.01)
+        await ear.close()
+        await bus.close()
+
+    tokens.clear()
+    run_virtual(play())
+    return heard
+
+
+tokens: list[tuple[str, bool]] = []
+
+
+@settings(max_examples=60, deadline=None)
+@given(times=st.lists(st.floats(0.0, 50.0), min_size=1, max_size=30), since_s=st.sampled_from([0.0, 10.0]))
+def test_each_publication_comes_at_its_time_in_order_with_its_sender_and_number(times: list[float], since_s: float):
+    times.sort()
+    recording = recording_of(*(Said(at_s, SCOUT, Conversation.LOG, event(n)) for n, at_s in enumerate(times)))
+    heard = [(at_s, envelope) for at_s, said, envelope in played(recording, since_s=since_s)]
+    expected = [(at_s, n + 1) for n, at_s in enumerate(times) if at_s >= since_s]
+    assert [envelope.sequence for _at_s, envelope in heard] == [number for _at_s, number in expected]
+    assert [at_s for at_s, _envelope in heard] == pytest.approx([at_s for at_s, _number in expected], abs=1e-6)
+    assert all(envelope.source == SCOUT and envelope.stamp_s <= at_s + 1e-9 for at_s, envelope in heard)
+
+
+def test_tokens_rise_and_fall():
+    played(recording_of(*MORNING))
+    assert tokens == [(SCOUT, True), (SCOUT, False)]
+
+
+def test_who_comes_in_the_middle_is_told_the_newest_states():
+    heard = played(recording_of(*MORNING), since_s=3.5)
+    assert [(said, envelope.body) for _at_s, said, envelope in heard] == [
+        (Conversation.STATUS, state("stands")),
+        (Conversation.LOG, event(4)),
+    ]
+    assert tokens == [(SCOUT, True), (SCOUT, False)]
+
+
+def test_only_keys_that_are_meant_are_played():
+    heard = played(recording_of(*MORNING), keys=("*/log",))
+    assert [said for _at_s, said, _envelope in heard] == [Conversation.LOG, Conversation.LOG]
+
+
+def test_step_by_step_the_order_is_the_same():
+    shown: list[str] = []
+
+    async def step(message: Recorded) -> None:
+        shown.append(message.schema)
+        await asyncio.sleep(0.5)
+
+    heard = played(recording_of(*MORNING), next_step=step)
+    assert shown == ["ComponentState/2", "StoryEvent/1", "ComponentState/2", "StoryEvent/1"]
+    assert [envelope.sequence for _at_s, _said, envelope in heard] == [1, 3, 4, 5]
+
+
+def test_questions_get_the_answers_of_that_time():
+    async def scene(bus: LocalBus, clock: VirtualClock, _player: Player) -> None:
+        with pytest.raises(NoResponder):
+            await bus.ask(SCOUT, AskParameters(), Parameters, within_s=1.0)
+        await clock.sleep_until_s(1.15)
+        with pytest.raises(NotAnswered):
+            await bus.ask(SCOUT, AskParameters(), Parameters, within_s=1.0)
+        await clock.sleep_until_s(2.5)
+        assert await bus.ask(SCOUT, AskParameters(), Parameters, within_s=1.0) == Parameters({"speed": 1})
+        assert await bus.ask(SCOUT, AskState(), ComponentState, within_s=1.0) == state("drives")
+        listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=1.0)
+        assert listed.components == [state("drives")]
+        resolved = await bus.ask(NAMESERVER, Resolve("scout1"), Resolved, within_s=1.0)
+        assert resolved.component == state("drives")
+        log = await bus.ask(LAUNCHER, AskLog(), Log, within_s=1.0)
+        assert log.events == [event(2)]
+        await clock.sleep_until_s(5.5)
+        listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=1.0)
+        assert listed.components == []
+        with pytest.raises(UnknownName):
+            await bus.ask(NAMESERVER, Resolve("scout1"), Resolved, within_s=1.0)
+        with pytest.raises(NoResponder):
+            await bus.ask(SCOUT, AskState(), ComponentState, within_s=1.0)
+
+    played(recording_of(*MORNING), scene)
+
+
+def test_nothing_can_be_commanded_though_it_was_commanded_then():
+    commanded = (
+        Said(1.0, SCOUT, Conversation.ASK, Move(0.1, 0.0), "ui_console/anna"),
+        Said(1.1, SCOUT, Conversation.ASK, Story([]), SCOUT, "ui_console/anna#1"),
+    )
+
+    async def scene(bus: LocalBus, clock: VirtualClock, _player: Player) -> None:
+        await clock.sleep_until_s(2.0)
+        with pytest.raises(TakesNoCommands):
+            await bus.ask(SCOUT, Move(0.1, 0.0), Story, within_s=1.0)
+
+    played(recording_of(*commanded, *MORNING[4:]), scene)
+
+
+def test_a_console_may_register_and_a_person_may_end_it():
+    ended: list[bool] = []
+
+    async def scene(bus: LocalBus, _clock: VirtualClock, player: Player) -> None:
+        player.ends = lambda: ended.append(True)
+        assert await bus.ask(NAMESERVER, Register(state("")), Registered, within_s=1.0) == Registered()
+        assert await bus.ask(LAUNCHER, EndMission(), MissionEnding, within_s=1.0) == MissionEnding()
+
+    played(recording_of(*MORNING), scene)
+    assert ended == [True]
+
+
+def test_a_message_of_an_unknown_class_is_passed_over():
+    known = {schema: kind for schema, kind in CLASSES.items() if kind is not ComponentState}
+    heard = played(recording_of(*MORNING), classes=known)
+    assert [said for _at_s, said, _envelope in heard] == [Conversation.LOG, Conversation.LOG]
