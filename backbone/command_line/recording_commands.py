@@ -185,7 +185,7 @@ def replay(
     ] = None,
     as_json: AsJson = False,
     mission: Annotated[
-        str | None, typer.Option("--mission", help="Name under which it is up; default: that of the recording.")
+        str | None, typer.Option("--mission", help="Name under which it is up; default: replay-NAME.")
     ] = None,
 ) -> None:
     """Play a recording as a mission that is up; --without rc_manager lets today's scheduler decide on it instead."""

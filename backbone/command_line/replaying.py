@@ -22,7 +22,7 @@ from backbone.command_line.message_lines import message_line
 from backbone.command_line.recording_work import opened
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.preconditions import refuse_if_up
-from backbone.naming import Subsystem, legal
+from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
 from backbone.recording.decisions import Comparison, Difference, decided_anew
 from backbone.recording.known_messages import message_classes
 from backbone.recording.player import Player
@@ -32,6 +32,8 @@ from backbone.scheduling.events import Record
 from backbone.spoken import counted
 from backbone.waiting import first_of
 from backbone.wire import plain
+
+REPLAY = "replay"
 
 
 async def print_reasons_at(path: Path, name: str, at_s: float | None, *, as_json: bool) -> ExitCode:
@@ -63,7 +65,7 @@ class Playing:
     """How a recording is played.
 
     Attributes:
-        mission: Name under which it is up; None: as it was.
+        mission: Name under which it is up; None: ``replay-`` and its name, so that nobody takes it for the mission.
         since_s: Mission time at which it begins; None: with its first message.
         speed: Mission seconds per second of the machine.
         is_stepped: True: message by message, each after a line from standard input.
@@ -81,7 +83,7 @@ async def play(path: Path, wanted: Playing) -> ExitCode:
     """Play a recording as a mission that is up, until a person ends it."""
     with opened(path) as recording:
         found = recording.contents()
-        name = wanted.mission or legal(found.about.get("mission", "recording"))
+        name = legal(wanted.mission or f"{REPLAY}-{found.about.get('mission', '')}".strip("-")[:MAX_NAME_LENGTH])
         refuse_if_up(name)
         directory = run_files.prepare(name)
         try:
@@ -96,7 +98,7 @@ async def _play_in(
 ) -> None:
     since_s = found.begin_s if wanted.since_s is None else wanted.since_s
     endpoint, clock = socket_endpoint(directory), MissionClock(time.monotonic() - since_s / wanted.speed, wanted.speed)
-    bus = await ZenohBus.open_when_up(name, f"{Subsystem.BACKBONE}/replay", clock, hub_config([endpoint]))
+    bus = await ZenohBus.open_when_up(name, f"{Subsystem.BACKBONE}/{REPLAY}", clock, hub_config([endpoint]))
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)

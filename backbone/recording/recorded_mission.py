@@ -158,9 +158,9 @@ class RecordedMission:
             self._states.pop(address, None)
 
     def _asked_or_answered(self, address: str, message: Recorded, said: Message) -> None:
-        asked = self._open.pop(message.cause, None)
-        if asked is not None and asked[0] == address:
-            self._answers[asked] = said
+        asked = self._open.get(message.cause)
+        if asked is not None and asked[0] == address == message.source:  # else a question that this one led to
+            self._answers[self._open.pop(message.cause)] = said
             return
         self._open[message.id] = _asked(address, said)
         if len(self._open) > MOST_OPEN:

@@ -34,6 +34,7 @@ GUIDE = MISSION_XML.parent / "docs" / "how-to" / "record-a-mission.md"
 MIXED = Path(__file__).parents[2] / "docs" / "examples" / "mixed.xml"
 LOST_AT_MOST_S = 0.5
 ASKED = 200
+HALT = '{"schema": "Halt", "epoch": 1}'
 UNANSWERED = 4  # an ARC that ends is asked once more by creator, placer and RC manager
 
 
@@ -190,6 +191,27 @@ def test_a_recording_that_exists_is_refused_before_anything_runs(tmp_path: Path)
     assert (done.returncode, done.stdout) == (4, "")
     assert "exists" in done.stderr
     assert path.read_bytes() == b"another"
+
+
+def test_a_recording_is_played_as_a_mission_that_takes_no_commands(tmp_path: Path) -> None:
+    path = tmp_path / "it.mcap"
+    with mission_up("--record", str(path)) as mission:
+        time.sleep(2.0)
+        assert mission.down() == 0, mission.story()
+        name = f"replay-{mission.name}"
+        [info] = looked_into(mission, "info", str(path))
+        before_its_end = ["--from", str(info["end_s"] - 1.5), "--speed", "0.01"]
+        words = [str(BIN / "scout-backbone"), "replay", str(path), *before_its_end, "--mission", name]
+        with subprocess.Popen(words, env=mission.environment, stderr=subprocess.PIPE, text=True) as player:
+            assert player.stderr is not None
+            assert player.stderr.readline().startswith("plays "), player.stderr.read()
+            shown = mission.command("scout-backbone", "status", "--json", "--mission", name)
+            lit = mission.command("scout-backbone", "inject", "resource_pool/scout1/ask", HALT, "--mission", name)
+            down = mission.command("scout-backbone", "down", "--mission", name)
+    assert player.returncode == down.returncode == 0
+    assert {rc["rc"] for rc in json.loads(shown.stdout)["rcs"]} >= {"radio", "scout1", "scout2", "video1"}
+    assert lit.returncode == 5, lit.stdout
+    assert "is a recording" in lit.stderr
 
 
 def wait_for(holds: Callable[[], bool], mission: RunningMission) -> None:

@@ -198,6 +198,24 @@ def test_questions_get_the_answers_of_that_time():
     played(recording_of(*MORNING), scene)
 
 
+def test_a_question_that_led_to_another_gets_its_own_answer():
+    other = "resource_pool/scout2"
+    chain = (
+        Said(1.0, SCOUT, Conversation.ASK, AskParameters(), "ui_console/anna"),
+        Said(1.1, other, Conversation.ASK, AskParameters(), SCOUT, "ui_console/anna#1"),
+        Said(1.2, other, Conversation.ASK, Parameters({"of": 2}), other, f"{SCOUT}#1"),
+        Said(1.3, SCOUT, Conversation.ASK, Parameters({"of": 1}), SCOUT, "ui_console/anna#1"),
+        Said(3.0, SCOUT, Conversation.LOG, event(3)),
+    )
+
+    async def scene(bus: LocalBus, clock: VirtualClock, _player: Player) -> None:
+        await clock.sleep_until_s(2.0)
+        assert await bus.ask(SCOUT, AskParameters(), Parameters, within_s=1.0) == Parameters({"of": 1})
+        assert await bus.ask(other, AskParameters(), Parameters, within_s=1.0) == Parameters({"of": 2})
+
+    played(recording_of(*chain), scene)
+
+
 def test_nothing_can_be_commanded_though_it_was_commanded_then():
     commanded = (
         Said(1.0, SCOUT, Conversation.ASK, Move(0.1, 0.0), "ui_console/anna"),
