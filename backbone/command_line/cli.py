@@ -36,7 +36,7 @@ from backbone.command_line.options import (
     named_value,
     run,
 )
-from backbone.command_line.recording_commands import inject, record, recording, replay, top, watch
+from backbone.command_line.recording_commands import compare, inject, record, recording, replay, top, watch
 from backbone.command_line.tree_commands import tree
 from backbone.component.log_level import LogLevel
 from backbone.launcher.endings import ExitCode, say
@@ -348,6 +348,7 @@ app.command()(watch)
 app.command()(top)
 app.command()(inject)
 app.command()(replay)
+app.command()(compare)
 
 
 @app.command()

@@ -43,6 +43,7 @@ KeyGlobs = Annotated[
 ]
 For = Annotated[float | None, typer.Option("--for", min=0.1, max=1e9, help="End after so many seconds.")]
 MOST_LINES = 1_000_000
+MOST_TOLERANCE = 1e18  # as the largest number of a message
 
 
 @record.callback(invoke_without_command=True)
@@ -200,6 +201,30 @@ def replay(
         raise typer.BadParameter("--rule and --json are for --without rc_manager")
     wanted = replaying.Playing(mission, since_s, speed, is_stepped, tuple(keys or ()))
     run(lambda: replaying.play(file, wanted))
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="A.mcap", help="A recording.")],
+    second: Annotated[Path, typer.Argument(metavar="B.mcap", help="Another one.")],
+    keys: Keys = None,
+    tolerances: Annotated[
+        list[str] | None,
+        typer.Option("--tolerance", metavar="FIELD=X", help="Numbers of this field may be so far apart; repeatable."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare two recordings key by key: first difference, and how far numbers are apart; exit code 5: they differ."""
+    from backbone.command_line import comparing
+
+    allowed = dict(_tolerance(one) for one in tolerances or [])
+    run(lambda: comparing.compare(first, second, tuple(keys or ()), allowed, as_json=as_json))
+
+
+def _tolerance(given: str) -> tuple[str, float]:
+    field, value = named_value(given)
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 <= value <= MOST_TOLERANCE:
+        raise typer.BadParameter(f"{given!r} is not FIELD=X with a number of at least 0")
+    return field, float(value)
 
 
 def watch(

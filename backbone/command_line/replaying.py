@@ -23,7 +23,7 @@ from backbone.command_line.recording_work import opened
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.preconditions import refuse_if_up
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
-from backbone.recording.decisions import Comparison, Difference, decided_anew
+from backbone.recording.decisions import Comparison, OtherDecision, decided_anew
 from backbone.recording.known_messages import message_classes
 from backbone.recording.player import Player
 from backbone.recording.reader import Contents, Recorded, Recording
@@ -146,7 +146,7 @@ async def _asked_for_step(message: Recorded) -> None:
         await asyncio.Event().wait()
 
 
-def _lines(difference: Difference) -> list[str]:
+def _lines(difference: OtherDecision) -> list[str]:
     event = f"{type(difference.event).__name__} {json.dumps(plain(difference.event))}"
     pairs = zip(difference.recorded, difference.decided, strict=False)
     count = sum(1 for _pair in takewhile(lambda pair: pair[0].line == pair[1].line, pairs))

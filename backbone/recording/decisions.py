@@ -92,7 +92,7 @@ def schedule_at(recording: Recording, at_s: float) -> ScheduleManager:
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class OtherDecision:
     """The first decision that is not as recorded.
 
     Attributes:
@@ -124,7 +124,7 @@ class Comparison:
     decisions: int = 0
     grants: int = 0
     missing: int = 0
-    difference: Difference | None = None
+    difference: OtherDecision | None = None
 
 
 @dataclass(slots=True)
@@ -187,7 +187,7 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> Co
         found.grants += sum(one.line["ev"] == "grant" for one in recorded)
         if not is_same:
             of = step.decided
-            found.difference = Difference(number, of.at_s, of.event, tuple(recorded), tuple(decided))
+            found.difference = OtherDecision(number, of.at_s, of.event, tuple(recorded), tuple(decided))
             return found
     if not began:
         raise NotRecorded("the recording has no state of the schedule")

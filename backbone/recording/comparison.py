@@ -1,0 +1,154 @@
+"""Comparison of two recordings, key by key: the first difference, and how far numbers are apart. Pure.
+
+The n-th message of a key, sender and schema in one recording is compared with the n-th in the other. Of a message its
+fields count, not when it was sent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict, deque
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import zip_longest
+from typing import Any
+
+from backbone.recording.reader import Recorded
+
+Named = tuple[str, str, str]
+"""Key without ``scout/<mission>/``, sender, schema."""
+
+
+@dataclass(slots=True)
+class NumberError:
+    """How far a number is apart in the two recordings.
+
+    Attributes:
+        largest: Largest distance.
+        squares: Sum of the squares of all distances.
+        count: Of compared numbers.
+    """
+
+    largest: float = 0.0
+    squares: float = 0.0
+    count: int = 0
+
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the distances."""
+        return math.sqrt(self.squares / self.count) if self.count else 0.0
+
+    def add(self, distance: float) -> None:
+        """Count one pair of numbers."""
+        self.largest = max(self.largest, distance)
+        self.squares += distance * distance
+        self.count += 1
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """The first pair of messages that differs by more than the tolerance.
+
+    Attributes:
+        number: Of the message, from 0 on.
+        first_s: Its mission time in the first recording.
+        second_s: In the second.
+        field: Path of the first field that differs, as ``rcs.0.rc``.
+        first: Its value in the first recording; None: there is none.
+        second: In the second.
+    """
+
+    number: int
+    first_s: float
+    second_s: float
+    field: str
+    first: Any
+    second: Any
+
+
+@dataclass(slots=True)
+class KeyComparison:
+    """The messages of one key, sender and schema.
+
+    Attributes:
+        first: Their number in the first recording.
+        second: In the second.
+        differing: Pairs that differ by more than the tolerance.
+        difference: The first of these; None: there is none.
+        errors: Path of a number → how far it is apart; positions in lists are ``*``. Only numbers that differ.
+    """
+
+    first: int = 0
+    second: int = 0
+    differing: int = 0
+    difference: Difference | None = None
+    errors: dict[str, NumberError] = field(default_factory=lambda: defaultdict(NumberError))
+
+    @property
+    def is_same(self) -> bool:
+        """Whether both have as many messages, and no pair differs by more than the tolerance."""
+        return self.first == self.second and not self.differing
+
+
+def compared(
+    first: Iterable[Recorded], second: Iterable[Recorded], tolerances: Mapping[str, float] | None = None
+) -> dict[Named, KeyComparison]:
+    """Return the comparison of each key, sender and schema.
+
+    Args:
+        first: Messages of one recording, in their order.
+        second: Of the other.
+        tolerances: Name of a field, or its path, → largest distance of its numbers that is no difference.
+    """
+    allowed = tolerances or {}
+    found: dict[Named, KeyComparison] = defaultdict(KeyComparison)
+    waiting: dict[Named, tuple[deque[Recorded], deque[Recorded]]] = defaultdict(lambda: (deque(), deque()))
+    for pair in zip_longest(first, second):
+        for side, message in enumerate(pair):
+            if message is None:
+                continue
+            named = (message.key.split("/", 2)[-1], message.source, message.schema)
+            waiting[named][side].append(message)
+            if side:
+                found[named].second += 1
+            else:
+                found[named].first += 1
+            firsts, seconds = waiting[named]
+            if firsts and seconds:
+                _compare(found[named], firsts.popleft(), seconds.popleft(), allowed)
+    return dict(sorted(found.items()))
+
+
+def _compare(found: KeyComparison, first: Recorded, second: Recorded, tolerances: Mapping[str, float]) -> None:
+    number = min(found.first, found.second) - 1
+    differs = False
+    for path, one, other in _unequal(first.body, second.body, ""):
+        if _is_number(one) and _is_number(other):
+            distance = abs(one - other)
+            found.errors[_general(path)].add(distance)
+            if distance <= tolerances.get(path, tolerances.get(path.rpartition(".")[2], 0.0)):
+                continue
+        if not differs and found.difference is None:
+            found.difference = Difference(number, first.at_s, second.at_s, path, one, other)
+        differs = True
+    found.differing += differs
+
+
+def _unequal(first: Any, second: Any, path: str) -> Iterator[tuple[str, Any, Any]]:
+    """Yield the paths at which two bodies differ, with both values."""
+    if isinstance(first, dict) and isinstance(second, dict):
+        for name in dict.fromkeys((*first, *second)):
+            yield from _unequal(first.get(name), second.get(name), f"{path}.{name}" if path else name)
+    elif isinstance(first, list) and isinstance(second, list):
+        for place, (one, other) in enumerate(zip_longest(first, second)):
+            yield from _unequal(one, other, f"{path}.{place}" if path else str(place))
+    elif first != second:
+        yield path, first, second
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _general(path: str) -> str:
+    return ".".join("*" if part.isdecimal() else part for part in path.split("."))
