@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from backbone.command_line.recording_work import opened
@@ -19,12 +19,16 @@ async def compare(
 ) -> ExitCode:
     """Print where two recordings differ by more than the tolerances; ``REFUSED`` if they do."""
     with opened(first) as one, opened(second) as other:
-        found = compared(one.messages(keys), other.messages(keys), tolerances)
+        return print_comparison(compared(one.messages(keys), other.messages(keys), tolerances), as_json=as_json)
+
+
+def print_comparison(found: Mapping[Named, KeyComparison], *, as_json: bool) -> ExitCode:
+    """Print what differs; ``REFUSED`` if anything differs by more than was tolerated."""
     for named, comparison in found.items():
         show([json.dumps(_json(named, comparison))] if as_json else _lines(named, comparison))
     differing = sum(not comparison.is_same for comparison in found.values())
     if not found:
-        say("neither recording has a message of these keys")
+        say("there is no message to compare")
     else:
         say(f"{differing} of {counted(len(found), 'key')} differ")
     return ExitCode.REFUSED if differing else ExitCode.DONE

@@ -42,6 +42,10 @@ KeyGlobs = Annotated[
     typer.Argument(metavar="KEY…", help="Keys or patterns, as 'resource_pool/*/readings'; default: all."),
 ]
 For = Annotated[float | None, typer.Option("--for", min=0.1, max=1e9, help="End after so many seconds.")]
+Tolerances = Annotated[
+    list[str] | None,
+    typer.Option("--tolerance", metavar="FIELD=X", help="Numbers of this field may be so far apart; repeatable."),
+]
 MOST_LINES = 1_000_000
 MOST_TOLERANCE = 1e18  # as the largest number of a message
 
@@ -177,28 +181,33 @@ def replay(
     ] = None,
     keys: Keys = None,
     without: Annotated[
-        list[str] | None,
-        typer.Option("--without", metavar="NAME", help="Run this component instead of its recording: rc_manager."),
+        str | None,
+        typer.Option("--without", metavar="NAME", help="Run this component for real, and compare what it says."),
     ] = None,
-    rules: Annotated[
+    class_path: Annotated[
+        str, typer.Option("--class", metavar="MODULE:CLASS", help="With --without: another class.")
+    ] = "",
+    values: Annotated[
         list[str] | None,
-        typer.Option("--rule", metavar="NAME=VALUE", help="Another rule of the rc_manager, as 'policy=strict'."),
+        typer.Option("--set", metavar="NAME=VALUE", help="With --without: another parameter or rule; repeatable."),
     ] = None,
+    tolerances: Tolerances = None,
     as_json: AsJson = False,
     mission: Annotated[
         str | None, typer.Option("--mission", help="Name under which it is up; default: replay-NAME.")
     ] = None,
 ) -> None:
-    """Play a recording as a mission that is up; --without rc_manager lets today's scheduler decide on it instead."""
+    """Play a recording as a mission that is up; with --without NAME, run that component on it and compare instead."""
     from backbone.command_line import replaying
 
+    given = dict(named_value(value) for value in values or [])
+    allowed = dict(_tolerance(one) for one in tolerances or [])
+    if without == "rc_manager":
+        run(lambda: replaying.decide_anew(file, since_s or 0.0, given, as_json=as_json))
     if without:
-        if without != ["rc_manager"]:
-            raise typer.BadParameter("only the rc_manager can be run on a recording: --without rc_manager")
-        chosen_rules = dict(named_value(rule) for rule in rules or [])
-        run(lambda: replaying.decide_anew(file, since_s or 0.0, chosen_rules, as_json=as_json))
-    if rules or as_json:
-        raise typer.BadParameter("--rule and --json are for --without rc_manager")
+        run(lambda: replaying.run_without(file, without, class_path, given, allowed, as_json=as_json))
+    if class_path or given or allowed or as_json:
+        raise typer.BadParameter("--class, --set, --tolerance and --json are for --without NAME")
     wanted = replaying.Playing(mission, since_s, speed, is_stepped, tuple(keys or ()))
     run(lambda: replaying.play(file, wanted))
 
@@ -207,10 +216,7 @@ def compare(
     first: Annotated[Path, typer.Argument(metavar="A.mcap", help="A recording.")],
     second: Annotated[Path, typer.Argument(metavar="B.mcap", help="Another one.")],
     keys: Keys = None,
-    tolerances: Annotated[
-        list[str] | None,
-        typer.Option("--tolerance", metavar="FIELD=X", help="Numbers of this field may be so far apart; repeatable."),
-    ] = None,
+    tolerances: Tolerances = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare two recordings key by key: first difference, and how far numbers are apart; exit code 5: they differ."""

@@ -14,26 +14,58 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from backbone import run_files
 from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
+from backbone.command_line.comparing import print_comparison
 from backbone.command_line.message_lines import message_line
 from backbone.command_line.recording_work import opened
+from backbone.component.process import load_class
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.preconditions import refuse_if_up
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
+from backbone.recording.comparison import compared
 from backbone.recording.decisions import Comparison, OtherDecision, decided_anew
 from backbone.recording.known_messages import message_classes
 from backbone.recording.player import Player
 from backbone.recording.reader import Contents, Recorded, Recording
 from backbone.recording.reasons import reasons_at
+from backbone.recording.rerun import launch_of, run_again
 from backbone.scheduling.events import Record
 from backbone.spoken import counted
 from backbone.waiting import first_of
 from backbone.wire import plain
 
 REPLAY = "replay"
+
+
+async def run_without(
+    path: Path, name: str, class_path: str, parameters: dict[str, Any], tolerances: dict[str, float], *, as_json: bool
+) -> ExitCode:
+    """Run one component for real on the recording, and compare what it says with what the recorded one said.
+
+    Args:
+        class_path: Of another class; empty: the recorded one.
+        parameters: That are to be other than recorded.
+        tolerances: See ``compared``.
+    """
+    with opened(path) as recording:
+        classes = message_classes()
+        launch = launch_of(recording, classes, name)
+        launch = msgspec.structs.replace(
+            launch, class_path=class_path or launch.class_path, parameters={**launch.parameters, **parameters}
+        )
+        say(f"runs {launch.class_path} as {name} on {path}")
+        rerun = await asyncio.to_thread(run_again, recording, classes, launch, load_class(launch.class_path))
+        recorded = recording.messages(source=launch.address)
+        result = print_comparison(compared(recorded, rerun.said, tolerances), as_json=as_json)
+    if rerun.fell is not None:
+        say(f"it fell: {type(rerun.fell).__name__}: {rerun.fell}")
+        return ExitCode.REFUSED
+    return result
 
 
 async def print_reasons_at(path: Path, name: str, at_s: float | None, *, as_json: bool) -> ExitCode:

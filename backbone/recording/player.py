@@ -18,6 +18,7 @@ from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.recording.hearing import is_meant
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.recorded_mission import RecordedMission
+from backbone.recording.revival import message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message
 
 _PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, Conversation.TOLD}
@@ -49,7 +50,7 @@ class Player:
     ) -> None:
         self._bus, self._clock, self._recording = bus, clock, recording
         self._since_s, self._keys, self._next_step = since_s, keys, next_step
-        self._mission = RecordedMission(classes, clock.rate)
+        self._classes, self._mission = classes, RecordedMission(classes, clock.rate)
         self._accepts = reduce(or_, classes.values())
         self._tokens: dict[str, Subscription] = {}
         self._served: dict[str, Subscription] = {}
@@ -72,7 +73,7 @@ class Player:
         for address in self._mission.present:
             self._tokens[address] = self._bus.declare_alive(address)
         for message in self._mission.newest():
-            said = self._mission.message_of(message)
+            said = message_as_sent(self._classes, message)
             if said is not None:
                 self._publish(message, said)
 

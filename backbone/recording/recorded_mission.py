@@ -27,7 +27,7 @@ from backbone.rc_manager.messages import AskSchedule, AskWhy, Decided, ScheduleS
 from backbone.recording.decisions import RecordedSchedule
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recorded
-from backbone.recording.revival import OtherForm, revived
+from backbone.recording.revival import message_as_sent
 from backbone.recording.translation import named
 from backbone.scheduling.explain.answers import Answers
 from backbone.wire import Message, schema_of
@@ -76,20 +76,10 @@ class RecordedMission:
         self._log = MissionLog()
         self._schedule = RecordedSchedule()
 
-    def message_of(self, message: Recorded) -> Message | None:
-        """Return the message as it was sent; None: its class is not known, or has another form in this release."""
-        kind = self._classes.get(message.schema)
-        if kind is None or isinstance(message.body, bytes):
-            return None
-        try:
-            return revived(kind, message.body)
-        except OtherForm:
-            return None
-
     def take(self, message: Recorded) -> Message | None:
-        """Let it have been said; return it as it was sent, see ``message_of``."""
+        """Let it have been said; return it as it was sent, see ``message_as_sent``."""
         self.now_s = max(self.now_s, message.at_s)
-        said = self.message_of(message)
+        said = message_as_sent(self._classes, message)
         address, conversation = address_of(message.key), message.key.rpartition("/")[2]
         if conversation in STATES:
             self._newest[message.key, message.schema] = message
@@ -145,7 +135,7 @@ class RecordedMission:
                 return Answers(self._schedule.manager).why(name, self.now_s)
         if not type(question).__name__.startswith(READS):
             raise TakesNoCommands(f"{type(question).__name__} is a command, and {address} is a recording")
-        known = self._answers.get(_asked(address, question))
+        known = self._answers.get(asked_of(address, question))
         if known is None:
             raise NotAnswered(f"{address} did not answer {type(question).__name__} until {self.now_s:.3f} s")
         return known
@@ -162,10 +152,11 @@ class RecordedMission:
         if asked is not None and asked[0] == address == message.source:  # else a question that this one led to
             self._answers[self._open.pop(message.cause)] = said
             return
-        self._open[message.id] = _asked(address, said)
+        self._open[message.id] = asked_of(address, said)
         if len(self._open) > MOST_OPEN:
             self._open.popitem(last=False)
 
 
-def _asked(address: str, question: Message) -> tuple[str, str, bytes]:
+def asked_of(address: str, question: Message) -> tuple[str, str, bytes]:
+    """Return what makes a question to a component the same question."""
     return address, schema_of(type(question)), msgspec.json.encode(named(question))

@@ -11,6 +11,7 @@ from msgspec import inspect
 from backbone.errors import Refusal
 from backbone.naming import did_you_mean
 from backbone.recording.json_schema import TAG, fields_of
+from backbone.recording.reader import Recorded
 from backbone.wire import Message, schema_of
 
 WRITE_ONE = 'Write an object like {"schema": "Halt", "epoch": 3}; "watch KEY --json" shows messages with their fields.'
@@ -38,6 +39,17 @@ def revived(kind: type[Kind], body: dict[str, Any] | list[Any]) -> Kind:
         return msgspec.json.decode(msgspec.json.encode(listed), type=kind)
     except (msgspec.DecodeError, LookupError, TypeError, AttributeError) as error:
         raise OtherForm(f"{schema_of(kind)}: {error}") from error
+
+
+def message_as_sent(classes: Mapping[str, type[Message]], message: Recorded) -> Message | None:
+    """Return the message as it was sent; None: its class is not known, or has another form in this release."""
+    kind = classes.get(message.schema)
+    if kind is None or isinstance(message.body, bytes):
+        return None
+    try:
+        return revived(kind, message.body)
+    except OtherForm:
+        return None
 
 
 def message_from(classes: Mapping[str, type[Message]], said: object) -> Message:

@@ -1,0 +1,102 @@
+"""A component that is run on a recording says what the recorded one said, unless it is another one."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from backbone.bus.clock import run_virtual
+from backbone.component.process import load_class
+from backbone.mission.reader import read_mission
+from backbone.recording.comparison import KeyComparison, compared
+from backbone.recording.files import RecordingFiles
+from backbone.recording.known_messages import message_classes
+from backbone.recording.reader import Recording
+from backbone.recording.recorder import Recorder
+from backbone.recording.rerun import NoSuchComponent, launch_of, run_again
+from mission_control.laboratory.simulation.whole_mission import mission_in_one_process
+
+CLASSES = message_classes()
+MISSION_XML = Path(__file__).parents[3] / "mission.xml"
+LASTED_S = 25.0
+FINDINGS = "mission_control/watch-scout2/events MotionSeen/1"
+WATCHERS = ("watch-scout1", "watch-scout2")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Yield a recording of a mission on virtual time."""
+    path = tmp_path_factory.mktemp("rerun") / "it.mcap"
+
+    async def record() -> None:
+        async with mission_in_one_process(read_mission(MISSION_XML)) as running:
+            bus = running.network.join("backbone/recorder", running.clock)
+            recorder = Recorder(
+                bus, running.clock, files=RecordingFiles(path), classes=CLASSES, about={"mission": bus.mission}
+            )
+            recording = asyncio.create_task(recorder.run())
+            await running.clock.sleep_s(LASTED_S)
+            recorder.end()
+            await recording
+            await bus.close()
+
+    run_virtual(record())
+    with path.open("rb") as file:
+        yield Recording(file)
+
+
+def rerun_of(recording: Recording, name: str, **parameters: Any) -> dict[str, KeyComparison]:
+    """Return what the component said on the recording beside what the recorded one said, by schema."""
+    launch = launch_of(recording, CLASSES, name)
+    launch = msgspec.structs.replace(launch, parameters={**launch.parameters, **parameters})
+    rerun = run_again(recording, CLASSES, launch, load_class(launch.class_path))
+    assert rerun.fell is None
+    found = compared(recording.messages(source=launch.address), rerun.said)
+    return {f"{key} {schema}": one for (key, _source, schema), one in found.items()}
+
+
+@pytest.mark.parametrize("name", WATCHERS)
+def test_the_same_component_says_the_same(recording: Recording, name: str):
+    found = rerun_of(recording, name)
+    unlike = {key for key, one in found.items() if not one.is_same}
+    said_before_the_recorder_came = {"backbone/nameserver/ask Register/1", f"mission_control/{name}/ask Story/1"}
+    assert unlike == said_before_the_recorder_came
+    assert sum(one.first for one in found.values()) > 50
+
+
+def test_there_is_something_to_find(recording: Recording):
+    assert rerun_of(recording, "watch-scout2")[FINDINGS].first > 1
+
+
+def test_another_parameter_is_named_at_the_first_finding_that_differs(recording: Recording):
+    of_findings = rerun_of(recording, "watch-scout2", frames_wanted=3)[
+        "mission_control/watch-scout2/events MotionSeen/1"
+    ]
+    assert of_findings.difference is not None
+    assert of_findings.difference.number == 0
+    assert of_findings.difference.second_s > of_findings.difference.first_s
+
+
+def test_another_class_may_take_its_place(recording: Recording):
+    launch = msgspec.structs.replace(launch_of(recording, CLASSES, "watch-scout1"), parameters={"seconds": 5.0})
+    rerun = run_again(recording, CLASSES, launch, load_class("mission_control.behaviors.wait:Wait"))
+    found = compared(recording.messages(source=launch.address), rerun.said)
+    assert not all(one.is_same for one in found.values())
+
+
+def test_a_component_that_falls_is_told(recording: Recording):
+    class Broken(load_class("mission_control.behaviors.wait:Wait")):  # type: ignore[misc]
+        async def connect(self) -> None:
+            raise ZeroDivisionError
+
+    launch = msgspec.structs.replace(launch_of(recording, CLASSES, "watch-scout1"), parameters={"seconds": 5.0})
+    assert isinstance(run_again(recording, CLASSES, launch, Broken).fell, ZeroDivisionError)
+
+
+def test_of_nobody_there_is_no_launch(recording: Recording):
+    with pytest.raises(NoSuchComponent, match="watch-scout1"):
+        launch_of(recording, CLASSES, "watch-scot1")
