@@ -34,6 +34,7 @@ GUIDE = MISSION_XML.parent / "docs" / "how-to" / "record-a-mission.md"
 MIXED = Path(__file__).parents[2] / "docs" / "examples" / "mixed.xml"
 LOST_AT_MOST_S = 0.5
 ASKED = 200
+KILLS, QUICK_KILLS = 100, 3
 HALT = '{"schema": "Halt", "epoch": 1}'
 UNANSWERED = 4  # an ARC that ends is asked once more by creator, placer and RC manager
 
@@ -117,7 +118,9 @@ def test_a_recording_has_all_messages_and_tells_what_the_mission_told(mission: R
     assert "<mission" in shown.stdout
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=() if seed < QUICK_KILLS else pytest.mark.slow) for seed in range(KILLS)]
+)
 def test_of_a_killed_recorder_at_most_half_a_second_is_lost(mission: RunningMission, tmp_path: Path, seed: int) -> None:
     path, whole = tmp_path / "killed.mcap", tmp_path / "whole.mcap"
     with recording_to(mission, path) as recorder:
