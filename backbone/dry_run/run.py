@@ -143,7 +143,7 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     )
     rehearsal = Rehearsal(manager, opening_lines=manager.opening_lines())
     for resource in description.resources:
-        rehearsal.tell(replace(rc_known(resource, None), up=bool(hosts[resource.name])))
+        rehearsal.tell(msgspec.structs.replace(rc_known(resource, None), up=bool(hosts[resource.name])))
     answers = Answers(manager)
     asked = [(claim, *_ask(manager, rehearsal, claim, hosts)) for claim in _claims(description)]
     rehearsal.run(for_s)
