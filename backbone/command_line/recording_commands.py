@@ -160,6 +160,19 @@ def why(
     run(lambda: print_reasons_at(file, name, at_s, as_json=as_json))
 
 
+@recording.command()
+def export(
+    file: File,
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A new folder.")],
+    keys: Keys = None,
+    video: Annotated[bool, typer.Option("--video", help="Also an MP4 file for each camera.")] = False,
+) -> None:
+    """Write a CSV file for each key, with who commanded the robot in each row."""
+    from backbone.command_line.exporting import export as export_to
+
+    run(lambda: export_to(file, folder, tuple(keys or ()), with_videos=video))
+
+
 @recording.command("mission")
 def print_mission(file: File) -> None:
     """Print the mission file that was up."""

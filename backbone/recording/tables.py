@@ -1,0 +1,89 @@
+"""Tables: the messages of a key as rows with a column for each field. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from backbone.recording.reader import Recorded
+
+FIRST_COLUMNS = ("at_s", "source", "sequence", "cause", "commanded_by")
+LONGEST_LIST = 64  # chosen: a scan of a laser has more, and is no table
+BYTES_OF = "pixels"
+"""Field of a picture that is no column."""
+
+
+def table_of(message: Recorded) -> str:
+    """Return the name of the table that the message is a row of: its key and schema.
+
+    Example:
+        >>> table_of(Recorded("scout/night/resource_pool/scout1/readings", "", "Readings/1", 0, 0, 0, 0, "", {}))
+        'resource_pool_scout1_readings_Readings'
+    """
+    return "_".join([*message.key.split("/")[2:], message.schema.partition("/")[0] or "bytes"])
+
+
+def row_of(message: Recorded, commanded_by: str = "") -> dict[str, Any]:
+    """Return column → value. Fields inside others have their names joined by dots, as ``rcs.0.rc``.
+
+    Args:
+        commanded_by: Who commanded the robot then; see ``Commanders``.
+    """
+    row: dict[str, Any] = {
+        "at_s": f"{message.at_s:.6f}",
+        "source": message.source,
+        "sequence": message.sequence,
+        "cause": message.cause,
+        "commanded_by": commanded_by,
+    }
+    for path, value in _flat(message.body, ""):
+        row[f"{path}_" if path in row else path] = value
+    return row
+
+
+def columns_of(rows: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return all columns of these rows: the common ones first, then in the order in which they appear."""
+    return list(dict.fromkeys((*FIRST_COLUMNS, *(column for row in rows for column in row))))
+
+
+def _flat(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            if name != BYTES_OF:
+                yield from _flat(inner, f"{path}.{name}" if path else name)
+    elif isinstance(value, list):
+        if len(value) <= LONGEST_LIST:
+            for place, inner in enumerate(value):
+                yield from _flat(inner, f"{path}.{place}" if path else str(place))
+    elif isinstance(value, bytes):
+        yield path or "bytes", value.hex()
+    else:
+        yield path, value
+
+
+class Commanders:
+    """Who commanded a robot at an instant: a person, a behavior, or nobody.
+
+    It takes the messages of a recording in their order. Only the ARC that holds a robot moves it, under its epoch; so
+    its owner commanded what the robot did, and what its camera saw.
+    """
+
+    def __init__(self) -> None:
+        self._owners: dict[str, str] = {}
+        self._users: dict[str, str] = {}
+
+    def take(self, message: Recorded) -> None:
+        """Note whose each ARC is, and who sits at each console."""
+        body = message.body
+        if not isinstance(body, dict):
+            return
+        if message.schema.startswith("Schedule/"):
+            self._owners = {request["arc"]: request["owner"] for request in body.get("requests", [])}
+        elif message.schema.startswith("ComponentState/") and body.get("user"):
+            self._users[body["address"]] = body["user"]
+
+    def of(self, message: Recorded) -> str:
+        """Return who commanded the robot of this message; empty: nobody, or it is of no ARC."""
+        arc = message.body.get("arc", "") if isinstance(message.body, dict) else ""
+        owner = self._owners.get(arc, "")
+        return self._users.get(owner, owner.rpartition("/")[2])

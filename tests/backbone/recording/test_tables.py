@@ -1,0 +1,58 @@
+"""Rows of tables have all fields, and who commanded the robot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from backbone.recording.reader import Recorded
+from backbone.recording.tables import Commanders, columns_of, row_of, table_of
+
+FRAMES = "scout/night/resource_pool/anna-drive/frames"
+leaves = st.none() | st.booleans() | st.integers(-9, 9) | st.floats(-9, 9) | st.text(max_size=3)
+bodies = st.dictionaries(
+    st.sampled_from(["at_s", "x", "y"]),
+    st.recursive(leaves, lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.sampled_from("ab"), inner)),
+    max_size=3,
+)
+
+
+def said(schema: str, body: Any, key: str = FRAMES) -> Recorded:
+    return Recorded(key, "resource_pool/grabber", schema, 1.0, 1.0, 1.0, 7, "", body)
+
+
+def leaves_of(value: Any) -> list[Any]:
+    if isinstance(value, dict | list):
+        inner = value.values() if isinstance(value, dict) else value
+        return [leaf for one in inner for leaf in leaves_of(one)]
+    return [value]
+
+
+@given(body=bodies)
+def test_a_row_has_each_value_once(body: dict[str, Any]):
+    row = row_of(said("Readings/1", body))
+    of_message = [value for column, value in row.items() if column not in row_of(said("Readings/1", {}))]
+    assert sorted(map(repr, of_message)) == sorted(map(repr, leaves_of(body)))
+    assert columns_of([row]) == list(row)
+
+
+def test_pictures_are_no_columns():
+    assert "pixels" not in row_of(said("Frame/1", {"number": 1, "pixels": "aGFsbG8="}))
+    assert table_of(said("Frame/1", {})) == "resource_pool_anna-drive_frames_Frame"
+
+
+def test_a_person_is_named_by_name_a_behavior_by_its_own_and_nobody_is_empty():
+    commanders = Commanders()
+    of_anna, of_watch, of_none = (said("Frame/1", {"arc": arc}) for arc in ("anna-drive", "watch-capture", "gone"))
+    assert commanders.of(of_anna) == ""
+    requests = [
+        {"arc": "anna-drive", "owner": "ui_console/console-1"},
+        {"arc": "watch-capture", "owner": "mission_control/watch"},
+    ]
+    commanders.take(said("Schedule/1", {"requests": requests}))
+    commanders.take(said("ComponentState/2", {"address": "ui_console/console-1", "user": "anna"}))
+    assert [commanders.of(one) for one in (of_anna, of_watch, of_none)] == ["anna", "watch", ""]
+    commanders.take(said("Schedule/1", {"requests": []}))
+    assert commanders.of(of_anna) == ""
