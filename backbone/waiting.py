@@ -25,6 +25,17 @@ async def first_of(*waits: Awaitable[Any]) -> None:
         await end_tasks(*tasks)
 
 
+async def first_to_end(*waits: Awaitable[Any]) -> None:
+    """Return when one of these is over, or raise what it raised; the others are ended."""
+    tasks = [asyncio.ensure_future(wait) for wait in waits]
+    try:
+        done, _others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        await end_tasks(*tasks)
+    for task in done:
+        task.result()
+
+
 async def end_tasks(*tasks: asyncio.Future[Any]) -> None:
     """Cancel the tasks and return when all have ended; what they raise is not looked at."""
     for task in tasks:

@@ -219,6 +219,10 @@ def serve(
     design: Annotated[
         str, typer.Option(help="Serve the designer of this mission file instead; nothing needs to be up.")
     ] = "",
+    recording: Annotated[
+        Path | None,
+        typer.Option(help="Serve this recording instead: play it, go to any time, ask why; nothing needs to be up."),
+    ] = None,
     kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim; default: the robot's.")] = "",
     new_tokens: Annotated[
         bool,
@@ -237,7 +241,7 @@ def serve(
     connect: Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Serve the console, or with --design the mission designer, as a web page: for browsers, tablets and phones."""
+    """Serve the console, the mission designer (--design) or a recording as a web page, for any browser."""
     from ui_console.web.login import WrongOperator, new_rights, read_operator
 
     try:
@@ -246,16 +250,21 @@ def serve(
         raise _usage(f"--operator {wrong}") from wrong
     if key and not certificate:
         raise _usage("--key belongs to a --certificate")
-    if design and (mission is not None or connect is not None):
-        raise _usage("--design serves a mission file; --mission and --connect are for missions that are up")
+    if (design or recording) and (mission is not None or connect is not None):
+        raise _usage("--design and --recording serve a file; --mission and --connect are for missions that are up")
+    if design and recording:
+        raise _usage("--design and --recording cannot be served by one server")
     try:
         from ui_console.design.serving import serve_designer
+        from ui_console.web.recording_serving import serve_recording
         from ui_console.web.serving import Claims, ServerOptions, serve_console
     except ModuleNotFoundError as missing:
         raise _usage(f"{missing.name} is not installed; install scout-backbone[web]") from missing
     options, claims = ServerOptions(host, port, certificate, key, new_tokens), Claims(kind, away_after)
     if design:
         run(lambda: serve_designer(design, rights, options))
+    if recording is not None:
+        run(lambda: serve_recording(recording, rights, options))
     where = chosen(mission, connect, secret_file)
     run(lambda: serve_console(where, rights, options, claims))
 

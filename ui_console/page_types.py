@@ -16,6 +16,7 @@ import msgspec
 from msgspec import inspect
 
 from backbone.component.messages import ComponentState
+from backbone.recording.markers import Marker
 from backbone.scheduling.views import RequestView
 from ui_console.design.answers import DesignAnswer
 from ui_console.design.protocol import DesignIntent
@@ -32,8 +33,10 @@ from ui_console.model import views
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.debug_views import SeenViews
 from ui_console.model.map import BodyView, FloorView
+from ui_console.model.playback import PlaybackView
 from ui_console.model.timeline import TimelineView
 from ui_console.web.login import BeatRequest, Hello
+from ui_console.web.playing import Playing
 from ui_console.web.protocol import Intent
 
 FOLDER = Path(__file__).parent / "web" / "page"
@@ -94,6 +97,8 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bodies: list[BodyView]
     now_s: float
     seen: SeenViews
+    playback: PlaybackView
+    markers: list[Marker]
     beat: int
 
 
@@ -196,7 +201,7 @@ CONSOLE = Page(
     FOLDER / "messages.d.ts",
     View,
     (WhyAnswer, RefusedAnswer, ParametersAnswer, SetAnswer, LogFoundAnswer, LogRefusedAnswer),
-    (Hello, BeatRequest, *get_args(Intent)),
+    (Hello, BeatRequest, *get_args(Intent), *get_args(Playing)),
 )
 DESIGNER = Page(
     FOLDER / "design_messages.d.ts", DesignView, get_args(DesignAnswer), (Hello, BeatRequest, *get_args(DesignIntent))

@@ -36,7 +36,7 @@ from backbone.recording.reasons import reasons_at
 from backbone.recording.rerun import launch_of, run_again
 from backbone.scheduling.events import Record
 from backbone.spoken import counted
-from backbone.waiting import first_of
+from backbone.waiting import first_to_end
 from backbone.wire import plain
 
 REPLAY = "replay"
@@ -145,6 +145,7 @@ async def _play_in(
     )
     player.ends = ended.set
     try:
+        player.catch_up()
         player.begin()
         clock.origin_monotonic_s = time.monotonic() - since_s / wanted.speed
         run_files.write(
@@ -159,7 +160,7 @@ async def _play_in(
             )
         )
         say(f"plays {path} from {since_s:.3f} s on as mission {name}; Ctrl-C ends it")
-        await first_of(_play_to_end(player), ended.wait())
+        await first_to_end(_play_to_end(player), ended.wait())
     finally:
         await bus.close()
 

@@ -17,11 +17,12 @@ from backbone.keys import Conversation, address_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.recording.hearing import is_meant
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.recorded_mission import RecordedMission
+from backbone.recording.recorded_mission import HISTORY, STATES, RecordedMission
 from backbone.recording.revival import message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message
 
 _PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, Conversation.TOLD}
+_KNOWN = tuple(f"*/{said}" for said in (*STATES, *HISTORY))
 
 
 class Player:
@@ -59,19 +60,26 @@ class Player:
         self.played = 0
         """Publications so far."""
 
-    def begin(self) -> None:
-        """Take in what was said before, answer questions, and say what a newcomer must know.
+    def catch_up(self) -> None:
+        """Take in what was said before. It uses no bus, so it may run in a thread.
 
         Raises:
             NoRecording: The recording is damaged.
         """
-        for address in (NAMESERVER, LAUNCHER):
-            self._serve(address)
-        for message in self._recording.messages(until_s=math.nextafter(self._since_s, -math.inf)):
+        for message in self._recording.messages(_KNOWN, until_s=math.nextafter(self._since_s, -math.inf)):
             self._mission.take(message)
-            self._serve(address_of(message.key))
+
+    def begin(self) -> None:
+        """Answer questions, and say what a newcomer must know. When: after ``catch_up``."""
+        for address in dict.fromkeys((NAMESERVER, LAUNCHER, *self._mission.speakers)):
+            self._serve(address)
         for address in self._mission.present:
             self._tokens[address] = self._bus.declare_alive(address)
+        self._bus.watch_alive("*/*", lambda address, alive: None if alive else self._mission.gone(address))
+        self.say_again()
+
+    def say_again(self) -> None:
+        """Publish the newest message of each key that tells a state."""
         for message in self._mission.newest():
             said = message_as_sent(self._classes, message)
             if said is not None:

@@ -34,8 +34,14 @@ from backbone.wire import Message, schema_of
 
 READS = ("Ask", "List", "Resolve")
 """First words of questions that change nothing."""
-STATES = frozenset({Conversation.STATUS, Conversation.SCHEDULE, Conversation.HEALTH, Conversation.POSES})
+STATES = frozenset(
+    {Conversation.STATUS, Conversation.SCHEDULE, Conversation.HEALTH, Conversation.POSES, Conversation.FRAMES}
+)
 """Conversations whose newest message is what a newcomer must know."""
+HISTORY = frozenset(
+    {Conversation.ALIVE, Conversation.ASK, Conversation.LOG, Conversation.OPERATORS, Conversation.DECISIONS}
+)
+"""Conversations of which all messages until then decide what is answered."""
 MOST_OPEN = 1000  # chosen: questions under way at one time; the others were never answered
 
 
@@ -63,13 +69,16 @@ class RecordedMission:
     Attributes:
         now_s: Mission time.
         present: Addresses of the components that are ready.
+        speakers: Addresses of all of whom there was a message.
     """
 
     def __init__(self, classes: Mapping[str, type[Message]], rate: float = 1.0) -> None:
         self.now_s = 0.0
         self.present: dict[str, None] = {}
+        self.speakers: dict[str, None] = {}
         self._classes, self._rate = classes, rate
         self._states: dict[str, ComponentState] = {}
+        self._guests: dict[str, ComponentState] = {}  # who came to look
         self._newest: dict[tuple[str, str], Recorded] = {}
         self._open: OrderedDict[str, tuple[str, str, bytes]] = OrderedDict()
         self._answers: dict[tuple[str, str, bytes], Message] = {}
@@ -79,8 +88,9 @@ class RecordedMission:
     def take(self, message: Recorded) -> Message | None:
         """Let it have been said; return it as it was sent, see ``message_as_sent``."""
         self.now_s = max(self.now_s, message.at_s)
-        said = message_as_sent(self._classes, message)
         address, conversation = address_of(message.key), message.key.rpartition("/")[2]
+        self.speakers[address] = None
+        said = message_as_sent(self._classes, message)
         if conversation in STATES:
             self._newest[message.key, message.schema] = message
         match said:
@@ -114,14 +124,17 @@ class RecordedMission:
         match question:
             case AskTime():
                 return MissionTime(self.now_s, self._rate)
-            case Register():
+            case Register(component=guest):
+                self._guests[guest.address] = guest
                 return Registered()
             case ListComponents(subsystem=subsystem, type=kind) if address == NAMESERVER:
-                states = [self._states[at] for at in sorted(self._states.keys() & self.present.keys())]
+                there = {at: one for at, one in self._states.items() if at in self.present} | self._guests
+                states = [there[at] for at in sorted(there)]
                 of = [one for one in states if one.address.startswith(subsystem) and kind in ("", one.type)]
                 return Components(of, True, 0.0)
             case Resolve(name=name):
-                found = [one for one in self._states.values() if component_of(one.address) == name]
+                those = (self._states | self._guests).values()
+                found = [one for one in those if component_of(one.address) == name]
                 if not found:
                     raise UnknownName(f"no component is named {name!r} at {self.now_s:.3f} s", name=name)
                 return Resolved(found[-1])
@@ -139,6 +152,10 @@ class RecordedMission:
         if known is None:
             raise NotAnswered(f"{address} did not answer {type(question).__name__} until {self.now_s:.3f} s")
         return known
+
+    def gone(self, guest: str) -> None:
+        """Forget who came to look, by address."""
+        self._guests.pop(guest, None)
 
     def _presence_changed(self, address: str, alive: bool) -> None:
         if alive:

@@ -94,9 +94,9 @@ class WebHub:
         """Number of pictures encoded as JPEG."""
 
     # ------------------------------------------------------------------ operators come and go
-    def enter(self, welcome: Welcome) -> Operator:
-        """Return a new operator, whose page gets the whole view."""
-        operator = Operator(self, welcome)
+    def enter(self, welcome: Welcome, former: Operator | None = None) -> Operator:
+        """Return a new operator, whose page gets the whole view; ``former`` as in ``Operator``."""
+        operator = Operator(self, welcome, former)
         self.clients[operator] = None
         welcomed = {"user": welcome.user, "priority": welcome.priority, "mission": self._launch.mission}
         operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))

@@ -78,15 +78,16 @@ class Operator:
     Args:
         services: The server's.
         welcome: Identity and priority.
+        former: The same person at the same page, before the page shows another time of a recording; None: a new page.
     """
 
-    def __init__(self, services: OperatorServices, welcome: Welcome) -> None:
+    def __init__(self, services: OperatorServices, welcome: Welcome, former: Operator | None = None) -> None:
         self.welcome = welcome
-        self.outbox = Outbox()
-        self.news = asyncio.Event()
+        self.outbox: Outbox = Outbox() if former is None else former.outbox
+        self.news: asyncio.Event = asyncio.Event() if former is None else former.news
         """Set when there is something to send."""
         self.is_there = True
-        self.sight = PageSight()
+        self.sight: PageSight = PageSight() if former is None else former.sight
         """The debug views that this page shows."""
         self.model = ConsoleModel(welcome.user, welcome.user, services.team)
         self.answers = ConsentAnswers(welcome.user, services.clock, self.show, services.observer.acted)

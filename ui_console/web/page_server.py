@@ -57,10 +57,17 @@ class CannotListen(Refusal):
 class Client(Protocol):
     """A person at a page, from the right token to the end of the connection."""
 
-    welcome: Welcome
-    outbox: Outbox
-    news: asyncio.Event
-    """Set when there is something to send."""
+    @property
+    def welcome(self) -> Welcome:
+        """Identity."""
+
+    @property
+    def outbox(self) -> Outbox:
+        """Messages not sent yet."""
+
+    @property
+    def news(self) -> asyncio.Event:
+        """Set when there is something to send."""
 
 
 ClientT = TypeVar("ClientT", bound=Client)

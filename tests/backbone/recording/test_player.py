@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import io
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_recordings import CLASSES, SCOUT, Said, recorded
 
 from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -28,30 +28,15 @@ from backbone.component.messages import (
 )
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
-from backbone.keys import key as key_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.mission_log.log import AskLog, Log
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.recording.known_messages import message_classes
 from backbone.recording.player import Player
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.recorded_mission import NotAnswered, TakesNoCommands
-from backbone.recording.writer import RecordingWriter
-from backbone.wire import WIRE_VERSION, Envelope, Message, write
+from backbone.wire import Envelope, Message
 from resource_pool.commands import Move
-
-CLASSES = message_classes()
-SCOUT = "resource_pool/scout1"
-
-
-class Said(NamedTuple):
-    at_s: float
-    address: str
-    conversation: Conversation
-    body: Message
-    source: str = SCOUT
-    cause: str = ""
 
 
 def event(number: int) -> StoryEvent:
@@ -63,15 +48,7 @@ def state(doing: str) -> ComponentState:
 
 
 def recording_of(*said: Said) -> Recording:
-    """Return a recording; the messages of each sender are numbered in their order."""
-    file, numbers = io.BytesIO(), dict.fromkeys((one.source for one in said), 0)
-    writer = RecordingWriter(file, CLASSES, {})
-    for one in said:
-        numbers[one.source] += 1
-        envelope = Envelope(WIRE_VERSION, one.source, numbers[one.source], one.at_s, one.cause, one.body)
-        writer.write(key_of("night", one.address, one.conversation), write(envelope), one.at_s)
-    writer.finish()
-    return Recording(file)
+    return Recording(recorded(said))
 
 
 MORNING = (
@@ -111,6 +88,7 @@ def played(
             )
         ear.watch_alive("*/*", lambda address, alive: tokens.append((address, alive)))
         player = Player(bus, clock, recording, classes, since_s=since_s, **options)
+        player.catch_up()
         player.begin()
         running = asyncio.create_task(player.run())
         if scene is not None:
@@ -246,3 +224,22 @@ def test_a_message_of_an_unknown_class_is_passed_over():
     known = {schema: kind for schema, kind in CLASSES.items() if kind is not ComponentState}
     heard = played(recording_of(*MORNING), classes=known)
     assert [said for _at_s, said, _envelope in heard] == [Conversation.LOG, Conversation.LOG]
+
+
+def test_who_comes_to_look_is_there_until_it_leaves():
+    guest = ComponentState("ui_console/web-1", "console", "base", 8, LifeState.READY, 0.0, "")
+
+    async def scene(bus: LocalBus, clock: VirtualClock, _player: Player) -> None:
+        async def there() -> list[str]:
+            listed = await bus.ask(NAMESERVER, ListComponents(subsystem="ui_console"), Components, within_s=1.0)
+            return [one.address for one in listed.components]
+
+        await clock.sleep_until_s(1.5)
+        await bus.ask(NAMESERVER, Register(guest), Registered, within_s=1.0)
+        token = bus.declare_alive(guest.address)
+        assert await there() == [guest.address]
+        token.close()
+        await clock.sleep_s(0.1)
+        assert await there() == []
+
+    played(recording_of(*MORNING), scene)

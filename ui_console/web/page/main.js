@@ -13,6 +13,7 @@ import { Login } from "./login.js";
 import { RobotMap } from "./map.js";
 import { notice, read, showAlarm, showHealth } from "./notices.js";
 import { Orders } from "./orders.js";
+import { Playback } from "./playback.js";
 import { Seen } from "./seen.js";
 import { Stopping } from "./stopping.js";
 import { Tables } from "./tables.js";
@@ -65,6 +66,7 @@ const commands = new Commands({
 });
 const hand = new Hand({ act, driving, commands });
 const map = new RobotMap({ act, inHand: () => hand.stick });
+const playback = new Playback({ say, act });
 const orders = new Orders({ list: find("orders"), act });
 const blindness = new Blindness({
   link,
@@ -143,6 +145,8 @@ function heard(message) {
   if (changes.health !== undefined) showHealth(changes.health);
   if (changes.components) seen.know(changes.components);
   if (changes.seen) seen.heard(changes.seen);
+  if (changes.playback) playback.show(changes.playback);
+  if (changes.markers) playback.mark(changes.markers);
   if (changes.alarms) showAlarm(changes.alarms, act);
   if (changes.welcome || changes.robots || changes.log) log.know(view);
   tables.show(view, changes);

@@ -224,6 +224,19 @@ export interface LostView {
   may_retake: boolean;
 }
 
+export interface Marker {
+  at_s: number;
+  kind: MarkerKind;
+  name: string;
+  line: string;
+}
+
+export type MarkerKind =
+  | "alarm"
+  | "grant"
+  | "operator"
+  | "revoked";
+
 export type NodeState =
   | "failure"
   | "idle"
@@ -310,6 +323,14 @@ export interface ParameterView {
 export interface ParametersAnswer {
   parameters: string;
   told: boolean;
+}
+
+export interface PlaybackView {
+  begin_s: number;
+  end_s: number;
+  at_s: number;
+  is_playing: boolean;
+  speed: number;
 }
 
 export interface Reach {
@@ -477,6 +498,8 @@ export interface View {
   bodies: BodyView[];
   now_s: number;
   seen: SeenViews;
+  playback: PlaybackView;
+  markers: Marker[];
   beat: number;
 }
 
@@ -535,6 +558,11 @@ export interface GiveRequest {
   role: string;
 }
 
+export interface GoTo {
+  do: "go_to";
+  at_s: number;
+}
+
 export interface Hello {
   do: "hello";
   token: string;
@@ -586,6 +614,10 @@ export interface ParametersRequest {
   name: string;
 }
 
+export interface Pause {
+  do: "pause";
+}
+
 export interface PictureOrder {
   do: "order_in_picture";
   moment: number;
@@ -595,6 +627,11 @@ export interface PictureOrder {
   row_px: number;
   width_px: number;
   height_px: number;
+}
+
+export interface PlayOn {
+  do: "play_on";
+  speed?: number;
 }
 
 export interface ReleaseRequest {
@@ -625,6 +662,10 @@ export interface Steer {
   forward: number;
   right: number;
   speed: number;
+}
+
+export interface StepOn {
+  do: "step_on";
 }
 
 export interface StopAllRequest {
@@ -692,4 +733,8 @@ export type Said =
   | Acknowledge
   | ParametersRequest
   | SetRequest
-  | Here;
+  | Here
+  | PlayOn
+  | Pause
+  | StepOn
+  | GoTo;

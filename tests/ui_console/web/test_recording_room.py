@@ -1,0 +1,222 @@
+"""A recording at a page: each time of it shows what was so then, however one got there; nothing can be commanded."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from small_recordings import SCOUT, Said, recorded
+
+from backbone.addresses import NAMESERVER, RC_MANAGER
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.component.messages import ComponentState, LifeState, LogLevel, StoryEvent
+from backbone.keys import Conversation
+from backbone.recording.presence import Presence
+from backbone.scheduling.requests import Holder
+from backbone.scheduling.views import RcView, Schedule
+from backbone.wire import Message
+from resource_pool.arc_client import Frame
+from ui_console.web import playing, protocol
+from ui_console.web.login import Welcome
+from ui_console.web.recording_room import NOT_NOW, RecordingRoom, Viewer
+
+ARC = "watch-capture"
+FIRST_S, LAST_S = 1.0, 60.0
+EACH_S = 5.0
+
+
+def said_by(address: str, at_s: float, conversation: Conversation, body: Message) -> Said:
+    return Said(at_s, address, conversation, body, address)
+
+
+def state(address: str, kind: str, doing: str = "") -> ComponentState:
+    return ComponentState(address, kind, "base", 7, LifeState.READY, 0.5, doing, is_robot=kind == "scout")
+
+
+def a_minute() -> list[Said]:
+    """Return a mission in which a robot says each five seconds how often it did, and an ARC holds it all the time."""
+    begin = [Said(FIRST_S, at, Conversation.ALIVE, Presence(True), "") for at in (NAMESERVER, RC_MANAGER, SCOUT)] + [
+        said_by(RC_MANAGER, 1.1, Conversation.STATUS, state(RC_MANAGER, "rc_manager"))
+    ]
+    told: list[Said] = []
+    for number in range(12):
+        at_s = 2.0 + EACH_S * number
+        holder = Holder(ARC, number + 1, at_s, 0.0)
+        views = [RcView("scout1", "scout", "up", False, 1.0, [holder], number + 1, [], [at_s + 9.0], is_robot=True)]
+        told += [
+            said_by(SCOUT, at_s, Conversation.STATUS, state(SCOUT, "scout", f"round {number}")),
+            said_by(RC_MANAGER, at_s, Conversation.SCHEDULE, Schedule(at_s, views, [], [])),
+            said_by(f"resource_pool/{ARC}", at_s, Conversation.FRAMES, picture(at_s, number)),
+            said_by(
+                SCOUT, at_s, Conversation.LOG, StoryEvent(at_s, SCOUT, f"round {number}", "scout1", "", LogLevel.INFO)
+            ),
+        ]
+    fell = StoryEvent(LAST_S, SCOUT, "fell over", "scout1", "", LogLevel.ALARM)
+    return [*begin, *told, said_by(SCOUT, LAST_S, Conversation.LOG, fell)]
+
+
+def picture(at_s: float, number: int) -> Frame:
+    return Frame("grabber", ARC, number + 1, "scout1", number, at_s, 4, 2, bytes([number * 10]) * 8)
+
+
+FILE = recorded(a_minute()).getvalue()
+
+
+class Page:
+    """What a page would show."""
+
+    def __init__(self, room: RecordingRoom) -> None:
+        self.room = room
+        self.viewer: Viewer = room.enter(Welcome("anna", 100))
+        self.view: dict[str, Any] = {}
+        self.answers: list[dict[str, Any]] = []
+        self.pictures = 0
+
+    async def does(self, intent: Any) -> None:
+        await self.room.obey(self.viewer, intent)
+
+    async def looks(self, seconds: float = 2.5) -> dict[str, Any]:
+        """Return the view after so long."""
+        clock = VirtualClock()
+        until_s = clock.now_s() + seconds
+        while clock.now_s() < until_s:
+            while (message := self.viewer.outbox.next(clock.now_s())) is not None:
+                if isinstance(message, bytes):
+                    self.pictures += 1
+                    number = int.from_bytes(message[1 + message[0] : 5 + message[0]], "big")
+                    await self.does(protocol.Drawn("scout1", number))
+                    continue
+                said = json.loads(message)
+                self.view |= said.get("view", {})
+                self.answers += [said["answer"]] if "answer" in said else []
+            await clock.sleep_s(0.05)
+        return self.view
+
+    async def round(self) -> str:
+        """Return what the robot says it does."""
+        view = await self.looks()
+        return str({one["address"]: one["feedback"] for one in view["components"]}.get(SCOUT, "gone"))
+
+
+def on_a_page(scene: Callable[[RecordingRoom, Page], Awaitable[None]], file: bytes = FILE) -> None:
+    async def run() -> None:
+        room = RecordingRoom(lambda: io.BytesIO(file), VirtualClock())
+        life = asyncio.create_task(room.run())
+        try:
+            await scene(room, Page(room))
+        finally:
+            room.end("the test is over")
+            await life
+
+    run_virtual(run())
+
+
+def round_at(at_s: float) -> str:
+    return f"round {int((at_s - 2.0) // EACH_S)}" if at_s >= 2.0 else "gone"
+
+
+@settings(max_examples=25, deadline=None)
+@given(times=st.lists(st.floats(2.0, LAST_S), min_size=1, max_size=4))
+def test_a_time_shows_the_same_however_one_got_there(times: list[float]):
+    async def scene(room: RecordingRoom, page: Page) -> None:
+        for at_s in times:
+            await page.does(playing.GoTo(at_s))
+            assert await page.round() == round_at(at_s)
+            assert room.playback.now_s() == at_s
+            assert page.view["playback"]["at_s"] == pytest.approx(at_s, abs=1e-3)
+
+    on_a_page(scene)
+
+
+def test_it_is_played_paused_and_stops_at_the_end():
+    async def scene(room: RecordingRoom, page: Page) -> None:
+        await page.looks()
+        assert page.view["playback"] == {
+            "begin_s": FIRST_S, "end_s": LAST_S, "at_s": FIRST_S, "is_playing": False, "speed": 1.0,
+        }  # fmt: skip
+        assert [one["line"] for one in page.view["markers"]] == ["scout1: fell over"]
+        await page.does(playing.PlayOn(2.0))
+        await page.looks(10.0)
+        await page.does(playing.Pause())
+        assert await page.round() == round_at(room.playback.now_s()) == "round 3"
+        await page.does(playing.PlayOn(10.0))
+        view = await page.looks(10.0)
+        assert (view["playback"]["at_s"], view["playback"]["is_playing"]) == (LAST_S, False)
+        await page.does(playing.PlayOn(10.0))
+        assert room.playback.now_s() == FIRST_S, "from the begin again"
+
+    on_a_page(scene)
+
+
+def test_a_step_goes_to_the_next_picture_or_event():
+    async def scene(room: RecordingRoom, page: Page) -> None:
+        await page.does(playing.GoTo(12.5))
+        await page.looks()
+        await page.does(playing.StepOn())
+        assert room.playback.now_s() == 17.0
+        assert await page.round() == "round 3"
+        await page.does(playing.GoTo(LAST_S))
+        await page.looks()
+        await page.does(playing.StepOn())
+        assert room.playback.now_s() == LAST_S
+
+    on_a_page(scene)
+
+
+def test_pictures_come_also_where_time_stands_still():
+    async def scene(_room: RecordingRoom, page: Page) -> None:
+        await page.does(protocol.Watch(["scout1"]))
+        await page.does(playing.GoTo(33.0))
+        await page.looks(4.0)
+        assert page.pictures
+
+    on_a_page(scene)
+
+
+@pytest.mark.parametrize(
+    "intent",
+    [
+        protocol.TakeOver("scout1"),
+        protocol.StopRequest("scout1"),
+        protocol.StopAllRequest(),
+        protocol.Steer(0, 1.0, 0.0, 1.0),
+        protocol.SetRequest("scout1", "speed", 1),
+        protocol.EndOrders(["scout1"]),
+    ],
+)
+def test_nothing_can_be_commanded(intent: protocol.Intent):
+    async def scene(_room: RecordingRoom, page: Page) -> None:
+        await page.does(intent)
+        await page.looks()
+        assert page.answers == [{"refused": NOT_NOW}]
+
+    on_a_page(scene)
+
+
+def test_what_was_so_can_be_asked():
+    async def scene(_room: RecordingRoom, page: Page) -> None:
+        await page.does(playing.GoTo(20.0))
+        await page.does(protocol.WhyRequest("scout1"))  # at once: the answer is of that time all the same
+        await page.looks()
+        assert any("round 3" in line for line in page.answers[0]["lines"]), page.answers
+
+    on_a_page(scene)
+
+
+def test_pages_see_the_same_time_and_one_may_leave():
+    async def scene(room: RecordingRoom, page: Page) -> None:
+        other = Page(room)
+        await other.does(playing.GoTo(47.0))
+        await page.looks()
+        await room.leave(other.viewer, "has gone away")
+        await page.does(playing.GoTo(7.0))
+        assert await page.round() == "round 1"
+        assert len(room.clients) == 1
+
+    on_a_page(scene)

@@ -1,0 +1,61 @@
+"""Messages of a page that shows a recording: those that only look, and those that play it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from backbone.ranges import Instant
+from backbone.recording.playback import FASTEST, SLOWEST
+from ui_console.web.login import BeatRequest, Hello
+from ui_console.web.protocol import (
+    Acknowledge,
+    Drawn,
+    Here,
+    Intent,
+    LookInto,
+    MoreLog,
+    ParametersRequest,
+    SearchLog,
+    Watch,
+    WhyRequest,
+)
+
+Looking = Acknowledge | Drawn | Here | LookInto | MoreLog | ParametersRequest | SearchLog | Watch | WhyRequest
+"""Intents that command nothing."""
+
+
+class PlayOn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="play_on"):
+    """Play on, so many mission seconds in a second."""
+
+    speed: Annotated[float, msgspec.Meta(ge=SLOWEST, le=FASTEST)] = 1.0
+
+
+class Pause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="pause"):
+    """Stand still."""
+
+
+class StepOn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="step_on"):
+    """Go on to the next picture, decision or event, and stand still there."""
+
+
+class GoTo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="go_to"):
+    """Show another time."""
+
+    at_s: Instant
+
+
+Playing = PlayOn | Pause | StepOn | GoTo
+_intents: msgspec.json.Decoder[Hello | BeatRequest | Intent | Playing] = msgspec.json.Decoder(
+    Hello | BeatRequest | Intent | Playing
+)
+
+
+def understand(data: bytes | str) -> Hello | BeatRequest | Intent | Playing:
+    """Return the decoded message.
+
+    Raises:
+        msgspec.DecodeError: The message is not valid.
+    """
+    return _intents.decode(data)
