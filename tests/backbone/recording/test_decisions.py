@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from random import Random
 from typing import Any
 
 import pytest
 
 from backbone.addresses import RC_MANAGER
-from backbone.bus.clock import VirtualClock
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.local_bus import LocalNetwork
+from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
+from backbone.rc_manager.messages import AskWhy
 from backbone.recording.decisions import NoSuchRule, NotRecorded, decided_anew, schedule_at
 from backbone.recording.hearing import to_overhear
 from backbone.recording.known_messages import message_classes
@@ -22,29 +26,40 @@ from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.fairness import Turns
 from backbone.scheduling.own_planner import WrongPlanner
-from backbone.scheduling.views import Schedule
+from backbone.scheduling.views import Schedule, Why
 from mission_control.laboratory.simulation import mission_run
-from mission_control.laboratory.simulation.mission_run import run_mission
+from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
+from mission_control.laboratory.simulation.shape import draw_shape
 from mission_control.laboratory.simulation.unreliable_network import UnreliableNetwork
 
 CLASSES = message_classes()
 MOST_BYTES = 2**30
 SEEDS = range(20)
+ASKED_SEEDS, ASKED = range(4), 50
 
+Beside = Callable[[LocalNetwork], Coroutine[Any, Any, None]]
 RecordMission = Callable[..., Recording]
+
+
+async def nothing(_network: LocalNetwork) -> None:
+    """Do nothing beside the mission."""
 
 
 @pytest.fixture
 def recorded(monkeypatch: pytest.MonkeyPatch) -> RecordMission:
-    """Return what plays the chaotic mission of a seed and returns the recording of it."""
+    """Return what plays the chaotic mission of a seed, with something beside it, and returns the recording of it."""
 
-    def play(seed: int, leave_out: Callable[[str, bytes], bool] = lambda _key, _raw: False) -> Recording:
+    def play(
+        seed: int, leave_out: Callable[[str, bytes], bool] = lambda _key, _raw: False, beside: Beside = nothing
+    ) -> Recording:
         file = io.BytesIO()
         writer = RecordingWriter(file, CLASSES, {})
+        networks: list[LocalNetwork] = []
 
         class OverheardNetwork(UnreliableNetwork):
             def __init__(self, *args: Any) -> None:
                 super().__init__(*args)
+                networks.append(self)
                 self._recorder = self.join("backbone/recorder", VirtualClock())
                 for conversation in to_overhear(()):
                     self._recorder.overhear(conversation, self._heard, MOST_BYTES)
@@ -53,8 +68,19 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> RecordMission:
                 if not leave_out(key, raw):
                     writer.write(key, raw, 0.0)
 
+        async def both(mission: Coroutine[Any, Any, MissionRun]) -> MissionRun:
+            task = asyncio.create_task(beside(networks[0]), name="beside the mission")
+            try:
+                return await mission
+            finally:
+                task.cancel()
+                await asyncio.wait({task})
+                if not task.cancelled():
+                    task.result()
+
         with monkeypatch.context() as patched:
             patched.setattr(mission_run, "UnreliableNetwork", OverheardNetwork)
+            patched.setattr(mission_run, "run_virtual", lambda mission: run_virtual(both(mission)))
             run_mission(seed, chaos=True)
         writer.finish()
         return Recording(file)
@@ -118,6 +144,30 @@ def test_the_schedule_of_each_instant_is_the_one_that_was_published_then(recorde
 def schedule_then(recording: Recording, message: Recorded) -> Schedule:
     manager = schedule_at(recording, message.at_s)
     return Answers(manager).schedule(message.body["at_s"])
+
+
+@pytest.mark.parametrize("seed", ASKED_SEEDS)
+def test_reasons_of_random_instants_are_those_that_were_given_then(recorded: RecordMission, seed: int):
+    """Two hundred questions in all, while ARCs ask and give back, and RCs and the RC manager itself die and return."""
+    drawn, shape, given = Random(seed), draw_shape(seed), list[Why]()
+    names = [name for owner in shape.owners for name in (owner.arc, owner.name)]
+    names += [resource.name for resource in shape.resources]
+
+    async def ask(network: LocalNetwork) -> None:
+        clock = VirtualClock()
+        bus = network.join("ui_console/asker", clock)
+        while True:
+            await clock.sleep_s(drawn.uniform(0.0, 2 * (shape.active_s + shape.calm_s) / (3 * ASKED)))
+            try:
+                given.append(await bus.ask(RC_MANAGER, AskWhy(drawn.choice(names)), Why, within_s=0.5))
+            except (LinkError, Refusal):  # it is dead or cut off, or has no request of that name
+                continue
+
+    recording = recorded(seed, beside=ask)
+    assert len(given) >= ASKED
+    assert len({why.state for why in given}) > 2
+    for why in drawn.sample(given, ASKED):
+        assert reasons_at(recording, why.name, why.at_s).why == why
 
 
 def test_without_a_snapshot_there_is_no_schedule(recorded: RecordMission):
