@@ -21,7 +21,7 @@ from backbone.rc_manager.messages import Decided, ScheduleSnapshot, TraceLine
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.revival import revived
 from backbone.scheduling import snapshot
-from backbone.scheduling.events import Event, Record
+from backbone.scheduling.events import Event, Instruction, Record, Woken
 from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
@@ -98,7 +98,7 @@ class OtherDecision:
     Attributes:
         number: Of the decision.
         at_s: Its mission time.
-        event: On which it was made.
+        event: On which it was made; ``Woken`` if other rules decide of themselves where the recorded ones did not.
         recorded: Its lines and their causes, as recorded.
         decided: The same, as decided now.
     """
@@ -161,24 +161,24 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> Co
         NoSnapshot, OtherForm: The recording is of another release.
     """
     found = Comparison()
-    manager: ScheduleManager | None = None
+    anew: _Anew | None = None
     number, began = 0, False
     for step in _steps(recording, since_s):
         if isinstance(step, ScheduleSnapshot):
-            if manager is None or step.number == 0:
-                manager, number, began = _first(step, rules), step.number, True
+            if anew is None or step.number == 0:
+                anew, number, began = _Anew(step, rules), step.number, True
             continue
-        if manager is None or step.decided.number <= number:
+        if anew is None or step.decided.number <= number:
             continue
         found.missing += step.decided.number - number - 1
         if step.decided.number != number + 1:
-            manager = None  # until the next snapshot
+            anew = None  # until the next snapshot
             continue
         number = step.decided.number
-        decided = [one for one in manager.handle(step.decided.event, step.decided.at_s) if isinstance(one, Record)]
-        recorded = step.records
-        if rules:  # they stand in the lines that begin a section
-            recorded, decided = ([one for one in lines if one.line["ev"] != "meta"] for lines in (recorded, decided))
+        found.difference = anew.of_itself(number, step.decided.at_s)
+        if found.difference is not None:
+            return found
+        recorded, decided = anew.lines(step.records), anew.decide(step.decided.event, step.decided.at_s)
         is_same = [one.line for one in recorded] == [one.line for one in decided]
         if not is_same and not step.is_whole:
             found.missing += 1
@@ -186,12 +186,47 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> Co
         found.decisions += 1
         found.grants += sum(one.line["ev"] == "grant" for one in recorded)
         if not is_same:
-            of = step.decided
-            found.difference = OtherDecision(number, of.at_s, of.event, tuple(recorded), tuple(decided))
+            found.difference = OtherDecision(number, step.decided.at_s, step.decided.event, recorded, decided)
             return found
     if not began:
         raise NotRecorded("the recording has no state of the schedule")
+    if anew is not None and rules:
+        last_s = max(message.at_s for message in recording.messages(source=RC_MANAGER))
+        found.difference = anew.of_itself(number + 1, last_s)
     return found
+
+
+class _Anew:
+    """A schedule manager that decides anew. Beside one with other rules goes one as recorded."""
+
+    def __init__(self, begin: ScheduleSnapshot, rules: dict[str, Any]) -> None:
+        self._manager = _first(begin, rules)
+        self._as_recorded = snapshot.read(begin.state) if rules else None
+
+    def decide(self, event: Event, at_s: float) -> tuple[Record, ...]:
+        """Decide on a recorded event; return the lines that count."""
+        if self._as_recorded is not None:
+            self._as_recorded.handle(event, at_s)
+        return self.lines(self._manager.handle(event, at_s))
+
+    def of_itself(self, number: int, before_s: float) -> OtherDecision | None:
+        """Decide whenever the manager wakes before this time and the recorded one did not; return what it decides."""
+        while (wake_s := self._own_wake_s()) is not None and wake_s < before_s:
+            decided = self.lines(self._manager.handle(Woken(), wake_s))
+            if decided:
+                return OtherDecision(number, wake_s, Woken(), (), decided)
+        return None
+
+    def _own_wake_s(self) -> float | None:
+        if self._as_recorded is None or self._manager.wake_s is None:
+            return None
+        recorded_s = self._as_recorded.wake_s
+        return self._manager.wake_s if recorded_s is None or self._manager.wake_s < recorded_s else None
+
+    def lines(self, told: Iterable[Instruction]) -> tuple[Record, ...]:
+        """Return the lines that count: of other rules not those that begin a section, which name the rules."""
+        lines = (one for one in told if isinstance(one, Record))
+        return tuple(one for one in lines if self._as_recorded is None or one.line["ev"] != "meta")
 
 
 def _first(begin: ScheduleSnapshot, rules: dict[str, Any]) -> ScheduleManager:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 from collections.abc import Callable, Coroutine
+from functools import cache
 from random import Random
 from typing import Any
 
@@ -23,6 +24,7 @@ from backbone.recording.reader import Recorded, Recording
 from backbone.recording.reasons import reasons_at
 from backbone.recording.revival import revived
 from backbone.recording.writer import RecordingWriter
+from backbone.scheduling.events import Woken
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.fairness import Turns
 from backbone.scheduling.own_planner import WrongPlanner
@@ -45,47 +47,47 @@ async def nothing(_network: LocalNetwork) -> None:
     """Do nothing beside the mission."""
 
 
-@pytest.fixture
-def recorded(monkeypatch: pytest.MonkeyPatch) -> RecordMission:
+@pytest.fixture(scope="module")
+def recorded() -> RecordMission:
     """Return what plays the chaotic mission of a seed, with something beside it, and returns the recording of it."""
+    return cache(play)
 
-    def play(
-        seed: int, leave_out: Callable[[str, bytes], bool] = lambda _key, _raw: False, beside: Beside = nothing
-    ) -> Recording:
-        file = io.BytesIO()
-        writer = RecordingWriter(file, CLASSES, {})
-        networks: list[LocalNetwork] = []
 
-        class OverheardNetwork(UnreliableNetwork):
-            def __init__(self, *args: Any) -> None:
-                super().__init__(*args)
-                networks.append(self)
-                self._recorder = self.join("backbone/recorder", VirtualClock())
-                for conversation in to_overhear(()):
-                    self._recorder.overhear(conversation, self._heard, MOST_BYTES)
+def play(
+    seed: int, leave_out: Callable[[str, bytes], bool] = lambda _key, _raw: False, beside: Beside = nothing
+) -> Recording:
+    file = io.BytesIO()
+    writer = RecordingWriter(file, CLASSES, {})
+    networks: list[LocalNetwork] = []
 
-            def _heard(self, key: str, raw: bytes) -> None:
-                if not leave_out(key, raw):
-                    writer.write(key, raw, 0.0)
+    class OverheardNetwork(UnreliableNetwork):
+        def __init__(self, *args: Any) -> None:
+            super().__init__(*args)
+            networks.append(self)
+            self._recorder = self.join("backbone/recorder", VirtualClock())
+            for conversation in to_overhear(()):
+                self._recorder.overhear(conversation, self._heard, MOST_BYTES)
 
-        async def both(mission: Coroutine[Any, Any, MissionRun]) -> MissionRun:
-            task = asyncio.create_task(beside(networks[0]), name="beside the mission")
-            try:
-                return await mission
-            finally:
-                task.cancel()
-                await asyncio.wait({task})
-                if not task.cancelled():
-                    task.result()
+        def _heard(self, key: str, raw: bytes) -> None:
+            if not leave_out(key, raw):
+                writer.write(key, raw, 0.0)
 
-        with monkeypatch.context() as patched:
-            patched.setattr(mission_run, "UnreliableNetwork", OverheardNetwork)
-            patched.setattr(mission_run, "run_virtual", lambda mission: run_virtual(both(mission)))
-            run_mission(seed, chaos=True)
-        writer.finish()
-        return Recording(file)
+    async def both(mission: Coroutine[Any, Any, MissionRun]) -> MissionRun:
+        task = asyncio.create_task(beside(networks[0]), name="beside the mission")
+        try:
+            return await mission
+        finally:
+            task.cancel()
+            await asyncio.wait({task})
+            if not task.cancelled():
+                task.result()
 
-    return play
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(mission_run, "UnreliableNetwork", OverheardNetwork)
+        patched.setattr(mission_run, "run_virtual", lambda mission: run_virtual(both(mission)))
+        run_mission(seed, chaos=True)
+    writer.finish()
+    return Recording(file)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -111,6 +113,24 @@ def test_with_other_rules_the_first_decision_that_differs_has_both_reasons(recor
     assert named
     lines = [line for one in named for line in (*one.recorded, *one.decided)]
     assert any(line.cause for line in lines)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_recorded_rules_given_as_other_rules_make_no_difference(recorded: RecordMission, seed: int):
+    shape = draw_shape(seed)
+    found = decided_anew(recorded(seed), policy=shape.policy, grace_s=shape.grace_s)
+    assert found.difference is None
+    assert found.decisions > 10
+
+
+def test_what_other_rules_decide_of_themselves_between_recorded_events_is_a_difference(recorded: RecordMission):
+    """An ARC rises by waiting alone: nothing happened then that the recording could have."""
+    found = [decided_anew(recorded(seed), aging_s=0.5).difference for seed in SEEDS]
+    named = [one for one in found if one is not None and isinstance(one.event, Woken)]
+    assert named
+    for one in named:
+        assert one.recorded == ()
+        assert one.decided
 
 
 def test_a_rule_that_is_none_is_refused(recorded: RecordMission):
