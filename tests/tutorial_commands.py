@@ -13,6 +13,7 @@ import pytest
 
 BIN = Path(sys.executable).parent
 ASKING = ("scout-backbone status", "scout-backbone why", "scout-backbone story", "scout-console look")
+ENDS_WITHIN_S = 120.0  # the longest command of a tutorial is a whole mission of half a minute
 TRUE_WITHIN_S = 20.0  # what a command shows may need a turn to become so; only commands that ask are run again
 
 
@@ -70,6 +71,6 @@ def run(command: str, folder: Path, environment: dict[str, str]) -> subprocess.C
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=60,
+        timeout=ENDS_WITHIN_S,
         check=False,
     )
