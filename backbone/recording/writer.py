@@ -23,7 +23,7 @@ ABOUT = "mission"
 """Name of the metadata about the mission."""
 NS = 1_000_000_000
 CHUNK_BYTES = 256 * 1024  # chosen: a chunk is written well before the next flush, and still compresses
-MOST_AWAY_S = 60.0  # chosen: beyond any delay and any difference of clocks that a mission survives
+MOST_AHEAD_S = 60.0  # chosen: beyond any difference of clocks that a mission survives
 MOST_CHANNELS = 60_000  # MCAP specification, op 0x04: id is a uint16; the rest is for channels of any sender
 MOST_SEQUENCE = 2**32  # MCAP specification, op 0x05: sequence is a uint32
 MIME_XML = "application/xml"
@@ -65,7 +65,8 @@ class RecordingWriter:
             self._write(said_at, message, at_s)
 
     def _write(self, key: str, message: Translated, at_s: float) -> None:
-        is_credible = message.source and abs(message.stamp_s - at_s) <= MOST_AWAY_S
+        # A question comes with its answer, maybe hours later; but nothing is sent before the mission begins.
+        is_credible = message.source and -MOST_AHEAD_S <= message.stamp_s <= at_s + MOST_AHEAD_S
         channel, data = self._channel_and_data(key, message)
         sent_ns = _ns(message.stamp_s if is_credible else at_s)
         self._writer.add_message(

@@ -160,6 +160,15 @@ def test_a_time_that_is_not_credible_orders_nothing(stamp_s: float) -> None:
     assert (found.at_s, found.stamp_s) == (3.0, stamp_s)
 
 
+def test_a_question_whose_answer_took_hours_stands_where_it_was_asked() -> None:
+    file = io.BytesIO()
+    made = writer(file)
+    made.write(key_of(SOURCES[0]), raw(SOURCES[0], 20, story(20)), 5.0)
+    made.write(key_of(SOURCES[0]), raw(SOURCES[0], 1, story(1)), 10_000.0)
+    made.finish()
+    assert [one.sequence for one in read(file.getvalue())] == [1, 20]
+
+
 def test_unknown_messages_and_bytes_that_are_none_are_in_the_recording() -> None:
     file = io.BytesIO()
     made = writer(file)
