@@ -67,6 +67,7 @@ _SURE = (zenoh.Priority.DATA, zenoh.CongestionControl.BLOCK)
 MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
 _REPEATED = (zenoh.Priority.DATA, zenoh.CongestionControl.DROP)
 _BULK = (zenoh.Priority.DATA_LOW, zenoh.CongestionControl.DROP)
+_FOR_RECORDERS = (zenoh.Priority.BACKGROUND, zenoh.CongestionControl.DROP)
 _QUALITY = {
     Conversation.COMMAND: _URGENT,
     Conversation.LEASES: _URGENT,
@@ -76,6 +77,8 @@ _QUALITY = {
     Conversation.SCHEDULE: _SURE,
     Conversation.FRAMES: _BULK,
     Conversation.LOG: _BULK,
+    Conversation.TOLD: _FOR_RECORDERS,
+    Conversation.DECISIONS: _FOR_RECORDERS,
 }
 
 
