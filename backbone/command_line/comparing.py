@@ -1,14 +1,17 @@
-"""The work of ``scout-backbone compare``: two recordings side by side."""
+"""The work of ``scout-backbone compare``: two recordings side by side, or what their watchers saw of marks."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from backbone.command_line.recording_work import opened
+from backbone.command_line.unusable_file import FileUnusable
+from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.recording.comparison import Difference, KeyComparison, Named, compared
+from backbone.recording.detection import Detection, Mark, detected, read_marks, sightings, worse
 from backbone.spoken import counted
 
 LONGEST_VALUE = 60  # chosen: two of them fit a line of a wide terminal
@@ -20,6 +23,59 @@ async def compare(
     """Print where two recordings differ by more than the tolerances; ``REFUSED`` if they do."""
     with opened(first) as one, opened(second) as other:
         return print_comparison(compared(one.messages(keys), other.messages(keys), tolerances), as_json=as_json)
+
+
+async def compare_detection(paths: Sequence[Path], marks_file: Path, later_s: float, *, as_json: bool) -> ExitCode:
+    """Print what was seen of the marks in each recording; ``REFUSED`` if one is worse than the first.
+
+    Args:
+        later_s: See ``worse``.
+    """
+    marks = _marks(marks_file)
+    found = {path: _detection(path, marks) for path in paths}
+    complaints = {path: worse(found[paths[0]], one, later_s) for path, one in found.items()}
+    for path, one in found.items():
+        show([json.dumps(_detection_json(path, one, complaints[path])) if as_json else _detection_line(path, one)])
+    for path, worse_in in complaints.items():
+        for complaint in worse_in:
+            say(f"{path} is worse than {paths[0]}: {complaint}")
+    return ExitCode.REFUSED if any(complaints.values()) else ExitCode.DONE
+
+
+def _marks(path: Path) -> list[Mark]:
+    try:
+        return read_marks(path.read_text())
+    except (OSError, UnicodeError) as error:
+        raise FileUnusable(f"{path} cannot be read: {error}") from error
+
+
+def _detection(path: Path, marks: Sequence[Mark]) -> Detection:
+    with opened(path) as recording:
+        contents = recording.contents()
+        seen = sightings(recording.messages((f"*/{Conversation.EVENTS}",)))
+    return detected(marks, seen, contents.end_s - contents.begin_s)
+
+
+def _detection_line(path: Path, found: Detection) -> str:
+    seen = found.seen_after_s
+    line = f"{path}: detected {len(seen)} of {counted(len(found.delays_s), 'mark')}, missed {found.missed}"
+    if found.median_delay_s is not None:
+        line += f", after {found.median_delay_s:.3f} s (median), {found.largest_delay_s:.3f} s (largest)"
+    return f"{line}; {found.false_alarms_per_minute:.3g} false alarms a minute"
+
+
+def _detection_json(path: Path, found: Detection, worse_in: list[str]) -> dict[str, object]:
+    return {
+        "recording": str(path),
+        "marks": len(found.delays_s),
+        "missed": found.missed,
+        "delays_s": found.delays_s,
+        "median_delay_s": found.median_delay_s,
+        "largest_delay_s": found.largest_delay_s,
+        "false_alarms": found.false_alarms,
+        "false_alarms_per_minute": found.false_alarms_per_minute,
+        "worse": worse_in,
+    }
 
 
 def print_comparison(found: Mapping[Named, KeyComparison], *, as_json: bool) -> ExitCode:

@@ -46,6 +46,7 @@ Tolerances = Annotated[
     list[str] | None,
     typer.Option("--tolerance", metavar="FIELD=X", help="Numbers of this field may be so far apart; repeatable."),
 ]
+DELAY = "delay_s"
 MOST_LINES = 1_000_000
 MOST_TOLERANCE = 1e18  # as the largest number of a message
 
@@ -226,16 +227,26 @@ def replay(
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(metavar="A.mcap", help="A recording.")],
-    second: Annotated[Path, typer.Argument(metavar="B.mcap", help="Another one.")],
+    files: Annotated[list[Path], typer.Argument(metavar="A.mcap…", help="Two recordings; with --detect any number.")],
     keys: Keys = None,
     tolerances: Tolerances = None,
+    marks: Annotated[
+        Path | None,
+        typer.Option("--detect", metavar="MARKS.jsonl", help="What watchers saw of these marks, instead of all keys."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Compare two recordings key by key: first difference, and how far numbers are apart; exit code 5: they differ."""
+    """Compare recordings key by key, or with --detect what was seen in them; exit code 5: they differ, or are worse."""
     from backbone.command_line import comparing
 
     allowed = dict(_tolerance(one) for one in tolerances or [])
+    if marks is not None:
+        if keys or not allowed.keys() <= {DELAY}:
+            raise typer.BadParameter(f"with --detect only --tolerance {DELAY}=X, for later detections, counts")
+        run(lambda: comparing.compare_detection(files, marks, allowed.get(DELAY, 0.0), as_json=as_json))
+    if len(files) != 2:
+        raise typer.BadParameter("two recordings are compared; more or one only with --detect")
+    first, second = files
     run(lambda: comparing.compare(first, second, tuple(keys or ()), allowed, as_json=as_json))
 
 
