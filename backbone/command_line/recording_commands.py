@@ -174,6 +174,20 @@ def export(
     run(lambda: export_to(file, folder, tuple(keys or ()), with_videos=video))
 
 
+@recording.command()
+def foxglove(
+    file: File,
+    to: Annotated[Path, typer.Argument(metavar="TO.mcap", help="The new file.")],
+    keys: Keys = None,
+) -> None:
+    """Write a copy that Foxglove, Lichtblick and Rerun show: pictures, robots in their room, log, all numbers."""
+    from backbone.command_line.extras import needing_extras
+
+    with needing_extras():
+        from backbone.command_line.foxglove_copy import copy_for_foxglove
+    run(lambda: copy_for_foxglove(file, to, tuple(keys or ())))
+
+
 @recording.command("mission")
 def print_mission(file: File) -> None:
     """Print the mission file that was up."""

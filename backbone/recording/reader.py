@@ -13,7 +13,7 @@ from typing import IO, Any, cast
 import msgspec
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader
 from mcap.summary import Summary
 from mcap.writer import CompressionType, Writer
@@ -34,6 +34,13 @@ class NoRecording(Refusal):
 
     code = "recording.unreadable"
     remedy = "If its recorder was killed: scout-backbone record recover FILE TO."
+
+
+class NotOfMessages(NoRecording):
+    """The file is whole, but no recording of a bus, such as a copy for other tools."""
+
+    code = "recording.other"
+    remedy = "Name the recording itself, which 'scout-backbone record' or 'up --record' wrote."
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,16 +111,18 @@ class Recording:
         file: Read until the recording is not used any more; not closed.
 
     Raises:
-        NoRecording: The file is none, or its recorder was killed.
+        NoRecording: The file is none, or its recorder was killed; ``NotOfMessages``: it holds something else.
     """
 
     def __init__(self, file: IO[bytes]) -> None:
         try:
             _check_index(file)
             self._reader = SeekingReader(file, validate_crcs=True, record_size_limit=MOST_RECORD_BYTES)
-            summary = self._reader.get_summary()
+            profile, summary = self._reader.get_header().profile, self._reader.get_summary()
         except (*_DAMAGED, OSError) as error:
             raise NoRecording(f"no whole recording: {error}") from error
+        if profile != PROFILE:
+            raise NotOfMessages(f"the file is of profile {profile!r}, a recording of {PROFILE!r}")
         if summary is None or summary.statistics is None:
             raise NoRecording("the recording has no index")
         self._summary: Summary = summary
@@ -152,6 +161,13 @@ class Recording:
             until_s: Not after it; None: to the end.
             source: Only of this sender; empty: of all.
         """
+        for _schema, _channel, _message, recorded in self.records(patterns, since_s, until_s, source):
+            yield recorded
+
+    def records(
+        self, patterns: tuple[str, ...] = (), since_s: float = 0.0, until_s: float | None = None, source: str = ""
+    ) -> Iterator[tuple[Schema | None, Channel, Message, Recorded]]:
+        """Yield the messages, see ``messages``, with their records in the file."""
         if until_s is not None and until_s < since_s:
             return
         named = [(channel.topic, *_named(channel)[:2]) for channel in self._summary.channels.values()]
@@ -163,10 +179,10 @@ class Recording:
         end_ns = None if until_s is None else round(until_s * NS)
         found = self._reader.iter_messages(topics, starting_at=max(0, round(since_s * NS)), ending_at=end_ns)
         try:
-            for _schema, channel, message in found:
+            for schema, channel, message in found:
                 recorded = _recorded(channel, message)
                 if (not patterns or is_meant(recorded.key, patterns)) and source in ("", recorded.source):
-                    yield recorded
+                    yield schema, channel, message, recorded
         except _DAMAGED as error:
             raise NoRecording(f"the recording is damaged: {error}") from error
 
@@ -189,7 +205,7 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> int:
     """Write a whole recording with all messages before the damage; return their number.
 
     Raises:
-        NoRecording: Not even the begin is there.
+        NoRecording: Not even the begin is there; ``NotOfMessages``: it is a copy for other tools.
     """
     writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
     writer.start(profile=PROFILE, library=PROFILE)
@@ -201,6 +217,8 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> int:
         for record in reader.records:
             has_begun = True
             match record:
+                case Header(profile=""):  # any other may be damaged
+                    raise NotOfMessages(f"the file is of profile '', a recording of {PROFILE!r}")
                 case Schema() if record.id not in schemas:
                     schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
                 case Channel() if record.id not in channels:

@@ -40,6 +40,8 @@ PLANTED = [
     ("mujoco", "resource_pool/robots/walker/planted.py", "import mink"),
     ("cv2", "mission_control/planted.py", "import cv2"),
     ("cv2", "ui_console/planted.py", "import cv2"),
+    ("foxglove", "backbone/recording/planted.py", "import foxglove"),
+    ("foxglove", "resource_pool/planted.py", "from foxglove.messages import Log"),
     ("pydantic", "backbone/placer/planted.py", "import pydantic"),
     ("pydantic", "resource_pool/planted.py", "from lxml import etree"),
     ("textual", "mission_control/planted.py", "import textual.app"),

@@ -1,0 +1,31 @@
+"""The work of ``scout-backbone recording foxglove``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from backbone.command_line.recording_work import opened
+from backbone.command_line.unusable_file import FileUnusable
+from backbone.foxglove.translated_copy import write_copy
+from backbone.foxglove.well_known import installed
+from backbone.launcher.endings import ExitCode, say
+from backbone.spoken import counted
+
+
+async def copy_for_foxglove(path: Path, to: Path, keys: tuple[str, ...]) -> ExitCode:
+    """Write a copy of the recording in a new file, with what Foxglove shows.
+
+    Raises:
+        FileUnusable: The recording cannot be read, or the new file exists or cannot be written.
+        NoRecording: The file is none, or its recorder was killed.
+    """
+    with opened(path) as recording:
+        try:
+            with to.open("xb") as file:
+                shown = write_copy(recording, file, installed(), keys)
+        except FileExistsError as error:
+            raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
+        except OSError as error:
+            raise FileUnusable(f"{to}: {error.strerror or error}") from error
+    say(f"{to}: {counted(shown, 'message')} that Foxglove shows, and all others as recorded")
+    return ExitCode.DONE

@@ -1,0 +1,1 @@
+"""What other tools show of a mission without a plug-in: Foxglove, Lichtblick, Rerun."""

@@ -1,0 +1,68 @@
+"""Messages in Foxglove's well-known schemas, which Foxglove, Lichtblick and Rerun show without a plug-in. Pure.
+
+A package names its tables of translations as entry points of the group ``scout_backbone.foxglove``: message class → a
+function from such a message to the well-known ones that show it. They are encoded as Protocol Buffers, because Rerun
+reads these schemas in no other encoding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Any, Protocol
+
+from foxglove import Schema
+from foxglove.messages import Timestamp
+
+from backbone.wire import Message
+
+GROUP = "scout_backbone.foxglove"
+ENCODING = "protobuf"
+LATEST_S = 2**32 - 1  # google.protobuf.Timestamp as the SDK has it: whole seconds are a uint32
+
+
+class Encodable(Protocol):
+    """A message of Foxglove's SDK."""
+
+    @staticmethod
+    def get_schema() -> Schema:
+        """Return its schema."""
+
+    def encode(self) -> bytes:
+        """Return its bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class WellKnown:
+    """What a message is in one of Foxglove's schemas.
+
+    Attributes:
+        topic: One for each thing that is shown, because tools go on showing the last message of each topic.
+        message: In Foxglove's schema.
+        is_all: True: it has all that the message has, which then need not be shown beside it.
+    """
+
+    topic: str
+    message: Encodable
+    is_all: bool = False
+
+
+Translations = Mapping[type[Message], Callable[[Any], Iterable[WellKnown]]]
+
+
+def installed() -> Translations:
+    """Return the translations of the installed packages."""
+    tables: list[Translations] = [entry.load() for entry in entry_points(group=GROUP)]
+    return {kind: translation for table in tables for kind, translation in table.items()}
+
+
+def shown_as(message: Message | None, translations: Translations) -> list[WellKnown]:
+    """Return what shows this message; nothing if there is none, or no translation of its class."""
+    translation = translations.get(type(message)) if message is not None else None
+    return [*translation(message)] if translation is not None else []
+
+
+def moment(at_s: float) -> Timestamp:
+    """Return a mission time; one that Foxglove cannot say is the nearest that it can."""
+    return Timestamp.from_epoch_secs(min(max(at_s, 0.0), LATEST_S))
