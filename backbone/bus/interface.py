@@ -144,7 +144,9 @@ class Bus(Protocol):
                 the order of each source.
         """
 
-    def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
+    def overhear(
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+    ) -> Overhearing:
         """Call ``listener(key, bytes)``, in the event loop, with each publication of a conversation, whoever sends it.
 
         The bytes are not read, so messages of unknown classes and malformed ones come too. Of conversations that are
@@ -153,6 +155,7 @@ class Bus(Protocol):
 
         Args:
             most_waiting_bytes: Messages that arrive while so many bytes wait for the listener are dropped and counted.
+            of: Address under which they are published; empty: any. Others then make no copies.
         """
 
     def declare_alive(self, address: str) -> Subscription:

@@ -128,10 +128,10 @@ class Neighbor(BusBase):
         return listening
 
     def overhear_neighbors(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str
     ) -> Overheard:
-        """Subscribe to a conversation of all components of this process."""
-        overheard = Overheard(self, conversation, listener, most_waiting_bytes)
+        """Subscribe to a conversation of components of this process."""
+        overheard = Overheard(self, conversation, listener, most_waiting_bytes, of)
         self.network.overhearers.append(overheard)
         return overheard
 
@@ -162,7 +162,7 @@ class Neighbor(BusBase):
     def is_overheard_by_neighbors(self, conversation: Conversation) -> bool:
         """Return whether anybody in this process hears this conversation of its own address."""
         network = self.network
-        return any(overheard.hears(conversation) for overheard in network.overhearers) or any(
+        return any(overheard.hears(self.source, conversation) for overheard in network.overhearers) or any(
             _matches(listening.pattern, self.source) for listening in network.listeners[conversation]
         )
 
@@ -245,20 +245,20 @@ class Listening(Declaration):
 
 
 class Overheard(Declaration):
-    """A declaration that subscribes to a conversation of all components, as bytes."""
+    """A declaration that subscribes to a conversation of one component or of all, as bytes."""
 
-    def __init__(self, owner: Neighbor, conversation: Conversation, listener: Overhearer, most: int) -> None:
+    def __init__(self, owner: Neighbor, conversation: Conversation, listener: Overhearer, most: int, of: str) -> None:
         super().__init__(owner, lambda: owner.network.overhearers.remove(self))
-        self._conversation, self._listener, self._most = conversation, listener, most
+        self._conversation, self._listener, self._most, self._of = conversation, listener, most, of
         self._waiting = self.dropped = 0
 
-    def hears(self, conversation: Conversation) -> bool:
-        """Return whether it is subscribed to this conversation."""
-        return conversation is self._conversation
+    def hears(self, address: str, conversation: Conversation) -> bool:
+        """Return whether it is subscribed to this conversation of this address."""
+        return conversation is self._conversation and self._of in ("", address)
 
     def arrived(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Deliver a publication in a step of its own, unless too many wait."""
-        if not self.hears(conversation):
+        if not self.hears(address, conversation):
             return
         raw = write(envelope)
         if self._waiting + len(raw) > self._most:
@@ -340,10 +340,12 @@ class LocalBus(Neighbor):
         _check(self.mission, address)
         return self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest)
 
-    def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overheard:
-        """Subscribe to a conversation of all components; see ``Bus.overhear``."""
+    def overhear(
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+    ) -> Overheard:
+        """Subscribe to a conversation of one component or of all; see ``Bus.overhear``."""
         self.require_open()
-        return self.overhear_neighbors(conversation, listener, most_waiting_bytes)
+        return self.overhear_neighbors(conversation, listener, most_waiting_bytes, of)
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether anybody hears this conversation of its own address."""

@@ -100,10 +100,12 @@ class SharedBus(Neighbor, ZenohBus):
         """Return whether anybody hears this conversation of its own address, here or in another process."""
         return self.is_overheard_by_neighbors(conversation) or super().is_overheard(conversation)
 
-    def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
+    def overhear(
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+    ) -> Overhearing:
         """Subscribe to a conversation of all components, neighbors too; see ``Bus.overhear``."""
-        elsewhere = super().overhear(conversation, listener, most_waiting_bytes)
-        return _BothHeard(elsewhere, self.overhear_neighbors(conversation, listener, most_waiting_bytes))
+        elsewhere = super().overhear(conversation, listener, most_waiting_bytes, of)
+        return _BothHeard(elsewhere, self.overhear_neighbors(conversation, listener, most_waiting_bytes, of))
 
     def declare_alive(self, address: str) -> Subscription:
         """Raise a liveliness token; see ``Bus.declare_alive``."""

@@ -328,11 +328,14 @@ class ZenohBus(InboxBus):
         )
         return self._declare(self._session.declare_subscriber(pattern, receive))
 
-    def overhear(self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int) -> Overhearing:
+    def overhear(
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+    ) -> Overhearing:
         """Subscribe to whole conversations, unread; see ``Bus.overhear``."""
         self.require_open()
         heard = OverheardSamples(self, listener, most_waiting_bytes)
-        heard.declared = self._declare(self._session.declare_subscriber(key_of_all(self._mission, conversation), heard))
+        expression = key(self._mission, of, conversation) if of else key_of_all(self._mission, conversation)
+        heard.declared = self._declare(self._session.declare_subscriber(expression, heard))
         return heard
 
     # ------------------------------------------------------------------ life

@@ -602,6 +602,36 @@ def test_a_conversation_is_overheard_whoever_says_what_in_it(on_bus: Runner) -> 
     on_bus(law)
 
 
+def test_one_component_is_overheard_and_no_other_copies_anything(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, other, listener = net.join(SERVER), net.join(THIRD), net.join(ASKER)
+        told, came = list[tuple[str, Copies]](), asyncio.Event()
+
+        def overheard(key: str, raw: bytes) -> None:
+            told.append((key, Reader(Copies).read(raw).body))
+            came.set()
+
+        listener.overhear(Conversation.TOLD, overheard, 1_000_000, SERVER)
+        await until_known(listener, source)
+        await until_known(listener, other)
+
+        while not told:  # the sender knows of a listener a moment later
+            source.publish(SERVER, Conversation.STATUS, News(0))
+            await net.clock.sleep_s(0.005)
+        other.publish(THIRD, Conversation.STATUS, News(1))
+        source.publish(SERVER, Conversation.STATUS, News(2))
+
+        async def last_came() -> None:
+            while Reader(News).read(told[-1][1].messages[0]).body.number != 2:
+                came.clear()
+                await came.wait()
+
+        await within(last_came(), "the last copy")
+        assert {key for key, _ in told} == {f"scout/conformance/{SERVER}/told"}
+
+    on_bus(law)
+
+
 def test_who_overhears_too_slowly_loses_messages_and_knows_how_many(on_bus: Runner) -> None:
     async def law(net: Net) -> None:
         source, listener = net.join(SERVER), net.join(ASKER)
