@@ -42,6 +42,7 @@ PLANTED = [
     ("cv2", "ui_console/planted.py", "import cv2"),
     ("foxglove", "backbone/recording/planted.py", "import foxglove"),
     ("foxglove", "resource_pool/planted.py", "from foxglove.messages import Log"),
+    ("prometheus", "backbone/metrics/planted.py", "import prometheus_client"),
     ("pydantic", "backbone/placer/planted.py", "import pydantic"),
     ("pydantic", "resource_pool/planted.py", "from lxml import etree"),
     ("textual", "mission_control/planted.py", "import textual.app"),

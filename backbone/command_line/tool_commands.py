@@ -1,0 +1,34 @@
+"""``scout-backbone`` ``bridge``, ``metrics``: a mission that is up, for other tools. They change nothing in it.
+
+Rules of this file: as those of ``cli``.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from backbone.command_line.extras import needing_extras
+from backbone.command_line.options import Endpoint, MissionName, SecretFile, chosen, run
+
+METRICS_PORT = 9464  # OpenTelemetry's port for Prometheus
+MOST_PORT = 65_535
+
+Host = Annotated[
+    str, typer.Option("--host", help="Address to listen at; anybody who reaches it reads all. Default: this machine.")
+]
+
+
+def metrics(
+    host: Host = "127.0.0.1",
+    port: Annotated[int, typer.Option("--port", min=1, max=MOST_PORT, help="Port to listen at.")] = METRICS_PORT,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Serve numbers of the schedule to Prometheus: who held and waited for what, switches, drops; until Ctrl-C."""
+    with needing_extras():
+        from backbone.command_line.metrics_work import serve_metrics
+    where = chosen(mission, connect, secret_file)
+    run(lambda: serve_metrics(where, host, port))

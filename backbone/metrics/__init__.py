@@ -1,0 +1,1 @@
+"""Metrics: what a mission's schedule did so far, in numbers that only grow, for Prometheus."""
