@@ -37,7 +37,7 @@ from backbone.command_line.options import (
     run,
 )
 from backbone.command_line.recording_commands import compare, inject, record, recording, replay, top, watch
-from backbone.command_line.tool_commands import metrics
+from backbone.command_line.tool_commands import bridge, metrics
 from backbone.command_line.tree_commands import tree
 from backbone.component.log_level import LogLevel
 from backbone.launcher.endings import ExitCode, say
@@ -350,6 +350,7 @@ app.command()(top)
 app.command()(inject)
 app.command()(replay)
 app.command()(compare)
+app.command()(bridge)
 app.command()(metrics)
 
 

@@ -11,13 +11,30 @@ import typer
 
 from backbone.command_line.extras import needing_extras
 from backbone.command_line.options import Endpoint, MissionName, SecretFile, chosen, run
+from backbone.command_line.recording_commands import Keys
 
+BRIDGE_PORT = 8765  # where Foxglove looks first
 METRICS_PORT = 9464  # OpenTelemetry's port for Prometheus
 MOST_PORT = 65_535
 
 Host = Annotated[
     str, typer.Option("--host", help="Address to listen at; anybody who reaches it reads all. Default: this machine.")
 ]
+
+
+def bridge(
+    keys: Keys = None,
+    host: Host = "127.0.0.1",
+    port: Annotated[int, typer.Option("--port", min=1, max=MOST_PORT, help="Port to listen at.")] = BRIDGE_PORT,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Show a mission live in Foxglove or Lichtblick: cameras, robots in their room, all messages; until Ctrl-C."""
+    with needing_extras():
+        from backbone.command_line.bridging import bridge as show_live
+    where = chosen(mission, connect, secret_file)
+    run(lambda: show_live(where, host, port, tuple(keys or ())))
 
 
 def metrics(

@@ -125,19 +125,26 @@ def _lines(key: str, message: Translated, at_s: float, wanted: Watched) -> Itera
 async def _listening(
     where: Where, keys: tuple[str, ...], heard: Callable[[str, Translated, float], None]
 ) -> AsyncIterator[tuple[Clock, list[Overhearing]]]:
-    """Call ``heard`` with key, message and mission time of all that is meant."""
-    async with connected(where) as (bus, clock):
-        hearing = Hearing(await mission_classes(bus), keys)
-
-        def came(key: str, raw: bytes) -> None:
-            at_s = clock.now_s()
-            for said_at, message in hearing.heard(key, raw, at_s):
-                heard(said_at, message, at_s)
-
-        subscribed = [bus.overhear(one, came, MOST_WAITING_BYTES) for one in to_overhear(keys)]
+    async with connected(where) as (bus, clock), overhearing(bus, clock, keys, heard) as subscribed:
         yield clock, subscribed
-        for one in subscribed:
-            one.close()
+
+
+@asynccontextmanager
+async def overhearing(
+    bus: Bus, clock: Clock, keys: tuple[str, ...], heard: Callable[[str, Translated, float], None]
+) -> AsyncIterator[list[Overhearing]]:
+    """Call ``heard`` with key, message and mission time of all that is meant."""
+    hearing = Hearing(await mission_classes(bus), keys)
+
+    def came(key: str, raw: bytes) -> None:
+        at_s = clock.now_s()
+        for said_at, message in hearing.heard(key, raw, at_s):
+            heard(said_at, message, at_s)
+
+    subscribed = [bus.overhear(one, came, MOST_WAITING_BYTES) for one in to_overhear(keys)]
+    yield subscribed
+    for one in subscribed:
+        one.close()
 
 
 @asynccontextmanager

@@ -101,11 +101,9 @@ class RecordingWriter:
         return shared, msgspec.json.encode(data)
 
     def _new_channel(self, key: str, source: str, schema: str, kind: type[Message] | None) -> int:
-        path = "/".join(key.split("/")[2:])
-        topic = f"/{path}/{schema.partition('/')[0]}".replace("//", "/").rstrip("/")
         about = {"key": key, "source": source, "schema": schema}
         number = self._schema(kind) if kind is not None else 0
-        made = self._writer.register_channel(topic, "json" if schema else "", number, about)
+        made = self._writer.register_channel(topic_of(key, schema), "json" if schema else "", number, about)
         self._channels[key, source, schema] = made
         return made
 
@@ -115,6 +113,17 @@ class RecordingWriter:
             name = kind.__struct_config__.tag
             known = self._schemas[kind] = self._writer.register_schema(str(name), "jsonschema", schema_json(kind))
         return known
+
+
+def topic_of(key: str, schema: str) -> str:
+    """Return the topic of messages of a schema at a key, as other tools show it.
+
+    Example:
+        >>> topic_of("scout/night/resource_pool/scout1/readings", "Readings/1")
+        '/resource_pool/scout1/readings/Readings'
+    """
+    path = "/".join(key.split("/")[2:])
+    return f"/{path}/{schema.partition('/')[0]}".replace("//", "/").rstrip("/")
 
 
 def _ns(at_s: float) -> int:
