@@ -127,9 +127,9 @@ def read_marks(text: str) -> list[Mark]:
 
 
 def sightings(messages: Iterable[Recorded]) -> list[Sighting]:
-    """Return the sightings among these messages."""
+    """Return the sightings among these messages; one that lacks its time or robot is none."""
     seen = (one.body for one in messages if one.schema.partition("/")[0] == SIGHTING and isinstance(one.body, dict))
-    return [Sighting(body["at_s"], body["robot"]) for body in seen]
+    return [Sighting(body["at_s"], body["robot"]) for body in seen if {"at_s", "robot"} <= body.keys()]
 
 
 def detected(marks: Sequence[Mark], seen: Iterable[Sighting], lasted_s: float) -> Detection:
