@@ -76,8 +76,8 @@ class FoundEvent(LoggedEvent, frozen=True):
     time: str
 
 
-class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """All sections of the view; a message has those that changed."""
+class MissionView(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """All sections of the view of a mission; a message has those that changed."""
 
     welcome: Welcomed
     own: views.OwnView
@@ -97,9 +97,14 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bodies: list[BodyView]
     now_s: float
     seen: SeenViews
+    beat: int
+
+
+class View(MissionView, frozen=True):
+    """Those, and the sections that only a recording has."""
+
     playback: PlaybackView
     markers: list[Marker]
-    beat: int
 
 
 class LogFound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

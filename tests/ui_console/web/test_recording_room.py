@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import inspect
+from sent_types import odd
 from small_recordings import SCOUT, Said, recorded
 
 from backbone.addresses import NAMESERVER, RC_MANAGER
@@ -22,6 +24,7 @@ from backbone.scheduling.requests import Holder
 from backbone.scheduling.views import RcView, Schedule
 from backbone.wire import Message
 from resource_pool.arc_client import Frame
+from ui_console.page_types import View
 from ui_console.web import playing, protocol
 from ui_console.web.login import Welcome
 from ui_console.web.recording_room import NOT_NOW, RecordingRoom, Viewer
@@ -141,6 +144,7 @@ def test_it_is_played_paused_and_stops_at_the_end():
             "begin_s": FIRST_S, "end_s": LAST_S, "at_s": FIRST_S, "is_playing": False, "speed": 1.0,
         }  # fmt: skip
         assert [one["line"] for one in page.view["markers"]] == ["scout1: fell over"]
+        assert odd(page.view, inspect.type_info(View)) == ["view.beat"], "the page was not asked for a sign of life"
         await page.does(playing.PlayOn(2.0))
         await page.looks(10.0)
         await page.does(playing.Pause())

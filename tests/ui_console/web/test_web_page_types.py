@@ -8,7 +8,7 @@ from sent_types import fits, odd
 from web_stage import Stage
 
 from backbone.component.messages import StoryEvent
-from ui_console.page_types import CONSOLE, DESIGNER, Page, View, declarations
+from ui_console.page_types import CONSOLE, DESIGNER, MissionView, Page, declarations
 
 
 @pytest.mark.parametrize("page", [CONSOLE, DESIGNER], ids=lambda page: page.file.name)
@@ -27,7 +27,7 @@ async def test_what_a_server_sends_has_the_types_that_the_page_is_checked_by(sta
         await anna.wait(lambda: any(robot["stop"] for robot in anna.view["robots"]), "stopped")
         await anna.say(do="beat", number=1)
         await anna.wait(lambda: "beat" in anna.view, "beat")
-        assert odd(anna.view, inspect.type_info(View)) == []
+        assert odd(anna.view, inspect.type_info(MissionView)) == []
         await anna.say(do="search_log", number=1)
         await anna.say(do="search_log", number=2, level="loud")
         for intent in ({"do": "why", "name": "scout1"}, {"do": "parameters", "name": "scout1"}):

@@ -498,9 +498,9 @@ export interface View {
   bodies: BodyView[];
   now_s: number;
   seen: SeenViews;
+  beat: number;
   playback: PlaybackView;
   markers: Marker[];
-  beat: number;
 }
 
 export interface ViewRow {
