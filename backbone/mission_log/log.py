@@ -7,6 +7,7 @@ consoles.
 
 from __future__ import annotations
 
+import copy
 from collections import deque
 from collections.abc import Iterable, Sequence
 from itertools import islice
@@ -147,6 +148,12 @@ class MissionLog:
         """Return the events that match, with the names of people."""
         found = chosen(map(self.people.named_event, filter(asked.reaches, self._events)), asked)
         return Log(found[-asked.most :], max(0, len(found) - asked.most), self._since_s)
+
+    def copied(self) -> MissionLog:
+        """Return a log that goes on from here by itself; the events, which never change, are in both."""
+        twin = MissionLog()
+        twin._events, twin._since_s, twin.people = self._events.copy(), self._since_s, copy.deepcopy(self.people)
+        return twin
 
     def _recall(self, events: Sequence[StoryEvent]) -> None:
         """Keep earlier events, too; an event that is kept already is in it once."""

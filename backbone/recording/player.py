@@ -6,7 +6,6 @@ gave; tokens of liveliness rise and fall. Nothing can be commanded.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial, reduce
 from operator import or_
@@ -15,14 +14,14 @@ from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.keys import Conversation, address_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
+from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.hearing import is_meant
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.recorded_mission import HISTORY, STATES, RecordedMission
+from backbone.recording.recorded_mission import RecordedMission
 from backbone.recording.revival import message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message
 
 _PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, Conversation.TOLD}
-_KNOWN = tuple(f"*/{said}" for said in (*STATES, *HISTORY))
 
 
 class Player:
@@ -36,6 +35,7 @@ class Player:
         since_s: Mission time at which it begins; what was said before is known.
         keys: Patterns of the keys whose publications are played; none: all.
         next_step: Awaited before each publication, with the message; None: play in the recorded time.
+        checkpoints: Of the same recording; None: it is read from its begin.
     """
 
     def __init__(
@@ -48,10 +48,12 @@ class Player:
         since_s: float,
         keys: tuple[str, ...] = (),
         next_step: Callable[[Recorded], Awaitable[None]] | None = None,
+        checkpoints: Checkpoints | None = None,
     ) -> None:
         self._bus, self._clock, self._recording = bus, clock, recording
         self._since_s, self._keys, self._next_step = since_s, keys, next_step
-        self._classes, self._mission = classes, RecordedMission(classes, clock.rate)
+        self._classes, self._checkpoints = classes, checkpoints or Checkpoints(classes)
+        self._mission = RecordedMission(classes)
         self._accepts = reduce(or_, classes.values())
         self._tokens: dict[str, Subscription] = {}
         self._served: dict[str, Subscription] = {}
@@ -66,8 +68,8 @@ class Player:
         Raises:
             NoRecording: The recording is damaged.
         """
-        for message in self._recording.messages(_KNOWN, until_s=math.nextafter(self._since_s, -math.inf)):
-            self._mission.take(message)
+        self._mission = self._checkpoints.mission_at(self._recording, self._since_s)
+        self._mission.rate = self._clock.rate
 
     def begin(self) -> None:
         """Answer questions, and say what a newcomer must know. When: after ``catch_up``."""

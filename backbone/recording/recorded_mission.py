@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 
@@ -42,6 +43,7 @@ HISTORY = frozenset(
     {Conversation.ALIVE, Conversation.ASK, Conversation.LOG, Conversation.OPERATORS, Conversation.DECISIONS}
 )
 """Conversations of which all messages until then decide what is answered."""
+_TABLES = ("present", "speakers", "_states", "_guests", "_newest", "_open", "_answers")
 MOST_OPEN = 1000  # chosen: questions under way at one time; the others were never answered
 
 
@@ -64,19 +66,19 @@ class RecordedMission:
 
     Args:
         classes: Known message classes, by schema.
-        rate: Mission seconds per second of the machine, as its clock is to be told.
 
     Attributes:
         now_s: Mission time.
+        rate: Mission seconds per second of the machine, as its clock is to be told.
         present: Addresses of the components that are ready.
         speakers: Addresses of all of whom there was a message.
     """
 
-    def __init__(self, classes: Mapping[str, type[Message]], rate: float = 1.0) -> None:
-        self.now_s = 0.0
+    def __init__(self, classes: Mapping[str, type[Message]]) -> None:
+        self.now_s, self.rate = 0.0, 1.0
         self.present: dict[str, None] = {}
         self.speakers: dict[str, None] = {}
-        self._classes, self._rate = classes, rate
+        self._classes = classes
         self._states: dict[str, ComponentState] = {}
         self._guests: dict[str, ComponentState] = {}  # who came to look
         self._newest: dict[tuple[str, str], Recorded] = {}
@@ -108,6 +110,13 @@ class RecordedMission:
             self._asked_or_answered(address, message, said)
         return said
 
+    def copied(self) -> RecordedMission:
+        """Return a mission that goes on from here by itself; the messages, which never change, are in both."""
+        twin = copy.copy(self)
+        vars(twin).update({name: copy.copy(getattr(self, name)) for name in _TABLES})
+        vars(twin).update(_log=self._log.copied(), _schedule=copy.deepcopy(self._schedule))
+        return twin
+
     def newest(self) -> Iterator[Recorded]:
         """Yield the newest message of each key that tells a state."""
         yield from self._newest.values()
@@ -123,7 +132,7 @@ class RecordedMission:
         """
         match question:
             case AskTime():
-                return MissionTime(self.now_s, self._rate)
+                return MissionTime(self.now_s, self.rate)
             case Register(component=guest):
                 self._guests[guest.address] = guest
                 return Registered()

@@ -19,6 +19,7 @@ from backbone.bus.local_bus import LocalNetwork
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
+from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.known_messages import message_classes
 from backbone.recording.markers import markers_in
 from backbone.recording.playback import Playback
@@ -33,6 +34,7 @@ from ui_console.web.outbox import Outbox
 from ui_console.web.playing import GoTo, Looking, Pause, Playing, PlayOn, StepOn
 from ui_console.web.protocol import Intent, ParametersRequest, SearchLog, WhyRequest
 
+CLASSES = message_classes()
 NEAR_S = 2.0  # chosen: a step ahead is played, so that nothing between is left out; mission seconds
 TOLD_EVERY_S = 0.1  # chosen: the slider moves smoothly; machine seconds
 AGAIN_EVERY_S = 1.0  # chosen: a page that comes while time stands still has its pictures soon; machine seconds
@@ -47,9 +49,10 @@ class Performance:
         recording: Nobody else reads it.
         mission: Name under which it is shown.
         playback: Its time.
+        checkpoints: Of the recording.
     """
 
-    def __init__(self, recording: Recording, mission: str, playback: Playback) -> None:
+    def __init__(self, recording: Recording, mission: str, playback: Playback, checkpoints: Checkpoints) -> None:
         network = LocalNetwork(mission)
         launch = Launch(
             mission,
@@ -67,7 +70,7 @@ class Performance:
             return network.join(launch.address, playback)
 
         self._bus = network.join(f"{Subsystem.BACKBONE}/replay", playback)
-        self.player = Player(self._bus, playback, recording, message_classes(), since_s=playback.now_s())
+        self.player = Player(self._bus, playback, recording, CLASSES, since_s=playback.now_s(), checkpoints=checkpoints)
         self.hub = WebHub(launch, network.join(launch.address, playback), playback, join)
 
     async def begin(self) -> None:
@@ -145,6 +148,7 @@ class RecordingRoom:
         self.mission = legal((found.about.get("mission") or "recording")[:MAX_NAME_LENGTH])
         self.playback = Playback(machine, found.begin_s, found.end_s)
         self._markers = msgspec.json.encode(markers_in(self._recording))
+        self._checkpoints = Checkpoints(CLASSES)
         self.clients: dict[Viewer, None] = {}
         self._performance = self._new_performance()
         self._is_elsewhere, self._arrived, self._ended = asyncio.Event(), asyncio.Event(), asyncio.Event()
@@ -228,7 +232,7 @@ class RecordingRoom:
                 viewer.operator = performance.hub.enter(viewer.operator.welcome, viewer.operator)
 
     def _new_performance(self) -> Performance:
-        return Performance(Recording(self._opened()), self.mission, self.playback)
+        return Performance(Recording(self._opened()), self.mission, self.playback, self._checkpoints)
 
     # ------------------------------------------------------------------ within
     @property

@@ -1,0 +1,54 @@
+"""Checkpoints: a recorded mission at some instants, so that a look at a late one need not begin at the begin. Pure."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Mapping
+
+from backbone.recording.reader import Recording
+from backbone.recording.recorded_mission import HISTORY, STATES, RecordedMission
+from backbone.wire import Message
+
+EACH_S = 30.0  # chosen: what is said in half a minute is read within a second
+MOST = 240  # chosen: two hours with one each half minute; a copy takes some hundred kilobytes
+_KNOWN = tuple(f"*/{said}" for said in (*STATES, *HISTORY))
+
+
+class Checkpoints:
+    """Keeps them as the recording is read; to be used by one thread at a time.
+
+    Args:
+        classes: Known message classes, by schema.
+    """
+
+    def __init__(self, classes: Mapping[str, type[Message]]) -> None:
+        self._classes = classes
+        self._times_s = [-math.inf]
+        self._missions = [RecordedMission(classes)]
+
+    def mission_at(self, recording: Recording, at_s: float) -> RecordedMission:
+        """Return the mission after all messages before this time.
+
+        Raises:
+            NoRecording: The recording is damaged.
+        """
+        newest = bisect_right(self._times_s, at_s) - 1
+        mission, since_s = self._missions[newest].copied(), self._times_s[newest]
+        contents = recording.contents()
+        each_s = max(EACH_S, (contents.end_s - contents.begin_s) / MOST)
+        next_s, last_s = max(since_s, contents.begin_s) + each_s, -math.inf
+        until_s = math.nextafter(at_s, -math.inf)
+        for message in recording.messages(_KNOWN, max(0.0, since_s), until_s):
+            if message.at_s >= next_s and message.at_s > last_s:
+                self._keep(message.at_s, mission)
+                next_s = message.at_s + each_s
+            last_s = message.at_s
+            mission.take(message)
+        return mission
+
+    def _keep(self, at_s: float, mission: RecordedMission) -> None:
+        """Keep the mission after all messages before this time."""
+        if at_s > self._times_s[-1]:
+            self._times_s.append(at_s)
+            self._missions.append(mission.copied())

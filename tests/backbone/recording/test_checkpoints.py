@@ -1,0 +1,70 @@
+"""A mission that is read on from a checkpoint is the one that is read from the begin."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from small_recordings import CLASSES, SCOUT, Said, recorded
+
+from backbone.addresses import LAUNCHER, NAMESERVER
+from backbone.component.messages import (
+    AskParameters,
+    AskState,
+    ComponentState,
+    LifeState,
+    LogLevel,
+    Parameters,
+    StoryEvent,
+)
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from backbone.mission_log.log import AskLog
+from backbone.nameserver.messages import ListComponents
+from backbone.recording.checkpoints import EACH_S, Checkpoints
+from backbone.recording.presence import Presence
+from backbone.recording.reader import Recording
+from backbone.recording.recorded_mission import RecordedMission
+from backbone.wire import Message
+
+LAST_S = 5 * EACH_S
+QUESTIONS = [(SCOUT, AskState()), (SCOUT, AskParameters()), (LAUNCHER, AskLog()), (NAMESERVER, ListComponents())]
+kinds = st.sampled_from(["state", "event", "here", "gone", "asked"])
+
+
+def messages(at_s: float, kind: str, number: int) -> list[Said]:
+    match kind:
+        case "state":
+            state = ComponentState(SCOUT, "scout", "base", 7, LifeState.READY, 0.5, f"round {number}")
+            return [Said(at_s, SCOUT, Conversation.STATUS, state)]
+        case "event":
+            return [Said(at_s, SCOUT, Conversation.LOG, StoryEvent(at_s, SCOUT, f"{number}", "x", "", LogLevel.INFO))]
+        case "asked":
+            asker = f"ui_console/anna-{number}"
+            return [
+                Said(at_s, SCOUT, Conversation.ASK, AskParameters(), asker),
+                Said(at_s, SCOUT, Conversation.ASK, Parameters({"speed": number}), SCOUT, f"{asker}#1"),
+            ]
+    return [Said(at_s, SCOUT, Conversation.ALIVE, Presence(kind == "here"), "")]
+
+
+def told(mission: RecordedMission) -> list[Message | str]:
+    def answer(address: str, question: Message) -> Message | str:
+        try:
+            return mission.answer(address, question)
+        except Refusal as refusal:
+            return str(refusal)
+
+    return [*(answer(*question) for question in QUESTIONS), *(str(one) for one in mission.newest())]
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    said=st.lists(st.tuples(st.floats(0.0, LAST_S), kinds), min_size=1, max_size=40),
+    looks=st.lists(st.floats(0.0, LAST_S + 1.0), min_size=1, max_size=6),
+)
+def test_from_a_checkpoint_or_from_the_begin_a_mission_is_the_same(said: list[tuple[float, str]], looks: list[float]):
+    ordered = [one for number, (at_s, kind) in enumerate(sorted(said)) for one in messages(at_s, kind, number)]
+    recording, checkpoints = Recording(recorded(ordered)), Checkpoints(CLASSES)
+    for at_s in looks:
+        fresh = Checkpoints(CLASSES).mission_at(recording, at_s)
+        assert told(checkpoints.mission_at(recording, at_s)) == told(fresh)
