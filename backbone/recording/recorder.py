@@ -38,7 +38,7 @@ from backbone.spoken import counted
 from backbone.waiting import set_within
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
-FLUSH_EACH_S = 0.4  # chosen: below the half second that a killed recorder may lose; seconds of the machine
+FLUSH_EACH_S = 0.25  # chosen: a killed recorder may lose half a second, also on a busy machine; seconds of the machine
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 OVERHEARD_WITHIN_S = 0.02  # measured: a publisher knows of its first subscriber after 7 ms; seconds of the machine
 MOST_ATTEMPTS = 5  # chosen: together ten times as long
