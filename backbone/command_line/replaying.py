@@ -30,6 +30,7 @@ from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
 from backbone.recording.comparison import compared
 from backbone.recording.decisions import Comparison, OtherDecision, decided_anew
 from backbone.recording.known_messages import message_classes
+from backbone.recording.playback import NoSuchTime
 from backbone.recording.player import Player
 from backbone.recording.reader import Contents, Recorded, Recording
 from backbone.recording.reasons import reasons_at
@@ -129,6 +130,8 @@ async def _play_in(
     directory: Path, name: str, path: Path, recording: Recording, found: Contents, wanted: Playing
 ) -> None:
     since_s = found.begin_s if wanted.since_s is None else wanted.since_s
+    if since_s > found.end_s:
+        raise NoSuchTime(f"the recording ends at {found.end_s:.3f} s")
     endpoint, clock = socket_endpoint(directory), MissionClock(time.monotonic() - since_s / wanted.speed, wanted.speed)
     bus = await ZenohBus.open_when_up(name, f"{Subsystem.BACKBONE}/{REPLAY}", clock, hub_config([endpoint]))
     ended = asyncio.Event()

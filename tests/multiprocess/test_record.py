@@ -211,6 +211,8 @@ def test_a_recording_is_played_as_a_mission_that_takes_no_commands(tmp_path: Pat
             shown = mission.command("scout-backbone", "status", "--json", "--mission", name)
             lit = mission.command("scout-backbone", "inject", "resource_pool/scout1/ask", HALT, "--mission", name)
             down = mission.command("scout-backbone", "down", "--mission", name)
+        late = mission.command("scout-backbone", "replay", str(path), "--from", "1e9")
+    assert (late.returncode, "recording ends at" in late.stderr) == (5, True)
     assert player.returncode == down.returncode == 0
     assert {rc["rc"] for rc in json.loads(shown.stdout)["rcs"]} >= {"radio", "scout1", "scout2", "video1"}
     assert lit.returncode == 5, lit.stdout
