@@ -69,15 +69,23 @@ def test_every_profile_and_every_size_of_the_page_is_a_console_of_the_table(plac
 
 
 class Controls(HTMLParser):
-    """Finds the controls that can have the focus; a control without an id has the name of its parent."""
+    """Finds the controls that can have the focus; a control without an id has the name of its parent.
+
+    Those that play a recording are none of these: the page of a mission does not show them, and nothing in a recording
+    can be stopped.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.found: set[str] = set()
         self._around: list[str] = []
+        self._plays = False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         given = dict(attrs)
+        self._plays = self._plays or given.get("id") == "playback"
+        if self._plays:
+            return
         if tag in ("form", "dialog") and "id" in given:
             self._around.append(f"#{given['id']}")
             self.found |= {f"#{given['id']}"} if tag == "dialog" else set()
@@ -87,6 +95,7 @@ class Controls(HTMLParser):
             self.found.add(f"#{given['id']}" if "id" in given else named)
 
     def handle_endtag(self, tag: str) -> None:
+        self._plays = self._plays and tag != "section"
         if tag in ("form", "dialog") and self._around and (tag == "dialog" or not self._in_a_dialog):
             self._around.pop()
 
