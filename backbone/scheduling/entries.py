@@ -94,7 +94,7 @@ class ArcEntry:
         awaited: True: a check of it is scheduled, because an ARC waits for the end of its slice.
         look_s: Time of that check: the end of its slice, or later where the discipline lets it run on.
         afterwards: Its state once its RCs are free, while it is being revoked.
-        has_forced: True: a holder was preempted in the middle of a slice for it, since it was queued.
+        has_forced: True: a holder was preempted in the middle of a slice for it, since it was queued or granted.
         retry_s: When it is queued again, after its gate stayed shut or it left too often; None: when it wants time.
         retry_why: Why not sooner.
         had_s: Run time so far, as the discipline ``time`` counts it; without the present run.

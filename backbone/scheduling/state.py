@@ -245,6 +245,7 @@ class ScheduleState:
     def grant(self, arc: ArcEntry, now_s: float, end_s: float) -> dict[str, int]:
         """Begin its slice; return those of its epochs that are the newest grants of their RCs."""
         arc.granted_s = arc.slice_s = now_s
+        arc.has_forced = False
         arc.turns += 1
         self._enter(arc, RequestState.RUNNING, now_s)
         self.end_at(arc, end_s)

@@ -54,3 +54,18 @@ def test_who_is_damped_is_told_and_comes_in_by_itself():
     assert "again and again; again at" in why.lines[0]
     assert bench.run(20.0).runs("console")
     assert bench.verdict() == []
+
+
+def test_an_operator_who_had_the_robot_before_a_higher_one_took_it_has_not_left_in_vain():
+    bench = Bench(manager(grace_s=0.05), unit("v", connect_s=0.02, disconnect_s=0.01))
+    bench.tell(ask("behavior", "v", priority=1))
+    begins_s = [5.0 + 0.5 * number for number in range(12)]
+    for begin_s in begins_s:
+        bench.at(begin_s, ask("anna-drive", "v", path=[("anna", 9)], console=True))
+        bench.at(begin_s + 0.15, ask("ben-drive", "v", path=[("ben", 10)], console=True))
+        bench.at(begin_s + 0.30, Departed("anna-drive"))
+        bench.at(begin_s + 0.35, Departed("ben-drive"))
+    bench.run(15.0)
+    granted_s = [start_s for start_s, _end_s in bench.runs("anna-drive")]
+    assert granted_s == [pytest.approx(begin_s, abs=0.1) for begin_s in begins_s]
+    assert bench.verdict() == []
