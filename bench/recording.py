@@ -1,8 +1,9 @@
 """What a recorder costs: its processor time, and context switches with and without it.
 
-Runs the mission of IROS 2001 with short slices several times, with and without a recorder of everything in turn, and
-asks the RC manager a question twenty times a second meanwhile. Prints one JSON line; ``core_share`` is the recorder's
-part of one core, ``switch_ratio`` and ``question_ratio`` are medians with a recorder over those without.
+Runs the mission of IROS 2001 with short slices several times: alone, with a recorder of everything, and with a process
+that overhears everything and keeps nothing, which is the floor. Asks the RC manager a question twenty times a second
+meanwhile. Prints one JSON line; ``core_share`` and ``floor_share`` are parts of one core, ``switch_ratio`` and
+``question_ratio`` are medians with a recorder over those without.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import asyncio
 import os
 import signal
 import subprocess
+import sys
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +23,10 @@ import psutil
 from measuring import BIN, report
 from switch_time import fast_mission, measure
 
+from backbone.launcher.mission_connection import connected
+from backbone.recording.hearing import to_overhear
 from backbone.recording.reader import Recording, missing_numbers
+from backbone.recording.recorder import MOST_WAITING_BYTES
 
 SETTLE_S = 3.0  # chosen: the recorder's imports and its first questions are over
 
@@ -36,13 +41,13 @@ class Runs:
     late_questions_s: list[float] = field(default_factory=list)
 
 
-def run(mission: Path, seconds: float, to: Path | None, runs: Runs) -> float:
-    """Run the mission once, recorded to a file or not; return the recorder's part of a core."""
+def run(mission: Path, seconds: float, listener: list[str], runs: Runs) -> float:
+    """Run the mission once, with a process that overhears it or without; return that process's part of a core."""
     command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
         assert launcher.stderr is not None
         next(line for line in launcher.stderr if line.startswith("all ready"))
-        recorder = subprocess.Popen([str(BIN / "scout-backbone"), "record", "--to", str(to)]) if to else None
+        recorder = subprocess.Popen(listener) if listener else None
         asyncio.run(asyncio.sleep(SETTLE_S))
         before_s = busy_s(recorder)
         values, questions = asyncio.run(measure(seconds))
@@ -68,20 +73,36 @@ def busy_s(recorder: subprocess.Popen[bytes] | None) -> float:
     return times.user + times.system
 
 
+async def overhear() -> None:
+    """Overhear everything and keep nothing, until SIGINT."""
+    ended = asyncio.Event()
+    asyncio.get_running_loop().add_signal_handler(signal.SIGINT, ended.set)
+    async with connected("switching", None, "ui_console/bench-ear") as (bus, _clock):
+        for conversation in to_overhear(()):
+            bus.overhear(conversation, lambda _key, _raw: None, MOST_WAITING_BYTES)
+        await ended.wait()
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--rounds", type=int, default=2)
+    parser.add_argument("--overhear", action="store_true", help="be the process that only overhears")
     given = parser.parse_args()
-    plain, recorded, shares, messages, size, missing = Runs(), Runs(), [], 0, 0, 0
+    if given.overhear:
+        asyncio.run(overhear())
+        return
+    plain, recorded, shares, floors, messages, size, missing = Runs(), Runs(), [], [], 0, 0, 0
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_RUNTIME_DIR"] = folder
         mission = fast_mission(Path(folder), settling=False, clean_stop=False)
         for number in range(given.rounds):
-            run(mission, given.seconds, None, plain)
+            run(mission, given.seconds, [], plain)
             to = Path(folder) / f"{number}.mcap"
-            shares.append(run(mission, given.seconds, to, recorded))
+            record = [str(BIN / "scout-backbone"), "record", "--to", str(to)]
+            shares.append(run(mission, given.seconds, record, recorded))
+            floors.append(run(mission, given.seconds, [sys.executable, __file__, "--overhear"], Runs()))
             with to.open("rb") as file:
                 recording = Recording(file)
                 messages += recording.contents().messages
@@ -94,6 +115,7 @@ def main() -> None:
         bytes_a_second=round(size / lasted_s),
         missing=missing,
         core_share=round(median(shares), 4),
+        floor_share=round(median(floors), 4),
         switch_p50_ms=round(median(recorded.switches_s) * 1e3, 2),
         switch_p99_ms=round(median(recorded.late_switches_s) * 1e3, 2),
         switch_ratio=round(median(recorded.switches_s) / median(plain.switches_s), 3),

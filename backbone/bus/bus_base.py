@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
 
-from backbone.bus.interface import Answer, BusStatistics, Clock, Copies, Listener, current_cause
+from backbone.bus.interface import Answer, BusStatistics, Clock, Copies, Listener, Told, current_cause
 from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
 from backbone.keys import Conversation
-from backbone.ranges import MOST_QUOTED_BYTES
+from backbone.ranges import MOST_FEW, MOST_QUOTED_BYTES
 from backbone.waiting import settle
 from backbone.wire import WIRE_VERSION, Envelope, Message, OversizedMessage, Refused, UnwritableMessage, write
 
@@ -34,11 +34,13 @@ class BusBase(ABC):
         # A dict, not a set: it keeps the order of starts, so tasks that end together end in one order in every run.
         self._tasks: dict[asyncio.Task[object], None] = {}
         self._open_questions: dict[asyncio.Future[Any], None] = {}
+        self._untold: list[tuple[str, Conversation, Sequence[Envelope[Message]]]] = []
         self._closing: asyncio.Task[None] | None = None
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
         """Callback for an exception that is no refusal."""
         self.closed = False
         self.asked = self.answered = self.published = self.heard = self.refused = self.unreadable = 0
+        self.told = 0
 
     @property
     def mission(self) -> str:
@@ -47,7 +49,9 @@ class BusBase(ABC):
 
     def statistics(self) -> BusStatistics:
         """Return the counts of messages since the bus was opened."""
-        return BusStatistics(self.asked, self.answered, self.published, self.heard, self.refused, self.unreadable)
+        return BusStatistics(
+            self.asked, self.answered, self.published, self.heard, self.refused, self.unreadable, self.told
+        )
 
     def envelope(self, body: Message) -> Envelope[Message]:
         """Return the body in an envelope with the next sequence number, now, and the current cause."""
@@ -94,21 +98,41 @@ class BusBase(ABC):
         return self.envelope(body)
 
     def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
-        """Publish copies of these messages, if anybody overhears; too long ones are left out.
+        """Publish copies of these messages, if a component overhears; too long ones are left out."""
+        if not self.closed and self.is_overheard(Conversation.TOLD):
+            self._untold.append((address, conversation, messages))
+            if len(self._untold) == 1:
+                self.tell_later(self._tell_all)
 
-        The publication takes no number of its own: who overhears all messages of a sender sees from their numbers
-        whether one is missing.
+    def tell_later(self, act: Callable[[], None]) -> None:
+        """Call a function at once; a bus whose publications are dear calls it when more is to be told."""
+        act()
+
+    def _tell_all(self) -> None:
+        """Publish the copies that wait, many in one message.
+
+        The publication takes no number of its own and is not counted: a component that overhears all messages of a
+        sender detects from their numbers whether one is missing.
         """
-        if self.closed or not self.is_overheard(Conversation.TOLD):
-            return
-        try:
-            quoted = [write(message) for message in messages]
-        except (OversizedMessage, UnwritableMessage) as refusal:
-            log.info("not told: %s", refusal)
-            return
-        if sum(map(len, quoted)) <= 2 * MOST_QUOTED_BYTES and max(map(len, quoted)) <= MOST_QUOTED_BYTES:
-            self._sequence -= 1
-            self.publish(self.source, Conversation.TOLD, Copies(address, conversation, quoted))
+        untold, self._untold = self._untold, []
+        copies, length = list[Copies](), 0
+        for address, conversation, messages in untold:
+            quoted = _quoted(messages)
+            size = sum(map(len, quoted))
+            if copies and (length + size > 2 * MOST_QUOTED_BYTES or len(copies) == MOST_FEW):
+                self._publish_told(copies)
+                copies, length = [], 0
+            if quoted:
+                copies.append(Copies(address, conversation, quoted))
+                length += size
+        if copies:
+            self._publish_told(copies)
+
+    def _publish_told(self, copies: list[Copies]) -> None:
+        self._sequence -= 1
+        self.published -= 1
+        self.told += 1
+        self.publish(self.source, Conversation.TOLD, Told(copies))
 
     def open_question(self) -> asyncio.Future[Any]:
         """Return the future of an answer; it gets None if this bus is closed first.
@@ -138,6 +162,7 @@ class BusBase(ABC):
         with ``NoResponder`` at their askers.
         """
         if self._closing is None:
+            self._tell_all()
             self.closed = True
             self.take_back()
             for answered in tuple(self._open_questions):
@@ -177,3 +202,13 @@ class BusBase(ABC):
 
 def _report_to_loop(bug: BaseException) -> None:
     asyncio.get_running_loop().call_exception_handler({"message": "bug in a bus handler", "exception": bug})
+
+
+def _quoted(messages: Sequence[Envelope[Message]]) -> list[bytes]:
+    """Return the bytes of these messages; none if one is too long to be quoted."""
+    try:
+        quoted = [write(message) for message in messages]
+    except (OversizedMessage, UnwritableMessage) as refusal:
+        log.info("not told: %s", refusal)
+        return []
+    return quoted if max(map(len, quoted)) <= MOST_QUOTED_BYTES else []

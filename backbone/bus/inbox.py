@@ -16,6 +16,8 @@ from backbone.wire import Accepts, Message, Reader, Refused, refuse_oversized
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 
+GATHER_S = 0.05  # chosen: who overhears a mission is woken twenty times a second, however much is said
+
 
 class Payload(Protocol):
     """Bytes that are not copied yet."""
@@ -45,7 +47,7 @@ class InboxBus(BusBase):
         super().__init__(mission, source, clock)
         self._loop = asyncio.get_running_loop()
         self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
-        self._woken = False
+        self._woken = self._has_gathering = False
 
     def push(self, act: Callable[[T], None], what: T) -> None:
         """Make the loop call ``act(what)``; called from any thread."""
@@ -57,8 +59,18 @@ class InboxBus(BusBase):
             except RuntimeError:  # the loop is closed
                 log.debug("inbox dropped after the loop's end")
 
+    def gather(self, act: Callable[[T], None], what: T) -> None:
+        """Make the loop call ``act(what)`` within ``GATHER_S``, in one burst with others; called from any thread."""
+        self._inbox.append((act, what))
+        if not (self._woken or self._has_gathering):
+            self._has_gathering = True
+            try:
+                self._loop.call_soon_threadsafe(self._loop.call_later, GATHER_S, self._drain)
+            except RuntimeError:  # the loop is closed
+                log.debug("inbox dropped after the loop's end")
+
     def _drain(self) -> None:
-        self._woken = False
+        self._woken = self._has_gathering = False
         for _ in range(len(self._inbox)):
             act, what = self._inbox.popleft()
             if self.closed:
@@ -115,7 +127,7 @@ class OverheardSamples:
             self._dropped += 1
             return
         self._came += length
-        self._bus.push(self._hand_over, sample)
+        self._bus.gather(self._hand_over, sample)
 
     def _hand_over(self, sample: Sample) -> None:
         raw = sample.payload.to_bytes()

@@ -182,7 +182,7 @@ class Bus(Protocol):
 
 
 class Copies(Message, frozen=True):
-    """Copies of messages, published by a bus while somebody overhears that; they are dropped rather than block anybody.
+    """Copies of messages of one key.
 
     A question comes with its answer or refusal, from the bus of the answerer. A publication that is never dropped comes
     from the bus of its sender.
@@ -198,6 +198,16 @@ class Copies(Message, frozen=True):
     messages: Annotated[list[Quoted], FEW]
 
 
+class Told(Message, frozen=True):
+    """Copies that a bus publishes while a component overhears them; zenoh drops them rather than block the sender.
+
+    Attributes:
+        copies: In the order in which their messages were sent.
+    """
+
+    copies: Annotated[list[Copies], FEW]
+
+
 class BusStatistics(Message, frozen=True):
     """Counters of one bus since it was opened.
 
@@ -208,6 +218,7 @@ class BusStatistics(Message, frozen=True):
         heard: Publications delivered to listeners.
         refused: Answers that were refusals.
         unreadable: Messages that could not be read, in either direction.
+        told: Messages with copies for recorders; ``published`` does not count them.
     """
 
     asked: Count
@@ -216,3 +227,4 @@ class BusStatistics(Message, frozen=True):
     heard: Count
     refused: Count
     unreadable: Count
+    told: Count = 0

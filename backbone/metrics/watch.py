@@ -9,7 +9,7 @@ import logging
 from typing import TypeVar
 
 from backbone.addresses import NAMESERVER, RC_MANAGER
-from backbone.bus.interface import Bus, Clock, Copies
+from backbone.bus.interface import Bus, Clock, Told
 from backbone.component.messages import AskStatistics, Statistics
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
@@ -43,7 +43,7 @@ class MetricsWatch:
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self._bus, self._clock = bus, clock
-        self._copies = Reader(Copies)
+        self._told = Reader(Told)
         self._news: Reader[Schedule | Leases | TraceLine] = Reader(Schedule | Leases | TraceLine)
         self.tally = Tally()
         self.utilization: dict[str, float] = {}
@@ -84,9 +84,9 @@ class MetricsWatch:
 
     def _heard(self, _key: str, raw: bytes) -> None:
         try:
-            copies = self._copies.read(raw).body
-            for quoted in copies.messages if copies.conversation in TOLD_IN else []:
-                self._take(self._news.read(quoted))
+            for copies in self._told.read(raw).body.copies:
+                for quoted in copies.messages if copies.conversation in TOLD_IN else []:
+                    self._take(self._news.read(quoted))
         except Refusal as error:
             log.info("not counted: %s", error)
 

@@ -25,7 +25,7 @@ class Hearing:
         self._translator, self._keys = Translator(classes), tuple(keys)
 
     def heard(self, key: str, raw: bytes, at_s: float) -> Iterator[tuple[str, Translated]]:
-        """Yield key and message; of a ``Copies`` those that it tells, with the key that they had.
+        """Yield key and message; of ``Told`` the copied ones, with the key that they had.
 
         Args:
             key: At which the bytes were overheard.
@@ -37,10 +37,12 @@ class Hearing:
             if self._is_meant(key):
                 yield key, self._translator.translate(raw, at_s)
             return
-        told_key = f"{'/'.join(key.split('/')[:2])}/{told.address}/{told.conversation}"
-        if self._is_meant(told_key):
-            for quoted in told.messages:
-                yield told_key, self._translator.translate(quoted, at_s)
+        mission = "/".join(key.split("/")[:2])
+        for copies in told:
+            told_key = f"{mission}/{copies.address}/{copies.conversation}"
+            if self._is_meant(told_key):
+                for quoted in copies.messages:
+                    yield told_key, self._translator.translate(quoted, at_s)
 
     def _is_meant(self, key: str) -> bool:
         return not self._keys or is_meant(key, self._keys)

@@ -40,7 +40,7 @@ from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
 FLUSH_EACH_S = 0.25  # chosen: a killed recorder may lose half a second, also on a busy machine; seconds of the machine
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
-OVERHEARD_WITHIN_S = 0.02  # measured: a publisher knows of its first subscriber after 7 ms; seconds of the machine
+OVERHEARD_WITHIN_S = 0.1  # a copy gathers 10 ms at its sender and 50 ms here; seconds of the machine
 MOST_ATTEMPTS = 5  # chosen: together ten times as long
 SNAPSHOT_EACH_S = 10.0  # chosen: a replay from the middle decides on few events that are not shown
 SNAPSHOT_S_PER_BYTE = 1.5e-4  # measured: a kilobyte is written in 0.15 ms; so it takes a thousandth of the time
@@ -128,6 +128,7 @@ class Recorder:
         finally:
             asking.cancel()
             await asyncio.wait({asking})
+            await self._hear_the_last()
             self._finish()
         if not asking.cancelled():
             asking.result()
@@ -171,6 +172,12 @@ class Recorder:
 
     def _new_writer(self) -> RecordingWriter:
         return RecordingWriter(self._files.file, *self._facts)
+
+    async def _hear_the_last(self) -> None:
+        """Return when the copies of what was sent until now have arrived; the file ends with that."""
+        self._writer.end_at(self._clock.now_s())
+        if self._has_link:
+            await self._clock.sleep_s(OVERHEARD_WITHIN_S * self._clock.rate)
 
     def _finish(self) -> None:
         for subscribed in self._subscribed:

@@ -5,15 +5,29 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Union, cast
 
 import msgspec
+from msgspec import inspect
 
-from backbone.bus.interface import Copies
+from backbone.bus.interface import Copies, Told
 from backbone.recording.json_schema import TAG
 from backbone.wire import Envelope, Message, schema_of
 
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+_PLAIN = (
+    inspect.NoneType,
+    inspect.BoolType,
+    inspect.IntType,
+    inspect.FloatType,
+    inspect.StrType,
+    inspect.BytesType,
+    inspect.MemoryViewType,
+    inspect.EnumType,
+    inspect.LiteralType,
+    inspect.AnyType,  # decoded as plain values
+)
 _UNSPEAKABLE = (TypeError, ValueError, OverflowError, RecursionError)  # what MessagePack can say, and JSON cannot
 
 
@@ -50,7 +64,7 @@ class Translator:
     def __init__(self, classes: Mapping[str, type[Message]]) -> None:
         known: Any = Union[tuple(classes.values())]  # noqa: UP007  made at run time
         self._known = msgspec.msgpack.Decoder(Envelope[known])
-        self._copies = msgspec.msgpack.Decoder(Envelope[Copies])
+        self._told = msgspec.msgpack.Decoder(Envelope[Told])
         self._any: Any = msgspec.msgpack.Decoder(Envelope[Any])
 
     def translate(self, raw: bytes, heard_s: float) -> Translated:
@@ -66,10 +80,10 @@ class Translator:
         except _UNSPEAKABLE:
             return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
 
-    def copies(self, raw: bytes) -> Copies | None:
+    def copies(self, raw: bytes) -> list[Copies] | None:
         """Return the copies that these bytes hold; None if they are no copies."""
         try:
-            return self._copies.decode(raw).body
+            return self._told.decode(raw).body.copies
         except _UNREADABLE:
             return None
 
@@ -95,7 +109,27 @@ def _translated(
 
 def named(body: msgspec.Struct) -> dict[str, Any]:
     """Return the fields of a message by name; a message inside it has its schema beside them."""
-    return {name: _value(getattr(body, name)) for name in body.__struct_fields__}
+    return {
+        name: getattr(body, name) if is_plain else _value(getattr(body, name)) for name, is_plain in _fields(type(body))
+    }
+
+
+@cache
+def _fields(kind: type[msgspec.Struct]) -> list[tuple[str, bool]]:
+    """Return the names of the fields, and whether each is written as it is: no message can be inside it."""
+    fields = cast("inspect.StructType", inspect.type_info(kind)).fields
+    return [(field.name, _is_plain(field.type)) for field in fields]
+
+
+def _is_plain(field: inspect.Type) -> bool:
+    match field:
+        case inspect.UnionType(types=inner) | inspect.TupleType(item_types=inner):
+            return all(map(_is_plain, inner))
+        case inspect.CollectionType(item_type=inner):
+            return _is_plain(inner)
+        case inspect.DictType(key_type=key, value_type=value):
+            return _is_plain(key) and _is_plain(value)
+    return isinstance(field, _PLAIN)
 
 
 def _value(value: object) -> Any:

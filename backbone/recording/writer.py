@@ -7,6 +7,7 @@ the recorder got it. What was flushed outlives the recorder's death, see ``reade
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import IO
 
@@ -52,6 +53,7 @@ class RecordingWriter:
         self._hearing = Hearing(classes, keys)
         self._schemas: dict[type[Message], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
+        self._end_s = math.inf
         self.written = 0
         """Messages so far."""
         self._writer.start(profile=PROFILE, library=PROFILE)
@@ -60,15 +62,22 @@ class RecordingWriter:
             self._writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
 
     def write(self, key: str, raw: bytes, at_s: float) -> None:
-        """Add what came over the bus at a mission time, as far as it is meant."""
+        """Add what came over the bus at a mission time, as far as it is meant and was sent before the end."""
         for said_at, message in self._hearing.heard(key, raw, at_s):
             self._write(said_at, message, at_s)
+
+    def end_at(self, at_s: float) -> None:
+        """Leave out from now on what was sent after this mission time; what was sent before may still arrive."""
+        self._end_s = at_s
 
     def _write(self, key: str, message: Translated, at_s: float) -> None:
         # A question comes with its answer, maybe hours later; but nothing is sent before the mission begins.
         is_credible = message.source and -MOST_AHEAD_S <= message.stamp_s <= at_s + MOST_AHEAD_S
+        sent_s = message.stamp_s if is_credible else at_s
+        if sent_s > self._end_s:
+            return
         channel, data = self._channel_and_data(key, message)
-        sent_ns = _ns(message.stamp_s if is_credible else at_s)
+        sent_ns = _ns(sent_s)
         self._writer.add_message(
             channel_id=channel,
             log_time=sent_ns,

@@ -153,7 +153,9 @@ async def test_reasons_of_any_instant_are_those_that_were_given_then(tmp_path: P
     assert len({why.state for why in given}) > 1
     with path.open("rb") as file:
         recording = Recording(file)
-        for why in drawn.sample(given, 40):
+        known_s = min(one.at_s for one in recording.messages() if one.schema.startswith("ScheduleSnapshot/"))
+        known = [why for why in given if why.at_s >= known_s]  # a busy machine may record its first snapshot late
+        for why in drawn.sample(known, 40):
             assert reasons_at(recording, why.name, why.at_s).why == why
         found = decided_anew(recording)
     assert (found.difference, found.missing) == (None, 0)

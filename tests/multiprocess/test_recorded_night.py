@@ -131,9 +131,8 @@ def judge(address: str, found: list[Recorded], values: dict[str, float]) -> None
     asked_there = {message.id for message in found if short_key(message.key) == own}
     counts = Counter(kind_of(message, own, asked_there) for message in life)
     told = f"{address}: {dict(counts)} from number {numbers[0]} to {numbers[-1]}, counted {values}"
-    copies = counts["sent once"] + counts["answer"] - 1  # the answer that counts has no copy yet
     unanswered = values["bus_asked"] - counts["question"]
-    dropped = values["bus_published"] - copies - counts["sent once"] - counts["repeated"]
+    dropped = values["bus_published"] - counts["sent once"] - counts["repeated"]
     if address in UP_BEFORE:
         return
     assert values["bus_answered"] == counts["answer"], told

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.bus.interface import Copies
+from backbone.bus.interface import Copies, Told
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.recording.hearing import is_meant
 from backbone.recording.known_messages import message_classes
@@ -205,11 +205,11 @@ def test_with_more_senders_than_channels_each_message_says_its_own(monkeypatch: 
 
 
 def test_copies_inside_copies_are_not_followed() -> None:
-    inner = write(Envelope(1, "x/y", 1, 0.0, "", Copies("x/y", "ask", [])))
+    inner = write(Envelope(1, "x/y", 1, 0.0, "", Told([])))
     for _ in range(50):
-        inner = write(Envelope(1, "x/y", 1, 0.0, "", Copies("x/y", "ask", [inner, b"\xc1"])))
+        inner = write(Envelope(1, "x/y", 1, 0.0, "", Told([Copies("x/y", "ask", [inner, b"\xc1"])])))
     file = io.BytesIO()
     made = writer(file)
     made.write("scout/night/x/y/told", inner, 0.0)
     made.finish()
-    assert [one.schema for one in read(file.getvalue())] == ["Copies/1", ""]
+    assert [one.schema for one in read(file.getvalue())] == ["Told/1", ""]

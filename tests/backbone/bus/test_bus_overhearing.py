@@ -1,0 +1,243 @@
+"""Overhearing, and copies for those who overhear: the same on each bus."""
+
+import asyncio
+from typing import Any
+
+import pytest
+from bus_laws import (
+    ASK_S,
+    ASKER,
+    SERVER,
+    THIRD,
+    Echo,
+    Echoed,
+    Heard,
+    Net,
+    News,
+    Runner,
+    TooLoud,
+    echo,
+    pair,
+    until_known,
+    within,
+)
+
+from backbone.bus.interface import Copies, Told
+from backbone.keys import Conversation
+from backbone.wire import Envelope, Message, Reader, Refused, write
+
+
+def test_a_conversation_is_overheard_whoever_says_what_in_it(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, other, listener = net.join(SERVER), net.join(THIRD), net.join(ASKER)
+        heard: list[tuple[str, int]] = []
+        came = asyncio.Event()
+
+        def overheard(key: str, raw: bytes) -> None:
+            heard.append((key, Reader(News).read(raw).body.number))
+            came.set()
+
+        subscribed = listener.overhear(Conversation.POSES, overheard, 1_000_000)
+        await until_known(listener, source)
+        await until_known(listener, other)
+        source.publish("resource_pool/scout1", Conversation.STATUS, News(0))
+        source.publish("resource_pool/scout1", Conversation.POSES, News(1))
+        source.publish("backbone/scout1/claim", Conversation.POSES, News(2))
+        other.publish(THIRD, Conversation.POSES, News(3))
+
+        async def all_came() -> None:
+            while len(heard) < 3:
+                came.clear()
+                await came.wait()
+
+        await within(all_came(), "all three")
+        assert sorted(heard, key=lambda one: one[1]) == [
+            ("scout/conformance/resource_pool/scout1/poses", 1),
+            ("scout/conformance/backbone/scout1/claim/poses", 2),
+            (f"scout/conformance/{THIRD}/poses", 3),
+        ]
+        assert subscribed.dropped == 0
+        subscribed.close()
+        subscribed.close()
+
+    on_bus(law)
+
+
+def test_one_component_is_overheard_and_no_other_copies_anything(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, other, listener = net.join(SERVER), net.join(THIRD), net.join(ASKER)
+        told, came = list[tuple[str, Copies]](), asyncio.Event()
+
+        def overheard(key: str, raw: bytes) -> None:
+            told.extend((key, copies) for copies in Reader(Told).read(raw).body.copies)
+            came.set()
+
+        listener.overhear(Conversation.TOLD, overheard, 1_000_000, SERVER)
+        await until_known(listener, source)
+        await until_known(listener, other)
+
+        while not told:  # the sender knows of a listener a moment later
+            source.publish(SERVER, Conversation.STATUS, News(0))
+            await net.clock.sleep_s(0.005)
+        other.publish(THIRD, Conversation.STATUS, News(1))
+        source.publish(SERVER, Conversation.STATUS, News(2))
+
+        async def last_came() -> None:
+            while Reader(News).read(told[-1][1].messages[0]).body.number != 2:
+                came.clear()
+                await came.wait()
+
+        await within(last_came(), "the last copy")
+        assert {key for key, _ in told} == {f"scout/conformance/{SERVER}/told"}
+
+    on_bus(law)
+
+
+def test_who_overhears_too_slowly_loses_messages_and_knows_how_many(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, listener = net.join(SERVER), net.join(ASKER)
+        heard, last = [0], Heard()
+        most = 20 * len(write(Envelope(1, SERVER, 1, 0.0, "", News(1))))
+
+        def overheard(_key: str, _raw: bytes) -> None:
+            heard[0] += 1
+
+        listener.subscribe(SERVER, Conversation.STATUS, News, last)
+        subscribed = listener.overhear(Conversation.EVENTS, overheard, most)
+        await until_known(listener, source)
+        for number in range(500):
+            source.publish(SERVER, Conversation.EVENTS, News(number))
+        await until_known(source, listener)
+        while heard[0] + subscribed.dropped < 500:
+            await net.clock.sleep_s(0.01)
+        source.publish(SERVER, Conversation.EVENTS, News(1))
+        source.publish(SERVER, Conversation.STATUS, News(2))
+        await last.until_count(1)
+        while heard[0] + subscribed.dropped < 501:
+            await net.clock.sleep_s(0.01)
+        assert heard[0] >= 20
+
+    on_bus(law)
+
+
+def test_what_is_never_dropped_is_told_in_copies_without_a_number_of_their_own(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, listener = net.join(SERVER), net.join(ASKER)
+        told, heard = list[Copies](), Heard()
+        came = asyncio.Event()
+
+        def overheard(_key: str, raw: bytes) -> None:
+            told.extend(Reader(Told).read(raw).body.copies)
+            came.set()
+
+        listener.overhear(Conversation.TOLD, overheard, 1_000_000)
+        listener.subscribe("*/*", Conversation.STATUS, News, heard)
+        await until_known(listener, source)
+        while not told:  # the sender knows of a listener a moment later
+            source.publish(SERVER, Conversation.STATUS, News(0))
+            await net.clock.sleep_s(0.005)
+        for number in range(1, 4):
+            source.publish(THIRD, Conversation.STATUS, News(number))
+            source.publish(THIRD, Conversation.POSES, News(10 * number))
+
+        async def all_came() -> None:
+            while told[-1].address != THIRD or Reader(News).read(told[-1].messages[0]).body.number < 3:
+                came.clear()
+                await came.wait()
+
+        await within(all_came(), "the last copy")
+        await heard.until(lambda all_: all_ != [] and all_[-1].body.number == 3, "the last status")
+        copies = [Reader(News).read(one.messages[0]) for one in told if one.address == THIRD]
+        assert [copy.body.number for copy in copies] == [1, 2, 3], "poses can be overheard directly"
+        assert copies == heard.all[-3:]
+        numbers = [copy.sequence for copy in copies]
+        assert numbers == [numbers[0], numbers[0] + 2, numbers[0] + 4], "the poses are between them, and nothing else"
+
+    on_bus(law)
+
+
+def test_questions_are_told_with_their_answers_while_somebody_overhears_that(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        async def answer(asked: Envelope[Any]) -> Message:
+            if asked.body.text == "loud":
+                raise TooLoud("too loud")
+            return Echoed(asked.body.text)
+
+        async with pair(net, answer) as (asker, server):
+            await asker.ask(SERVER, Echo("before"), Echoed, within_s=ASK_S)
+            published = server.statistics().published
+            listener, told = net.join(THIRD), list[tuple[str, Copies]]()
+            came = asyncio.Event()
+
+            def overheard(key: str, raw: bytes) -> None:
+                told.extend((key, copies) for copies in Reader(Told).read(raw).body.copies)
+                came.set()
+
+            subscribed = listener.overhear(Conversation.TOLD, overheard, 1_000_000)
+            await until_known(listener, server)
+            while not told:  # the answerer knows of a listener a moment later
+                await asker.ask(SERVER, Echo("knows"), Echoed, within_s=ASK_S)
+                await net.clock.sleep_s(0.005)
+            told.clear()
+            await asker.ask(SERVER, Echo("hello"), Echoed, within_s=ASK_S)
+            with pytest.raises(TooLoud):
+                await asker.ask(SERVER, Echo("loud"), Echoed, within_s=ASK_S)
+
+            async def both() -> None:
+                while not (told and b"loud" in told[-1][1].messages[0]):
+                    came.clear()
+                    await came.wait()
+
+            await within(both(), "question and answer")
+            key, refused = told[-1]
+            assert key == f"scout/conformance/{SERVER}/told"
+            assert (refused.address, refused.conversation) == (SERVER, "ask")
+            question, reply = Reader(Echo).read(refused.messages[0]), Reader(Refused).read(refused.messages[1])
+            assert (question.source, question.body) == (ASKER, Echo("loud"))
+            assert (reply.source, reply.cause, reply.body.code) == (SERVER, question.id, "test.loud")
+            assert Reader(Echoed).read(told[-2][1].messages[1]).body == Echoed("hello")
+            subscribed.close()
+            assert server.statistics().told > 0
+            assert server.statistics().published == published, "copies are counted apart"
+
+    on_bus(law)
+
+
+def test_nothing_is_published_of_answers_that_nobody_overhears(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        async with pair(net, echo) as (asker, server):
+            for number in range(20):
+                await asker.ask(SERVER, Echo(f"{number}"), Echoed, within_s=ASK_S)
+            assert server.statistics().told == 0
+
+    on_bus(law)
+
+
+def test_the_copies_of_a_burst_arrive_in_order_although_the_bus_closes_at_once(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, listener = net.join(SERVER), net.join(ASKER)
+        numbers, came = list[int](), asyncio.Event()
+
+        def overheard(_key: str, raw: bytes) -> None:
+            for copies in Reader(Told).read(raw).body.copies:
+                numbers.extend(Reader(News).read(quoted).body.number for quoted in copies.messages)
+            came.set()
+
+        listener.overhear(Conversation.TOLD, overheard, 1_000_000)
+        await until_known(listener, source)
+        while not numbers:  # the sender knows of a listener a moment later
+            source.publish(SERVER, Conversation.STATUS, News(0))
+            await net.clock.sleep_s(0.005)
+        for number in range(1, 601):
+            source.publish(SERVER, Conversation.STATUS, News(number))
+        await source.close()
+
+        async def all_came() -> None:
+            while numbers[-1] < 600:
+                came.clear()
+                await came.wait()
+
+        await within(all_came(), "the last copy")
+        assert [number for number in numbers if number] == [*range(1, 601)]
+
+    on_bus(law)
