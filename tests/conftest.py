@@ -14,6 +14,7 @@ from typing import Any
 
 import limits
 import pytest
+import selection
 from hypothesis import settings
 
 from backbone.bus.clock import VirtualClock
@@ -37,8 +38,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Have limits for each test, and failures printed when they happen."""
+    """Have limits for each test, failures printed when they happen, and long tests left out."""
     limits.watch(config)
+    config.pluginmanager.register(selection.OnlyQuick(), "only-quick")
 
 
 MissionNetwork = Callable[..., AbstractAsyncContextManager[LocalNetwork]]

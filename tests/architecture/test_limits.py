@@ -72,6 +72,7 @@ def test_a_run_that_is_ended_has_named_each_failure_before(tmp_path: Path) -> No
     assert "short test summary" not in printed
 
 
+@pytest.mark.thorough
 def test_with_workers_a_test_that_hangs_fails_alone(tmp_path: Path) -> None:
     printed = run(tmp_path, "-n", "1")
     for name in (*ALONE, "test_hangs"):
@@ -133,6 +134,7 @@ def test_with_workers_tests_that_are_alone_come_first(tmp_path: Path, options: t
     assert (tmp_path / "log").read_text().strip() == order
 
 
+@pytest.mark.thorough
 def test_no_test_with_processes_runs_beside_one_that_is_alone(tmp_path: Path) -> None:
     assert "14 passed" in run(tmp_path, "-n", "3", suite=TOGETHER)
     busy: list[str] = []

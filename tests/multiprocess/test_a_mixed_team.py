@@ -44,6 +44,7 @@ async def place_of(mission: RunningMission, robot: str) -> tuple[float, float]:
         return pose.x_m, pose.y_m
 
 
+@pytest.mark.thorough
 async def test_all_of_a_mixed_team_is_driven_by_hand_and_goes_on_and_the_schedule_is_right(
     tmp_path: Path, judged: Callable[[Path], None]
 ) -> None:

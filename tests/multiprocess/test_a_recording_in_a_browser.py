@@ -67,6 +67,7 @@ async def wait_shown(page: Any, which: str) -> None:
     )
 
 
+@pytest.mark.thorough
 async def test_it_is_dragged_played_stepped_and_asked(address: str) -> None:
     async with recording_at(address) as page:
         await drag_to(page, 0.8)
@@ -91,6 +92,7 @@ async def test_it_is_dragged_played_stepped_and_asked(address: str) -> None:
         assert await page.get_by_role("button", name="Take over").filter(visible=True).count() == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("size", "theme"), [("desktop", "light"), ("phone", "dark")])
 async def test_the_page_of_a_recording_is_accessible(address: str, size: str, theme: str) -> None:
     async with recording_at(address, size, theme) as page:

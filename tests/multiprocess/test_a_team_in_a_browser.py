@@ -37,6 +37,7 @@ async def take(page: Any, robot: str) -> None:
     await page.wait_for_selector(f"body[data-held={robot}]")
 
 
+@pytest.mark.thorough
 async def test_each_of_a_team_is_taken_over_and_driven_from_the_page(served: Served) -> None:
     address = f"http://127.0.0.1:{served.port}/#token={served.token}"
     async with (

@@ -91,6 +91,7 @@ def operator(tmp_path: Path) -> Iterator[Operator]:
         yield found
 
 
+@pytest.mark.thorough
 def test_what_is_added_and_removed_follows_and_what_stays_keeps_its_process(operator: Operator, tmp_path: Path) -> None:
     before = operator.pids()
     operator.tree("add", operator.branch("spare"))
@@ -132,6 +133,7 @@ def test_what_is_added_and_removed_follows_and_what_stays_keeps_its_process(oper
         second.wait("the saved tree runs", lambda pids: {"outing", "spare", "patrol"} <= pids.keys())
 
 
+@pytest.mark.thorough
 def test_a_branch_is_moved_and_replaced(operator: Operator) -> None:
     before = operator.pids()
     operator.tree("add", operator.branch("spare"))
@@ -152,6 +154,7 @@ def test_a_branch_is_moved_and_replaced(operator: Operator) -> None:
     assert {name: after[name] for name in before} == before
 
 
+@pytest.mark.thorough
 def test_a_refused_change_changes_nothing(operator: Operator) -> None:
     before, tree = operator.pids(), operator.tree("--json")
     bad = operator.branch("bad", "wait", '<parameter name="secondz" value="1"/>')
@@ -171,6 +174,7 @@ def test_a_refused_change_changes_nothing(operator: Operator) -> None:
     assert operator.pids() == before
 
 
+@pytest.mark.thorough
 def test_the_guides_commands_print_what_it_says(tmp_path: Path) -> None:
     (tmp_path / "composed.xml").write_text(COMPOSED.read_text())
     for name, text in re.findall(r"^`([\w.-]+)`:\n\n```xml\n(.*?)^```", GUIDE.read_text(), re.M | re.S):
@@ -178,6 +182,7 @@ def test_the_guides_commands_print_what_it_says(tmp_path: Path) -> None:
     run_all(GUIDE, tmp_path)
 
 
+@pytest.mark.thorough
 def test_without_the_missions_secret_nobody_changes_its_tree(operator: Operator, tmp_path: Path) -> None:
     wrong = tmp_path / "secret"
     wrong.write_text("0" * 64)

@@ -126,6 +126,7 @@ async def test_the_missions_own_account_starts_no_class_and_opens_no_file_throug
         assert mission.launcher.wait(30) == 0, mission.story()
 
 
+@pytest.mark.thorough
 def test_no_attack_without_the_secret_changes_a_mission_on_three_machines(victim: Path, short_path: Path) -> None:
     with mission_on_three_hosts(short_path) as mission:
         base = mission.hosts["base"]

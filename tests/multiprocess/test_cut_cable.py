@@ -39,6 +39,7 @@ def said_by(process: subprocess.Popen[str]) -> str:
     return process.stdout.readline().strip()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("cut_s", [3.4, 3.8, 4.2])
 def test_a_cut_cable_stops_no_one_else_and_makes_no_one_deaf(tmp_path: Path, cut_s: float) -> None:
     with contextlib.ExitStack() as stack:

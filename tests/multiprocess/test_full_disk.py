@@ -51,6 +51,7 @@ def test_up_refuses_a_trace_that_cannot_be_written_before_anything_starts(tmp_pa
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.thorough
 def test_a_mission_goes_on_when_nothing_it_tells_can_be_written(tmp_path: Path) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
@@ -95,6 +96,7 @@ def fill(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Ite
     disk.rmdir()
 
 
+@pytest.mark.thorough
 def test_a_disk_that_fills_up_stops_the_trace_and_keeps_no_component_from_coming_back(fill: Fill) -> None:
     trace = Path(tempfile.gettempdir()) / f"trace-{os.getpid()}.jsonl"
     try:

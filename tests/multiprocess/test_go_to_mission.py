@@ -32,6 +32,7 @@ def away_m(at: Pose, place: tuple[float, float]) -> float:
     return math.hypot(at.x_m - place[0], at.y_m - place[1])
 
 
+@pytest.mark.thorough
 async def test_a_scout_goes_to_its_place_and_home_by_dead_reckoning() -> None:
     with mission_up(mission_xml=GO_TO) as mission:
         async with mission.bus() as bus:
@@ -57,6 +58,7 @@ async def test_a_scout_goes_to_its_place_and_home_by_dead_reckoning() -> None:
         assert {pose.source for pose in published} == {PoseSource.DEAD_RECKONING}
 
 
+@pytest.mark.thorough
 async def test_a_localizer_that_is_killed_on_the_way_is_back_and_the_scout_gets_there(tmp_path: Path) -> None:
     """It missed no command: without an answer of the localizer the behavior gave none."""
     alone = tmp_path / "alone.xml"

@@ -86,6 +86,7 @@ def test_a_nameserver_that_hangs_is_replaced(mission: RunningMission) -> None:
     assert mission.component("nameserver")["pid"] != hung
 
 
+@pytest.mark.thorough
 def test_a_mission_whose_nameserver_and_launcher_hang_has_a_status_all_the_same(mission: RunningMission) -> None:
     nameserver = mission.component("nameserver")["pid"]
     with paused(mission.launcher.pid, nameserver):  # nobody is left who could replace the nameserver

@@ -31,6 +31,7 @@ def drives_home(mission: RunningMission) -> None:
     mission.wait_for_line("runs: drive-home-drive", 20.0)
 
 
+@pytest.mark.thorough
 async def test_down_has_the_scout_drive_home_and_leaves_nothing() -> None:
     with mission_up(mission_xml=HOME_AT_THE_END) as mission:
         patrols(mission)
@@ -60,6 +61,7 @@ async def test_down_has_the_scout_drive_home_and_leaves_nothing() -> None:
         assert mission.launcher.wait(30) == 0, mission.story()
 
 
+@pytest.mark.thorough
 def test_it_gets_the_robot_that_a_person_holds() -> None:
     with mission_up(mission_xml=HOME_AT_THE_END) as mission:
         patrols(mission)

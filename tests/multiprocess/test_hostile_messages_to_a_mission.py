@@ -34,6 +34,7 @@ def raw_ask(session: zenoh.Session, at: str, payload: bytes) -> bytes:
     return (answer.err.payload if answer.err is not None else answer.ok.payload).to_bytes()
 
 
+@pytest.mark.thorough
 async def test_every_queryable_refuses_hostile_messages_and_nothing_changes() -> None:
     with mission_up() as mission:
         before = mission.status()
@@ -52,6 +53,7 @@ async def test_every_queryable_refuses_hostile_messages_and_nothing_changes() ->
         assert not any(c["restarts"] for c in after["components"])
 
 
+@pytest.mark.thorough
 async def test_numbers_beyond_their_ranges_change_nothing_in_a_running_mission(tmp_path: Path) -> None:
     """Each field of each message that a component answers, beyond its limits; then the same as publications."""
     trace = tmp_path / "trace.jsonl"

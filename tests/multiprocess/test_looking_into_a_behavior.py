@@ -21,6 +21,7 @@ GUIDE = MISSION_XML.parent / "docs" / "how-to" / "look-into-a-behavior.md"
 WITHIN_S = 60.0
 
 
+@pytest.mark.thorough
 def test_every_command_of_the_guide_prints_what_it_says() -> None:
     with tempfile.TemporaryDirectory(prefix="scout-look-") as name:
         shutil.copy(MISSION_XML, Path(name) / "mission.xml")
@@ -29,6 +30,7 @@ def test_every_command_of_the_guide_prints_what_it_says() -> None:
         assert saved.shape == (120, 160)
 
 
+@pytest.mark.thorough
 async def test_a_picture_is_shown_live_in_a_terminal_and_q_leaves() -> None:
     with mission_up() as mission:
         await asyncio.to_thread(mission.wait_for_watchers)

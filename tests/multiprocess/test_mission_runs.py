@@ -75,6 +75,7 @@ def test_a_second_mission_of_the_same_name_is_refused(mission: RunningMission) -
     assert "is up" in done.stderr
 
 
+@pytest.mark.thorough
 def test_components_are_started_and_stopped_while_the_others_keep_their_processes(mission: RunningMission) -> None:
     before = {c["name"]: c["pid"] for c in mission.status()["components"] if "-capture" not in c["name"]}
     words = ("scout-backbone", "start", "video_frequency", "--name", "video9", "--mission", mission.name)
@@ -90,6 +91,7 @@ def test_components_are_started_and_stopped_while_the_others_keep_their_processe
     }
 
 
+@pytest.mark.thorough
 def test_who_shares_a_process_is_stopped_alone_and_started_in_it_again(mission: RunningMission) -> None:
     """Which components share a process is a line in mission.xml."""
 
@@ -135,6 +137,7 @@ def test_an_unknown_robot_is_refused_with_a_remedy(mission: RunningMission) -> N
     assert refused["remedy"]
 
 
+@pytest.mark.thorough
 def test_equal_watchers_take_turns_and_the_judge_agrees(tmp_path: Path, judged) -> None:
     """IROS 2001, section 5.1: round robin; two seconds each here, whole minutes of five are among the long tests."""
     trace = tmp_path / "run.jsonl"
@@ -150,6 +153,7 @@ def test_equal_watchers_take_turns_and_the_judge_agrees(tmp_path: Path, judged) 
     judged(trace)
 
 
+@pytest.mark.thorough
 def test_two_missions_run_side_by_side() -> None:
     with mission_up() as one, mission_up() as other:
         ones, others = one.status(), other.status()

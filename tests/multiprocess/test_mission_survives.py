@@ -69,6 +69,7 @@ def somebody_runs(status: dict) -> bool:
     return any(request["state"] == "running" for request in status["requests"])
 
 
+@pytest.mark.thorough
 async def test_a_mission_recovers_from_the_death_of_each_of_its_processes(tmp_path: Path) -> None:
     trace = tmp_path / "run.jsonl"
     with mission_up("--trace", str(trace)) as mission:
@@ -98,6 +99,7 @@ async def test_a_mission_recovers_from_the_death_of_each_of_its_processes(tmp_pa
         assert await asyncio.to_thread(mission.down) in (0, 6), mission.story()
 
 
+@pytest.mark.thorough
 def test_nothing_is_left_after_the_death_of_the_launcher() -> None:
     with mission_up() as mission:
         mission.launcher.send_signal(signal.SIGKILL)
@@ -107,6 +109,7 @@ def test_nothing_is_left_after_the_death_of_the_launcher() -> None:
         assert not mission.directory.exists()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_mission_cleanly(how: signal.Signals) -> None:
     with mission_up() as mission:

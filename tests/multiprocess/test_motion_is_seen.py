@@ -121,6 +121,7 @@ async def watch(mission: RunningMission, at_least_s: float) -> Seen:
     return seen
 
 
+@pytest.mark.thorough
 async def test_the_target_is_seen_when_it_passes_and_only_then() -> None:
     with mission_up() as mission:
         seen = await watch(mission, SETTLED_S)
@@ -128,6 +129,7 @@ async def test_the_target_is_seen_when_it_passes_and_only_then() -> None:
     judge(seen, the_world())
 
 
+@pytest.mark.thorough
 async def test_nothing_is_seen_while_the_target_stands_in_the_doorway() -> None:
     """Swap-ins, also of a robot that a person has turned meanwhile, are no motion."""
     with mission_up(change={BEGIN: 'begin-s="1000"'}) as mission:

@@ -109,6 +109,7 @@ def names(mission: RunningMission) -> set[str]:
     return {component["name"] for component in mission.status()["components"]}
 
 
+@pytest.mark.thorough
 def test_a_halt_takes_the_robot_back_from_its_order(mission: RunningMission) -> None:
     with ordered(mission) as script:
         assert script.order in names(mission)
@@ -122,6 +123,7 @@ def test_a_halt_takes_the_robot_back_from_its_order(mission: RunningMission) -> 
     assert script.order not in names(mission)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM])
 def test_an_order_does_not_outlive_its_console(mission: RunningMission, how: signal.Signals) -> None:
     with ordered(mission) as script:

@@ -49,6 +49,7 @@ def serving(mission: RunningMission, command: str, port: int) -> Iterator[None]:
         server.stderr.close()
 
 
+@pytest.mark.thorough
 async def test_foxglove_sees_the_cameras_of_a_mission(mission: RunningMission) -> None:
     port = free_port()
     with serving(mission, "bridge", port):

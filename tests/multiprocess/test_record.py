@@ -80,6 +80,7 @@ def messages(path: Path) -> list[Recorded]:
         return [*Recording(file).messages()]
 
 
+@pytest.mark.thorough
 def test_every_command_of_the_guide_works() -> None:
     with tempfile.TemporaryDirectory(prefix="scout-record-") as name:
         shutil.copy(MISSION_XML, Path(name) / "mission.xml")
@@ -87,6 +88,7 @@ def test_every_command_of_the_guide_works() -> None:
         assert messages(Path(name) / "night.mcap")
 
 
+@pytest.mark.thorough
 def test_a_recording_has_all_messages_and_tells_what_the_mission_told(mission: RunningMission, tmp_path: Path) -> None:
     path = tmp_path / "it.mcap"
     with recording_to(mission, path) as recorder:
@@ -118,6 +120,7 @@ def test_a_recording_has_all_messages_and_tells_what_the_mission_told(mission: R
     assert "<mission" in shown.stdout
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "seed", [pytest.param(seed, marks=() if seed < QUICK_KILLS else pytest.mark.slow) for seed in range(KILLS)]
 )
@@ -138,6 +141,7 @@ def test_of_a_killed_recorder_at_most_half_a_second_is_lost(mission: RunningMiss
     assert (again.returncode, "exists" in again.stderr) == (2, True)
 
 
+@pytest.mark.thorough
 async def test_reasons_of_any_instant_are_those_that_were_given_then(tmp_path: Path) -> None:
     path = tmp_path / "it.mcap"
     drawn, given = random.Random(1), []
@@ -162,6 +166,7 @@ async def test_reasons_of_any_instant_are_those_that_were_given_then(tmp_path: P
     assert found.decisions > 5
 
 
+@pytest.mark.thorough
 def test_a_mission_that_was_brought_up_with_a_recording_has_it_from_the_first_decision_on(tmp_path: Path) -> None:
     path = tmp_path / "it.mcap"
     with mission_up("--record", str(path)) as mission:
@@ -176,6 +181,7 @@ def test_a_mission_that_was_brought_up_with_a_recording_has_it_from_the_first_de
         assert "<mission" in recording.mission_xml()
 
 
+@pytest.mark.thorough
 def test_a_recorder_that_is_killed_is_absent_until_the_recording_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "it.mcap"
     with mission_up("--record", str(path)) as mission:
@@ -198,6 +204,7 @@ def test_a_recording_that_exists_is_refused_before_anything_runs(tmp_path: Path)
     assert path.read_bytes() == b"another"
 
 
+@pytest.mark.thorough
 def test_a_recording_is_played_as_a_mission_that_takes_no_commands(tmp_path: Path) -> None:
     path = tmp_path / "it.mcap"
     with mission_up("--record", str(path)) as mission:
@@ -228,6 +235,7 @@ def wait_for(holds: Callable[[], bool], mission: RunningMission) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.thorough
 def test_a_recorder_that_hangs_delays_nobody(mission: RunningMission, tmp_path: Path) -> None:
     with recording_to(mission, tmp_path / "hangs.mcap") as recorder:
         time.sleep(1.0)
@@ -262,6 +270,7 @@ def printed(mission: RunningMission, *words: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in done.stdout.splitlines()]
 
 
+@pytest.mark.thorough
 def test_what_is_said_is_watched_live_with_questions_and_single_fields(mission: RunningMission) -> None:
     poses = printed(mission, "watch", "*/localizer/poses", "--most", "5", "--for", "20")
     assert len(poses) == 5
@@ -274,6 +283,7 @@ def test_what_is_said_is_watched_live_with_questions_and_single_fields(mission: 
     assert (done.returncode, done.stdout) == (0, "")
 
 
+@pytest.mark.thorough
 def test_the_busiest_keys_are_told_with_rates_and_sizes(mission: RunningMission) -> None:
     rows = printed(mission, "top", "--for", "3")
     sizes = [one["bytes_per_s"] for one in rows]

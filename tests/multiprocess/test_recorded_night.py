@@ -85,6 +85,7 @@ async def drive(console: Console, until_s: float) -> None:
         await asyncio.sleep(dice.uniform(0.0, 0.3))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("lasts_s", [5.0, pytest.param(60.0, marks=pytest.mark.slow)])
 async def test_all_that_components_counted_as_sent_is_recorded_once_and_in_order(
     tmp_path: Path, lasts_s: float

@@ -53,17 +53,20 @@ def stays_whole(mission: RunningMission) -> None:
     assert {"watch-scout1-capture", "watch-scout2-capture"} <= {each["arc"] for each in status["requests"]}
 
 
+@pytest.mark.thorough
 def test_a_mission_on_one_core_comes_up_and_stays_whole() -> None:
     with one_core(), mission_up() as mission:
         stays_whole(mission)
 
 
+@pytest.mark.thorough
 @pytest.mark.alone
 def test_a_mission_beside_twenty_busy_processes_comes_up_and_stays_whole() -> None:
     with busy_neighbors(20), mission_up() as mission:
         stays_whole(mission)
 
 
+@pytest.mark.thorough
 @pytest.mark.alone
 def test_a_mission_beside_busy_processes_on_its_one_core_comes_up_and_stays_whole() -> None:
     with one_core(), busy_neighbors(5), mission_up() as mission:

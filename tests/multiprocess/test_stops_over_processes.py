@@ -63,6 +63,7 @@ def component(console: Console) -> Teleoperation:
     return console.component
 
 
+@pytest.mark.thorough
 async def test_a_held_key_moves_nothing_after_stop_and_lift_until_it_is_pressed_anew(mission: RunningMission) -> None:
     async with (
         mission.bus("ui_console/onlooker") as bus,

@@ -28,6 +28,7 @@ def consoles() -> list[str]:
     return found
 
 
+@pytest.mark.thorough
 def test_every_kind_of_console_stops_robots_or_says_that_it_cannot() -> None:
     words = ["--console", *consoles(), "--link", "up", "other holds", "cut", "--first", "1", "--within", WITHIN_S]
     done = subprocess.run(

@@ -57,6 +57,7 @@ async def at_random(mission: RunningMission, cycles: int, seed: int) -> dict[str
     return took
 
 
+@pytest.mark.thorough
 async def test_a_few_take_overs_of_three_robots_at_once(
     mission: RunningMission, trace: Path, judged: Callable[[Path], None]
 ) -> None:

@@ -64,6 +64,7 @@ def test_a_hub_that_is_killed_is_back_before_anything_ends_on_the_other_hosts(mi
     assert {name: there[name]["pid"] for name in before if name in there} == before, mission.story()
 
 
+@pytest.mark.thorough
 @pytest.mark.alone
 @pytest.mark.parametrize(
     "cut_s",
@@ -124,6 +125,7 @@ def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwh
         mission.wait("nothing is left", lambda: not mission.left(), GONE_WITHIN_S)
 
 
+@pytest.mark.thorough
 def test_ctrl_c_ends_an_offer_at_any_time(short_path: Path) -> None:
     with machines(short_path) as mission:
         mission.type_what_up_prints("near")
@@ -142,6 +144,7 @@ def test_ctrl_c_ends_an_offer_at_any_time(short_path: Path) -> None:
             mission.type_what_up_prints("far")
 
 
+@pytest.mark.thorough
 def test_a_host_without_the_secret_stays_outside_and_says_so(short_path: Path) -> None:
     with machines(short_path) as mission:
         mission.type_what_up_prints("near")
@@ -156,6 +159,7 @@ def test_a_host_without_the_secret_stays_outside_and_says_so(short_path: Path) -
             assert offer.process.wait(8) == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.alone
 def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_by_its_secret(short_path: Path) -> None:
     with mission_on_three_hosts(short_path) as mission:
@@ -199,6 +203,7 @@ async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
         await bus.close()
 
 
+@pytest.mark.thorough
 def test_a_detached_up_waits_too_and_returns_when_all_is_ready(short_path: Path) -> None:
     with machines(short_path, "--detach") as mission:
         for host in ("near", "far"):

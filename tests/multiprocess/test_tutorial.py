@@ -18,12 +18,14 @@ TUTORIAL = DOCS / "tutorial" / "first-mission.md"
 INTRUDER = DOCS / "tutorial" / "the-intruder-nobody-saw.md"
 
 
+@pytest.mark.thorough
 def test_every_command_prints_what_the_tutorial_says() -> None:
     with tempfile.TemporaryDirectory(prefix="scout-tutorial-") as name:
         shutil.copy(MISSION_XML, Path(name) / "mission.xml")
         run_all(TUTORIAL, Path(name))
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(360)
 def test_the_intruder_is_missed_and_then_seen_as_the_tutorial_says() -> None:
     with tempfile.TemporaryDirectory(prefix="scout-intruder-") as name:

@@ -178,6 +178,7 @@ async def test_of_two_operators_the_higher_has_the_robot_and_the_other_is_told_w
         await ben.wait(lambda: ben.is_held, "ben has it back")
 
 
+@pytest.mark.thorough
 async def test_two_equal_operators_have_the_robot_in_turns(served: Served) -> None:
     async with program(served, "carla", 70) as carla, program(served, "dora", 70) as dora:
         for one in (carla, dora):
@@ -269,6 +270,7 @@ async def test_on_a_tablet_a_finger_on_the_pad_drives_and_a_lifted_one_stops(ser
         await page.wait_for_selector("body[data-held='']")
 
 
+@pytest.mark.thorough
 async def test_on_a_phone_that_loses_its_network_the_wheels_stop_and_the_behavior_goes_on(served: Served) -> None:
     async with (
         served.mission.bus() as bus,
@@ -305,6 +307,7 @@ Object.defineProperty(navigator, "getGamepads", { value: () => [pad()] });
 """
 
 
+@pytest.mark.thorough
 async def test_by_one_touch_a_page_asks_an_equal_for_the_robot_and_lets_an_equal_have_it(served: Served) -> None:
     async with program(served, "erna") as erna, page_at("phone", served.port, served.token) as page:
         await erna.say(do="take", robot="scout1")
@@ -327,6 +330,7 @@ async def test_by_one_touch_a_page_asks_an_equal_for_the_robot_and_lets_an_equal
         await erna.say(do="release")
 
 
+@pytest.mark.thorough
 async def test_a_gamepad_drives_only_while_its_shoulder_button_is_held(served: Served) -> None:
     async with served.mission.bus() as bus, page_at("desktop", served.port, served.token, script=GAMEPAD) as page:
         await take(page)
@@ -344,6 +348,7 @@ async def test_a_gamepad_drives_only_while_its_shoulder_button_is_held(served: S
         await wait_still(bus)
 
 
+@pytest.mark.thorough
 async def test_an_emergency_stop_holds_against_the_hands_until_it_is_lifted(served: Served) -> None:
     async with served.mission.bus() as bus, page_at("desktop", served.port, served.token) as page:
         card = page.locator(".robot[data-robot=scout1]")
@@ -383,6 +388,7 @@ async def test_a_stranger_is_asked_for_the_token_and_told_that_it_is_wrong(serve
         await other.wait_for_selector(".robot[data-robot=scout1]")
 
 
+@pytest.mark.thorough
 async def test_when_the_server_was_killed_and_is_started_again_open_pages_come_back_by_themselves(
     served: Served,
 ) -> None:

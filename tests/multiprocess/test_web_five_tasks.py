@@ -112,6 +112,7 @@ async def test_stop_and_lift(served: Served) -> None:
         assert one.touches == touches_of("stop a robot and lift the stop")
 
 
+@pytest.mark.thorough
 async def test_find_out_why_a_robot_waits(served: Served) -> None:
     async with person(served, "phone") as other, person(served) as one:
         await drive(other, "scout1")
@@ -122,6 +123,7 @@ async def test_find_out_why_a_robot_waits(served: Served) -> None:
         assert one.touches == touches_of("find out why a robot waits")
 
 
+@pytest.mark.thorough
 async def test_see_who_moved_a_robot_at_a_given_time(served: Served) -> None:
     async with person(served, "phone") as other:
         await drive(other, "scout2")
@@ -138,6 +140,7 @@ async def test_see_who_moved_a_robot_at_a_given_time(served: Served) -> None:
         assert one.touches == touches_of("see who moved scout2 at a given time")
 
 
+@pytest.mark.thorough
 async def test_hand_a_robot_to_a_colleague(served: Served) -> None:
     async with person(served, "phone") as colleague, person(served) as one:
         await drive(one, "scout1")

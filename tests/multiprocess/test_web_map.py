@@ -58,6 +58,7 @@ async def tap(page: Any, x_m: float, y_m: float) -> None:
     await page.mouse.click(box["x"] + scale * x_m, box["y"] + box["height"] - scale * y_m)
 
 
+@pytest.mark.thorough
 async def test_robots_go_where_a_person_taps_on_the_map_and_one_goes_on_while_the_person_drives_another(
     served: Served,
 ) -> None:
@@ -101,6 +102,7 @@ async def test_a_robot_goes_to_the_place_that_was_tapped_in_its_picture_and_the_
         assert abs(math.remainder(bearing_rad - before.heading_rad, math.tau)) < 0.2, "straight ahead, as it was tapped"
 
 
+@pytest.mark.thorough
 async def test_a_group_goes_to_places_side_by_side_and_an_order_is_stopped(served: Served) -> None:
     async with served.mission.bus() as bus, page_at(served) as page:
         for robot in ("scout1", "scout2"):

@@ -45,6 +45,7 @@ class Record:
         return [act.action for act in self.acts]
 
 
+@pytest.mark.thorough
 async def test_each_command_that_changes_a_mission_is_one_event_with_its_user(mission: RunningMission) -> None:
     async with mission.bus("ui_console/recorder") as bus:
         record = Record()

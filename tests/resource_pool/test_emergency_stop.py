@@ -391,6 +391,7 @@ def speed_for(known: int) -> float:
     return 1.0 + known / 200
 
 
+@pytest.mark.thorough
 def test_in_a_thousand_random_stops_nothing_from_before_a_stop_is_on_the_air_after_it(local_mission: Any) -> None:
     """By what the radio sent, and by the world's own audit of the numbers that packets carry."""
     rng = random.Random(12)

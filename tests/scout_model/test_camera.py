@@ -123,6 +123,7 @@ def test_a_painting_process_needs_no_opengl(tmp_path: Path) -> None:
     assert len(views("none", tmp_path)) == 9
 
 
+@pytest.mark.thorough
 @pytest.mark.processes
 def test_rendered_and_painted_pictures_show_the_same(gl: GlSupport, tmp_path: Path) -> None:
     if gl.backend == "none":

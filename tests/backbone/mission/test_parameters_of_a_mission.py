@@ -118,6 +118,7 @@ def test_rules_of_a_class_are_asked_once_for_the_same_parameters(modules: Path) 
     assert faults_in(modules, text) == [fault]
 
 
+@pytest.mark.thorough
 def test_a_module_that_hangs_is_a_fault_and_holds_up_nothing_else(
     modules: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

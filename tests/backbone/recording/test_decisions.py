@@ -166,6 +166,7 @@ def schedule_then(recording: Recording, message: Recorded) -> Schedule:
     return Answers(manager).schedule(message.body["at_s"])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", ASKED_SEEDS)
 def test_reasons_of_random_instants_are_those_that_were_given_then(recorded: RecordMission, seed: int):
     """Two hundred questions in all, while ARCs ask and give back, and RCs and the RC manager itself die and return."""

@@ -82,6 +82,7 @@ def only(name: str, **parameters: object) -> MissionDescription:
     return mission.model_copy(update={"behaviors": (changed,)})
 
 
+@pytest.mark.thorough
 def test_a_whole_team_is_commanded_by_behaviors_on_shared_hardware() -> None:
     async def main() -> None:
         async with at_work(read_mission(TEAM)) as running:

@@ -42,6 +42,7 @@ def checked(file: Path) -> bytes:
     return file.read_bytes()
 
 
+@pytest.mark.thorough
 async def test_with_a_mouse_the_mission_of_the_tutorial_is_built_by_dragging(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     with served(file) as address:
@@ -101,6 +102,7 @@ async def test_with_a_finger_on_a_phone_the_same_is_built(tmp_path: Path) -> Non
             await finger.is_state("saved, fine")
 
 
+@pytest.mark.thorough
 async def test_on_a_tablet_a_finger_drags_parts_and_keys_alone_add_move_raise_and_remove(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     with served(file) as address:
@@ -157,6 +159,7 @@ async def test_on_a_tablet_a_finger_drags_parts_and_keys_alone_add_move_raise_an
             await hands.row("behavior hide hide priority 1").wait_for(state="detached")
 
 
+@pytest.mark.thorough
 async def test_what_somebody_else_wrote_meanwhile_is_overwritten_only_when_told_so(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     file.write_bytes((ROOT / "mission.xml").read_bytes())
@@ -186,6 +189,7 @@ async def test_what_somebody_else_wrote_meanwhile_is_overwritten_only_when_told_
             assert file.read_bytes() == mine
 
 
+@pytest.mark.thorough
 async def test_a_refused_value_stays_marked_where_it_was_written_and_escape_takes_it_back(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     file.write_bytes((ROOT / "mission.xml").read_bytes())
@@ -207,6 +211,7 @@ async def test_a_refused_value_stays_marked_where_it_was_written_and_escape_take
             await Hands(page).is_state("saved, fine")
 
 
+@pytest.mark.thorough
 async def test_enter_sets_what_is_written_and_the_focus_stays(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     file.write_bytes((ROOT / "mission.xml").read_bytes())
@@ -222,6 +227,7 @@ async def test_enter_sets_what_is_written_and_the_focus_stays(tmp_path: Path) ->
             assert await page.locator("#undo").is_disabled(), "it was one change"
 
 
+@pytest.mark.thorough
 async def test_a_dialog_asks_for_what_is_required_and_keeps_answers_that_were_refused(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     with served(file) as address:
@@ -243,6 +249,7 @@ async def test_a_dialog_asks_for_what_is_required_and_keeps_answers_that_were_re
             await Hands(page).see("behavior rounds patrol priority 7")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("size", "theme"), [("desktop", "light"), ("phone", "dark")])
 async def test_axe_finds_nothing_serious_in_the_designer(tmp_path: Path, size: str, theme: str) -> None:
     file = tmp_path / "guard.xml"

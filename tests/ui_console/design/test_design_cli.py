@@ -74,6 +74,7 @@ def test_the_designer_loads_neither_opencv_nor_mujoco_nor_textual() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.processes
 def test_a_designer_that_begins_again_at_its_port_has_the_same_token(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

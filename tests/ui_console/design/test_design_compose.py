@@ -16,6 +16,7 @@ TUTORIAL = ROOT / "docs" / "tutorial" / "compose-a-tree.md"
 EXAMPLE = ROOT / "docs" / "examples" / "night.xml"
 
 
+@pytest.mark.thorough
 async def test_a_mouse_alone_composes_the_tree_of_the_example(tmp_path: Path) -> None:
     file = tmp_path / "night.xml"
     with served(file) as address:
@@ -24,6 +25,7 @@ async def test_a_mouse_alone_composes_the_tree_of_the_example(tmp_path: Path) ->
     assert file.read_text() == EXAMPLE.read_text()
 
 
+@pytest.mark.thorough
 def test_what_it_composes_is_checked_and_brought_up() -> None:
     with tempfile.TemporaryDirectory(prefix="scout-design-") as name:
         (Path(name) / "night.xml").write_bytes(EXAMPLE.read_bytes())

@@ -139,6 +139,7 @@ async def test_a_command_from_before_a_stop_is_not_given_and_the_page_says_so(st
         assert not given(stage)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size", ["desktop", "phone"])
 async def test_controls_of_commands_are_large_reached_by_focus_and_axe_finds_nothing_serious(
     stage: Stage, size: str

@@ -50,6 +50,7 @@ async def test_the_age_of_what_is_shown_counts_from_the_newest_beat_that_came_ba
         assert ages == [200, 300, 300, 400, 7250, 60000, 60100]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("way", ["up", "down", "both"])
 async def test_a_page_that_is_cut_off_says_within_a_second_that_it_cannot_stop_a_robot(stage: Stage, way: str) -> None:
     async with (
@@ -120,6 +121,7 @@ async def test_a_page_that_slept_drives_nothing_when_it_wakes_and_offers_the_los
         assert await page.locator("#lost").is_hidden()
 
 
+@pytest.mark.thorough
 async def test_a_page_that_comes_back_has_its_robot_again_at_once(stage: Stage) -> None:
     """The server need not find out first that the connection before is dead."""
     async with Cable(stage.port).plugged_in() as cable:
@@ -135,6 +137,7 @@ async def test_a_page_that_comes_back_has_its_robot_again_at_once(stage: Stage) 
             assert len(stage.hub.clients) == 1, "one page is one client"
 
 
+@pytest.mark.thorough
 async def test_a_robot_that_was_lost_can_be_left(stage: Stage) -> None:
     async with Cable(stage.port).plugged_in() as cable:
         address = f"http://127.0.0.1:{cable.port}/#token={ANYBODY}"

@@ -21,6 +21,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 VALUES = {"battery_share": 0.87, "lift": 0.25, "left_wheel_m": 12.3, "front_bumper": False, "is_holding": True}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("size", "theme"), [("desktop", "dark"), ("phone", "light")])
 async def test_each_report_is_a_bar_a_lamp_or_words_and_stays_in_its_place(stage: Stage, size: str, theme: str) -> None:
     abilities = Abilities(is_robot=True, reports=field_forms(RoverReport))

@@ -105,6 +105,7 @@ async def test_the_look_is_the_systems_unless_this_browser_was_told_otherwise(st
         assert await ground(page) == light
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("size", "theme"),
     [

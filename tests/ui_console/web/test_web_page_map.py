@@ -85,6 +85,7 @@ async def publishing(arc: FakeArc) -> AsyncIterator[None]:
         await asyncio.wait({task})
 
 
+@pytest.mark.thorough
 async def test_robots_are_on_the_map_with_name_source_spread_and_trail_and_an_old_place_is_marked(floor: Floor) -> None:
     async with map_at(floor) as page:
         for step in range(1, 20):
@@ -123,6 +124,7 @@ async def test_a_robot_is_selected_by_a_tap_and_sent_to_a_place_and_the_order_ca
         assert "scout1" not in floor.ordered
 
 
+@pytest.mark.thorough
 async def test_one_person_holds_two_robots_and_the_order_of_the_other_goes_on(floor: Floor) -> None:
     async with map_at(floor) as page:
         await take(page)

@@ -58,6 +58,7 @@ async def test_take_over_pressed_twice_takes_and_never_gives_back(stage: Stage) 
         assert not any(arc.is_idle or arc.released for arc in stage.placer.arcs.values())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("by", ["mouse", "enter"])
 async def test_a_stop_is_lifted_by_holding_for_a_second_and_by_nothing_shorter(stage: Stage, by: str) -> None:
     async def press() -> None:
@@ -171,6 +172,7 @@ async def test_what_is_held_when_the_robot_is_granted_moves_nothing_before_it_is
         await wheels.wait_turning()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("hand", HANDS)
 async def test_what_is_held_while_a_dialog_comes_and_goes_moves_nothing_afterwards(stage: Stage, hand: str) -> None:
     async with page_at(stage, script=GAMEPAD) as page:
@@ -198,6 +200,7 @@ FOCUS = {
 }
 
 
+@pytest.mark.thorough
 async def test_keys_stop_one_and_all_whatever_has_the_focus(stage: Stage) -> None:
     async with page_at(stage) as page:
         await take(page)
@@ -221,6 +224,7 @@ IN_REACH = """(words) => [...document.querySelectorAll("button.emergency")].some
 })"""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("size", ALL_SIZES)
 async def test_a_dialog_leaves_red_buttons_of_one_and_of_all_in_reach_of_a_finger(stage: Stage, size: str) -> None:
     async with page_at(stage, size) as page:
@@ -235,6 +239,7 @@ async def test_a_dialog_leaves_red_buttons_of_one_and_of_all_in_reach_of_a_finge
         assert await dialog.count() == 1, "the reading goes on"
 
 
+@pytest.mark.thorough
 async def test_a_hold_from_before_a_stop_moves_nothing_however_late_it_arrives(stage: Stage) -> None:
     async with (
         Cable(stage.port).plugged_in() as cable,
@@ -270,6 +275,7 @@ async def test_a_letter_that_stops_is_written_with_alt(stage: Stage) -> None:
         assert not any(robot.orders for robot in stage.robots.values())
 
 
+@pytest.mark.thorough
 async def test_space_and_escape_stop_the_wheels_whatever_has_the_focus(stage: Stage) -> None:
     async with page_at(stage) as page:
         await take(page)
@@ -324,6 +330,7 @@ async def test_a_gamepad_stops_one_and_all(stage: Stage, button: int, robots: li
         assert all(stage.robots[robot].orders == 1 for robot in robots), "once for each press"
 
 
+@pytest.mark.thorough
 async def test_a_stop_that_nobody_confirms_is_said_across_the_page(stage: Stage) -> None:
     async with page_at(stage) as page:
         stage.robots["scout2"].is_deaf = True
@@ -332,6 +339,7 @@ async def test_a_stop_that_nobody_confirms_is_said_across_the_page(stage: Stage)
         assert await page.locator("dialog[open]").count() == 0, "nothing stands before the red buttons"
 
 
+@pytest.mark.thorough
 async def test_a_finger_that_was_on_the_pad_at_a_stop_drives_only_when_put_down_anew(stage: Stage) -> None:
     async with page_at(stage, "phone") as page, stage.browser() as other:
         await take(page)

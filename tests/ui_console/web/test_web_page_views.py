@@ -14,6 +14,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 PIXEL = "() => [...document.querySelector('#seen-place canvas').getContext('2d').getImageData(5, 5, 1, 1).data]"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("size", "theme"), [("desktop", "light"), ("phone", "dark")])
 async def test_a_behavior_and_a_view_are_chosen_and_a_closed_panel_costs_nothing(
     stage: Stage, size: str, theme: str
@@ -37,6 +38,7 @@ async def test_a_behavior_and_a_view_are_chosen_and_a_closed_panel_costs_nothing
         await wait_until(lambda: not stage.hub.sights.looked_at, "no look")
 
 
+@pytest.mark.thorough
 async def test_a_page_whose_connection_comes_back_looks_again(stage: Stage) -> None:
     await shower_at(stage.placer)
     async with page_at(stage) as page:

@@ -241,6 +241,7 @@ async def test_others_do_not_notice_one_that_floods(stage: Stage) -> None:
         await stage.placer.wait(lambda: any(command == Move(0.025, 0.0) for _at, command in stage.drives()))
 
 
+@pytest.mark.thorough
 async def test_others_do_not_notice_one_that_stops_reading(stage: Stage) -> None:
     """It is found out by the pings it does not answer; its robot is given back."""
     stage.grant_all()

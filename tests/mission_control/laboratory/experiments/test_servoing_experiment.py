@@ -70,6 +70,7 @@ def test_the_outcome_tells_rate_interval_and_every_failure() -> None:
     assert condition["interval95"][0] < 0.5 < condition["interval95"][1]
 
 
+@pytest.mark.thorough
 def test_a_trial_with_noise_ends_at_its_place_and_the_same_seed_gives_the_same() -> None:
     trial = run_trial(ServoOrder(1, 0, 1.0))
     assert trial.succeeded, trial
