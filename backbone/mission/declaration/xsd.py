@@ -16,7 +16,7 @@ XSD = "mission.xsd"
 
 _HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <!--
-  Schema of mission files, made by: python -m backbone.mission.generate
+  Schema of mission files, made by: python -m tests.made_files
   Which elements and attributes there are and what values they take. Children may stand in any order.
 -->
 <xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" elementFormDefault="qualified">

@@ -12,7 +12,6 @@ import pytest
 from backbone.mission import class_asking
 from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of, shipped_classes
-from backbone.mission.generate import GENERATED
 from backbone.mission.reader import Fault, MissionInvalid, read_mission, read_mission_bytes
 from backbone.mission.shipped_types import shipped_types
 from backbone.mission.tables import parameter_value
@@ -60,12 +59,6 @@ def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder whose modules can be imported."""
     monkeypatch.syspath_prepend(str(tmp_path))
     return tmp_path
-
-
-@pytest.mark.parametrize("file", GENERATED, ids=lambda path: path.name)
-def test_a_generated_file_is_what_its_declaration_makes(file: Path) -> None:
-    old = (ROOT / file).read_text("utf-8")
-    assert old == GENERATED[file](old), "run: python -m backbone.mission.generate"
 
 
 def test_a_class_of_ones_own_is_asked_for_its_parameters(modules: Path) -> None:

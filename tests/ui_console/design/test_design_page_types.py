@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from design_stage import BEN, Page, serving
+from made_files.page_types import DESIGNER
 from msgspec import inspect
 from sent_types import fits, odd
-
-from ui_console.page_types import DESIGNER
 
 
 def write_elsewhere(file: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_files.page_types import View
 from msgspec import inspect
 from sent_types import odd
 from small_recordings import SCOUT, Said, recorded
@@ -24,7 +25,6 @@ from backbone.scheduling.requests import Holder
 from backbone.scheduling.views import RcView, Schedule
 from backbone.wire import Message
 from resource_pool.arc_client import Frame
-from ui_console.page_types import View
 from ui_console.web import playing, protocol
 from ui_console.web.login import Welcome
 from ui_console.web.recording_room import NOT_NOW, RecordingRoom, Viewer

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import pytest
+from made_files.page_types import CONSOLE, MissionView
 from msgspec import inspect
 from sent_types import fits, odd
 from web_stage import Stage
 
 from backbone.component.messages import StoryEvent
-from ui_console.page_types import CONSOLE, DESIGNER, MissionView, Page, declarations
-
-
-@pytest.mark.parametrize("page", [CONSOLE, DESIGNER], ids=lambda page: page.file.name)
-def test_the_file_of_types_is_made_from_the_structs(page: Page) -> None:
-    assert page.file.read_text() == declarations(page), "run python -m ui_console.page_types"
 
 
 async def test_what_a_server_sends_has_the_types_that_the_page_is_checked_by(stage: Stage) -> None:

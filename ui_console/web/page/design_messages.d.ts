@@ -1,4 +1,4 @@
-// What the page and its server send each other. Written by ui_console/page_types.py; change the structs.
+// What the page and its server send each other. Written by tests/made_files; change the structs.
 
 export interface AskAnswer {
   ask: OfferView;

@@ -1,15 +1,12 @@
 """The types of the pages' messages, for the checker of their JavaScript.
 
-Run ``python -m ui_console.page_types`` after a change of a message: it writes ``messages.d.ts`` of the console and
-``design_messages.d.ts`` of the designer anew. A test compares these files with the structs, and what the servers send
-with ``View``, ``DesignView`` and the answers.
+Tests compare what the servers send with ``View``, ``DesignView`` and the answers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import get_args
 
 import msgspec
@@ -39,7 +36,6 @@ from ui_console.web.login import BeatRequest, Hello
 from ui_console.web.playing import Playing
 from ui_console.web.protocol import Intent
 
-FOLDER = Path(__file__).parent / "web" / "page"
 _PLAIN: dict[type[inspect.Type], str] = {
     inspect.IntType: "number",
     inspect.FloatType: "number",
@@ -47,7 +43,7 @@ _PLAIN: dict[type[inspect.Type], str] = {
     inspect.BoolType: "boolean",
     inspect.NoneType: "null",
 }
-HEAD = "// What the page and its server send each other. Written by ui_console/page_types.py; change the structs.\n"
+HEAD = "// What the page and its server send each other. Written by tests/made_files; change the structs.\n"
 
 
 class Welcomed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -190,31 +186,26 @@ class Page:
     """What a page and its server send each other.
 
     Attributes:
-        file: Where its types are written.
         view: All that it shows.
         answers: To what it asks.
         said: What it says.
     """
 
-    file: Path
     view: type[msgspec.Struct]
     answers: tuple[type[msgspec.Struct], ...]
     said: tuple[type[msgspec.Struct], ...]
 
 
 CONSOLE = Page(
-    FOLDER / "messages.d.ts",
     View,
     (WhyAnswer, RefusedAnswer, ParametersAnswer, SetAnswer, LogFoundAnswer, LogRefusedAnswer),
     (Hello, BeatRequest, *get_args(Intent), *get_args(Playing)),
 )
-DESIGNER = Page(
-    FOLDER / "design_messages.d.ts", DesignView, get_args(DesignAnswer), (Hello, BeatRequest, *get_args(DesignIntent))
-)
+DESIGNER = Page(DesignView, get_args(DesignAnswer), (Hello, BeatRequest, *get_args(DesignIntent)))
 
 
 def declarations(page: Page) -> str:
-    """Return the whole file of a page."""
+    """Return the whole file of a page's types."""
     heard = _declared([page.view, *page.answers], is_sent_whole=True)
     said = _declared(page.said, is_sent_whole=False)
     news = f"{{ view: Partial<{page.view.__name__}>; answer?: undefined }}"
@@ -286,8 +277,3 @@ def _tag(kind: inspect.StructType) -> list[str]:
     """Return the field that says which message it is; messages of the bus go to the page without it."""
     is_tagged = kind.tag is not None and not kind.array_like
     return [f"  {kind.tag_field}: {msgspec.json.encode(kind.tag).decode()};\n"] if is_tagged else []
-
-
-if __name__ == "__main__":
-    for each in (CONSOLE, DESIGNER):
-        each.file.write_text(declarations(each))
