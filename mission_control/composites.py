@@ -44,8 +44,17 @@ class Composite(Children):
 
     expects_failures = True
     in_file_order = True
-    while_suspended: WhileSuspended = WhileSuspended.WAIT
-    patience_s: float = 0.0
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        *,
+        while_suspended: WhileSuspended = WhileSuspended.WAIT,
+        patience_s: float = 0.0,
+        together: bool = False,
+    ) -> None:
+        super().__init__(names, together=together)
+        self.while_suspended, self.patience_s = while_suspended, patience_s
 
     def _settle(self, now_s: float) -> list[Instruction]:
         """Arrange, also without children: then the parent has nothing to wait for."""
@@ -105,16 +114,6 @@ class InSequence(Composite):
     A suspended child can fail, see ``Composite``; no later child stands in for it, because their order matters.
     """
 
-    def __init__(
-        self,
-        names: Sequence[str],
-        *,
-        while_suspended: WhileSuspended = WhileSuspended.WAIT,
-        patience_s: float = 0.0,
-    ) -> None:
-        super().__init__(names, together=False)
-        self.while_suspended, self.patience_s = while_suspended, patience_s
-
     def _because(self) -> str:
         before = self._with_status(BehaviorStatus.SUCCESS)
         after = f", after {before[-1]} succeeded" if before else ""
@@ -129,16 +128,6 @@ class InFallback(Composite):
     start from their beginning when they are needed again. A child that failed is not tried again. If no other child
     is left, the parent waits for the suspended ones.
     """
-
-    def __init__(
-        self,
-        names: Sequence[str],
-        *,
-        while_suspended: WhileSuspended = WhileSuspended.WAIT,
-        patience_s: float = 0.0,
-    ) -> None:
-        super().__init__(names, together=False)
-        self.while_suspended, self.patience_s = while_suspended, patience_s
 
     def decision(self, name: str) -> Decision:  # noqa: ARG002
         """Leave every finished child; the verdict tells success from failure."""
@@ -206,9 +195,8 @@ class Again(Composite):
         while_suspended: WhileSuspended = WhileSuspended.WAIT,
         patience_s: float = 0.0,
     ) -> None:
-        super().__init__(names, together=False)
+        super().__init__(names, while_suspended=while_suspended, patience_s=patience_s)
         self.most, self.pause_s = most, pause_s
-        self.while_suspended, self.patience_s = while_suspended, patience_s
         self._ends, self._starts_at_s = 0, -math.inf
 
     def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
@@ -300,9 +288,8 @@ class WithTimeout(Composite):
     def __init__(
         self, names: Sequence[str], *, seconds: float, while_suspended: WhileSuspended = WhileSuspended.WAIT
     ) -> None:
-        super().__init__(names, together=False)
-        self.seconds, self.while_suspended = seconds, while_suspended
-        self._watch = Stopwatch()
+        super().__init__(names, while_suspended=while_suspended)
+        self.seconds, self._watch = seconds, Stopwatch()
 
     def begin(self, now_s: float) -> list[Instruction]:
         """Start the child and the clock."""

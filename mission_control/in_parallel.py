@@ -32,9 +32,8 @@ class InParallel(Composite):
         while_suspended: WhileSuspended = WhileSuspended.WAIT,
         patience_s: float = 0.0,
     ) -> None:
-        super().__init__(names)
+        super().__init__(names, while_suspended=while_suspended, patience_s=patience_s, together=True)
         self.success_count, self.failure_count = success_count, failure_count
-        self.while_suspended, self.patience_s = while_suspended, patience_s
         self._skipped = dict[str, float]()  # child → begin of the suspension for which it is skipped
 
     def decision(self, name: str) -> Decision:  # noqa: ARG002

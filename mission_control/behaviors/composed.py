@@ -1,21 +1,22 @@
 """Composed: base of the behaviors that a mission file composes of others.
 
-They hold no ARC and decide nothing of their own: ``mission_control.composites`` has their rules. Order is that of the
-mission file; priorities stay what they are, a matter of scheduling.
+They hold no ARC and decide nothing of their own: ``mission_control.composites`` has their rules, whose settings are the
+parameters. Order is that of the mission file; priorities stay what they are, a matter of scheduling.
 
 Source: BehaviorTree.CPP 4, "Nodes Library": Sequence, Fallback, Parallel, RetryUntilSuccessful, Repeat, Timeout, Sleep.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, TypeVar
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, TypeVar
 
 import msgspec
 
 from backbone.ranges import A_DAY_S
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.children import BRANCH
-from mission_control.composites import ENDLESS
+from mission_control.composites import ENDLESS, Composite, WhileSuspended
 
 MOST_CHILDREN = 256  # chosen: as many as a path may have steps; a mission has a dozen
 PAUSE_S = 1.0  # chosen: ten times the start of a process, so that a child that fails at once costs little
@@ -31,14 +32,35 @@ Times = Annotated[int, msgspec.Meta(ge=ENDLESS, le=MOST_TIMES)]
 Threshold = Annotated[int, msgspec.Meta(ge=-MOST_CHILDREN, le=MOST_CHILDREN)]
 """How many children; negative: counted from all of them, which are -1."""
 
+_SETTINGS = {"num_cycles": "most", "num_attempts": "most"}  # parameter → setting of the rules, where names differ
+
 P = TypeVar("P", bound=BehaviorParameters)
 
 
 class Composed(Behavior[P]):
     """A parent that decides by rule, and reports which branch runs and why: to people, and to its own parent."""
 
+    rules_type: ClassVar[type[Composite]]
     children_allowed = (1, MOST_CHILDREN)
     may_claim = False
+
+    def rules(self, children: Sequence[str]) -> Composite:
+        """Return the rules of ``rules_type``, with the parameters as their settings."""
+        return self.rules_type(children, **self._settings())
+
+    def parameters_changed(self) -> None:
+        """Apply them from now on, also to times and counts that are under way."""
+        for name, value in self._settings().items():
+            setattr(self._children.rules, name, value)
+        self._children.look_again()
+
+    def _settings(self) -> dict[str, Any]:
+        """Return the parameters that the tree does not give."""
+        own = [name for name in self.parameters.__struct_fields__ if name not in BehaviorParameters.__struct_fields__]
+        settings = {_SETTINGS.get(name, name): getattr(self.parameters, name) for name in own}
+        if "while_suspended" in settings:
+            settings["while_suspended"] = WhileSuspended(settings["while_suspended"])
+        return settings
 
     def children_arranged(self) -> None:
         """Report which children run, and why."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
 from mission_control.behaviors.composed import PATIENCE_S, Composed, Pause
-from mission_control.composites import InFallback, WhileSuspended
+from mission_control.composites import InFallback
 
 
 class FallbackParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -31,18 +30,4 @@ class Fallback(Composed[FallbackParameters]):
     """Tries its children one after the other; succeeds with the first that succeeds, fails after all have failed."""
 
     parameters_type = FallbackParameters
-
-    def rules(self, children: Sequence[str]) -> InFallback:
-        """Return the rules of a fallback."""
-        self._rules = InFallback(children)
-        self._set_rules()
-        return self._rules
-
-    def parameters_changed(self) -> None:
-        """Apply them from now on."""
-        self._set_rules()
-        self._children.look_again()
-
-    def _set_rules(self) -> None:
-        self._rules.while_suspended = WhileSuspended(self.parameters.while_suspended)
-        self._rules.patience_s = self.parameters.patience_s
+    rules_type = InFallback

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
 from mission_control.behaviors.composed import PATIENCE_S, Composed, Seconds, Threshold
-from mission_control.composites import ENDLESS, WhileSuspended
+from mission_control.composites import ENDLESS
 from mission_control.in_parallel import InParallel
 
 
@@ -39,20 +38,4 @@ class Parallel(Composed[ParallelParameters]):
     """Runs its children at the same time; succeeds or fails as soon as enough of them have, and ends the others."""
 
     parameters_type = ParallelParameters
-
-    def rules(self, children: Sequence[str]) -> InParallel:
-        """Return the rules of a parallel."""
-        self._rules = InParallel(children)
-        self._set_rules()
-        return self._rules
-
-    def parameters_changed(self) -> None:
-        """Apply them from now on."""
-        self._set_rules()
-        self._children.look_again()
-
-    def _set_rules(self) -> None:
-        self._rules.success_count = self.parameters.success_count
-        self._rules.failure_count = self.parameters.failure_count
-        self._rules.while_suspended = WhileSuspended(self.parameters.while_suspended)
-        self._rules.patience_s = self.parameters.patience_s
+    rules_type = InParallel

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
 from mission_control.behaviors.composed import PATIENCE_S, PAUSE_S, Composed, Pause, Seconds, Times
-from mission_control.composites import WhileSuspended, WithRetries
+from mission_control.composites import WithRetries
 
 
 class RetryParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -35,20 +34,5 @@ class Retry(Composed[RetryParameters]):
     """Starts its child again while it fails; succeeds with the child, fails after the last attempt."""
 
     parameters_type = RetryParameters
+    rules_type = WithRetries
     children_allowed = (1, 1)
-
-    def rules(self, children: Sequence[str]) -> WithRetries:
-        """Return the rules of a retry."""
-        self._rules = WithRetries(children, most=self.parameters.num_attempts)
-        self._set_rules()
-        return self._rules
-
-    def parameters_changed(self) -> None:
-        """Apply number and pause at the next end of the child, the others from now on."""
-        self._set_rules()
-        self._children.look_again()
-
-    def _set_rules(self) -> None:
-        self._rules.most, self._rules.pause_s = self.parameters.num_attempts, self.parameters.pause_s
-        self._rules.while_suspended = WhileSuspended(self.parameters.while_suspended)
-        self._rules.patience_s = self.parameters.patience_s

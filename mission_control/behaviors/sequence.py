@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Names
 from typing import Literal
 
 from mission_control.behavior import BehaviorParameters
 from mission_control.behaviors.composed import PATIENCE_S, Composed, Seconds
-from mission_control.composites import InSequence, WhileSuspended
+from mission_control.composites import InSequence
 
 
 class SequenceParameters(BehaviorParameters, frozen=True, kw_only=True):
@@ -28,18 +27,4 @@ class Sequence(Composed[SequenceParameters]):
     """Runs its children one after the other; succeeds after all have succeeded, fails with the first that fails."""
 
     parameters_type = SequenceParameters
-
-    def rules(self, children: Names[str]) -> InSequence:
-        """Return the rules of a sequence."""
-        self._rules = InSequence(children)
-        self._set_rules()
-        return self._rules
-
-    def parameters_changed(self) -> None:
-        """Apply them from now on."""
-        self._set_rules()
-        self._children.look_again()
-
-    def _set_rules(self) -> None:
-        self._rules.while_suspended = WhileSuspended(self.parameters.while_suspended)
-        self._rules.patience_s = self.parameters.patience_s
+    rules_type = InSequence
