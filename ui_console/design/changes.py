@@ -14,8 +14,9 @@ import msgspec
 
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Path
-from ui_console.design.commands import DesignRefused, Relocate, Remove
+from ui_console.design.commands import DesignRefused
 from ui_console.design.draft import Draft
+from ui_console.design.effects import relocate, remove
 from ui_console.design.following import follower
 from ui_console.design.offers import Offer, offer_at
 from ui_console.design.properties import Property, properties
@@ -63,9 +64,9 @@ def changed(draft: Draft, change: Change) -> Draft:
         case SetProperty(path=path, value=value):
             return draft.do(_property(draft, change).command(path, draft.mission.at(path).tag, value.strip()))
         case MoveElement(path=path, parent=parent, before=before):
-            return draft.do(Relocate(path, parent, _place(draft, path, parent, before)))
+            return draft.do(relocate(path, parent, _place(draft, path, parent, before)))
         case RemoveElement(path=path):
-            return draft.do(Remove(path))
+            return draft.do(remove(path))
         case Undo():
             return draft.undo()
         case Redo():

@@ -1,14 +1,15 @@
-"""Commands that change a mission while it is designed, and their refusals.
-
-Pure: values. ``effects`` carries them out.
-"""
+"""Commands that change a mission while it is designed, as values, and their refusals. Pure; they are in ``effects``."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Concatenate, ParamSpec
 
 from backbone.errors import Refusal
-from backbone.mission.edit import NewElement, Path
+from backbone.mission.edit import Path
+
+P = ParamSpec("P")
 
 
 class DesignRefused(Refusal):
@@ -33,115 +34,45 @@ class NothingToUndo(DesignRefused):
 
 
 @dataclass(frozen=True, slots=True)
-class Add:
-    """Add a given element."""
-
-    parent: Path
-    element: NewElement
-    at: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class AddType:
-    """Declare a type that the project ships, with the types it needs; declared types stay."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class AddBehavior:
-    """Add a node of the behavior tree, and declare its type if need be.
+class TextState:
+    """One state of the text.
 
     Attributes:
-        parent: A behavior; the mission or its ``<behaviors>`` for a root.
-        type: Its type.
-        name: Its name.
-        priority: Among its siblings.
+        text: The bytes of the file.
+        touched: The element added or changed last; the cursor goes there.
     """
 
-    parent: Path
-    type: str
-    name: str
-    priority: int = 1
+    text: bytes
+    touched: Path = ()
 
 
-@dataclass(frozen=True, slots=True)
-class ClaimArc:
-    """Set the ARC that a behavior claims, in place of its present one; the kind is declared if need be."""
+@dataclass(frozen=True)
+class Command:
+    """A change that can be carried out on any text.
 
-    behavior: Path
-    kind: str
-    minimum_runtime_s: str
+    Attributes:
+        effect: Returns the text afterwards; its first argument is the text before.
+        arguments: Its other arguments.
+        named: Those of them that are given by name.
+    """
 
+    effect: Callable[..., TextState]
+    arguments: tuple[Any, ...]
+    named: dict[str, Any]
 
-@dataclass(frozen=True, slots=True)
-class AddResource:
-    """Add a piece of hardware in its first shape, tied to existing hardware, and its body if there is a world."""
+    def carry_out(self, text: bytes) -> TextState:
+        """Return the text after the command, and the element it touched.
 
-    type: str
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class AddWorld:
-    """Add the simulated room, with a body for every robot."""
-
-    width_m: str
-    depth_m: str
+        Raises:
+            Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: the command is not possible.
+        """
+        return self.effect(text, *self.arguments, **self.named)
 
 
-@dataclass(frozen=True, slots=True)
-class Remove:
-    """Remove an element and all in it; with a robot goes its body."""
+def command(effect: Callable[Concatenate[bytes, P], TextState]) -> Callable[P, Command]:
+    """Return the function that makes a command of an effect's arguments behind the text."""
 
-    path: Path
+    def made(*arguments: P.args, **named: P.kwargs) -> Command:
+        return Command(effect, arguments, named)
 
-
-@dataclass(frozen=True, slots=True)
-class Relocate:
-    """Move an element; ``at`` is its number among its siblings afterwards."""
-
-    path: Path
-    parent: Path
-    at: int
-
-
-@dataclass(frozen=True, slots=True)
-class SetValue:
-    """Set an attribute; None leaves it out."""
-
-    path: Path
-    attribute: str
-    value: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class WriteParameter:
-    """Set a parameter of a behavior, a resource or a service; None leaves it out."""
-
-    path: Path
-    name: str
-    value: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class Rename:
-    """Rename an element, and all references to it."""
-
-    path: Path
-    name: str
-
-
-Command = (
-    Add
-    | AddType
-    | AddBehavior
-    | ClaimArc
-    | AddResource
-    | AddWorld
-    | Remove
-    | Relocate
-    | SetValue
-    | WriteParameter
-    | Rename
-)
+    return made

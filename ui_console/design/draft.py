@@ -23,8 +23,7 @@ from backbone.mission.reader import Fault, MissionInvalid, read_mission_bytes
 from backbone.mission.report import Report
 from backbone.naming import is_legal
 from ui_console.design.catalogue import new_text
-from ui_console.design.commands import Command, NothingToUndo
-from ui_console.design.effects import TextState, carry_out
+from ui_console.design.commands import Command, NothingToUndo, TextState
 
 UNDO_MOST = 1000  # chosen: more than a sitting; a mission file is small
 
@@ -121,7 +120,7 @@ class Draft:
         Raises:
             Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: the command is not possible.
         """
-        return self._after(carry_out(self.step, command))
+        return self._after(command.carry_out(self.text))
 
     def taken_from(self, text: bytes) -> Draft:
         """Return the draft with the file's present content; undo restores the text before.

@@ -1,4 +1,4 @@
-"""Effects of commands: a text and a command in, another text and the touched element out.
+"""All commands, each with its effect: a text and its arguments in, another text and the touched element out.
 
 Pure. The text is the only truth: each change reads the elements' places from it anew.
 
@@ -12,29 +12,14 @@ Rules of this file:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
-from backbone.mission.edit import NewElement, Node, Path, add, move, outline, place_for, remove, set_attribute
+from backbone.mission import edit
+from backbone.mission.edit import NewElement, Node, Path, outline, place_for
 from backbone.mission.report import quoted
 from backbone.mission.tables import NETWORK_ID, WORLD
 from backbone.naming import legal
 from ui_console.design.catalogue import stock_resource, stock_type
-from ui_console.design.commands import (
-    Add,
-    AddBehavior,
-    AddResource,
-    AddType,
-    AddWorld,
-    ClaimArc,
-    Command,
-    DesignRefused,
-    ElementNameTaken,
-    Relocate,
-    Remove,
-    Rename,
-    SetValue,
-    WriteParameter,
-)
+from ui_console.design.commands import DesignRefused, ElementNameTaken, TextState, command
 
 LAST_NETWORK_ID = 254  # as the reader has it
 BODY_STEP_M = 1.0  # chosen: distance of the robots' first places, half of it from the wall; none touch
@@ -42,53 +27,15 @@ WORLD_NAMED_BY = (WORLD, "localizer")  # parameters whose value is the world's n
 RADIO_RATE = {"period-s": "0.1", "packet-time-s": "0.002"}  # chosen: as mission.xml, a fiftieth of a radio
 
 
-@dataclass(frozen=True, slots=True)
-class TextState:
-    """One state of the text.
-
-    Attributes:
-        text: The bytes of the file.
-        touched: The element added or changed last; the cursor goes there.
-    """
-
-    text: bytes
-    touched: Path = ()
+@command
+def add(text: bytes, parent: Path, element: NewElement, at: int | None = None) -> TextState:
+    """Add a given element."""
+    return _added(text, parent, element, at)
 
 
-def carry_out(step: TextState, command: Command) -> TextState:
-    """Return the text after a command, and the element it touched.
-
-    Raises:
-        Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: the command is not possible.
-    """
-    match command:
-        case Add(parent, element, at):
-            return _add(step.text, parent, element, at)
-        case AddType(name):
-            return _add_type(step.text, name)
-        case AddBehavior():
-            return _add_behavior(step.text, command)
-        case ClaimArc():
-            return _claim(step.text, command)
-        case AddResource(kind, name):
-            return _add_resource(step.text, kind, name)
-        case AddWorld():
-            return _add_world(step.text, command)
-        case Remove(path):
-            return _remove(step.text, path)
-        case Relocate(path, parent, at):
-            return _move(step.text, path, parent, at)
-        case SetValue(path, attribute, value):
-            return TextState(set_attribute(step.text, path, attribute, value), path)
-        case WriteParameter():
-            return _set_parameter(step.text, command)
-        case Rename(path, name):
-            return _rename(step.text, path, name)
-
-
-def _add(text: bytes, parent: Path, element: NewElement, at: int | None = None) -> TextState:
+def _added(text: bytes, parent: Path, element: NewElement, at: int | None = None) -> TextState:
     node = outline(text).at(parent)
-    after = add(text, parent, element, at)
+    after = edit.add(text, parent, element, at)
     return TextState(after, (*parent, place_for(node, element.tag, at)))
 
 
@@ -97,15 +44,16 @@ def _section(text: bytes, tag: str) -> tuple[bytes, Path]:
     root = outline(text)
     found = root.first(tag)
     if found is None:
-        text = add(text, (), NewElement(tag))
+        text = edit.add(text, (), NewElement(tag))
         found = outline(text).first(tag)
     if found is None:
         raise AssertionError(f"<{tag}> was added and is not there")
     return text, found.path
 
 
-def _add_type(text: bytes, name: str) -> TextState:
-    """Write a shipped type into the file, where it may be changed."""
+@command
+def add_type(text: bytes, name: str) -> TextState:
+    """Declare a type that the project ships, where it may be changed; a declared one stays."""
     text, section = _section(text, "types")
     for declared in outline(text).at(section).all("type"):
         if declared.text("name") == name:
@@ -113,7 +61,7 @@ def _add_type(text: bytes, name: str) -> TextState:
     known = stock_type(name)
     if known is None:
         raise _no_type(name)
-    return _add(text, section, _copy(known))
+    return _added(text, section, _copy(known))
 
 
 def _must_have_type(text: bytes, name: str) -> None:
@@ -133,14 +81,23 @@ def _copy(node: Node) -> NewElement:
     return NewElement(node.tag, dict(node.attributes), [_copy(child) for child in node.children])
 
 
-def _add_behavior(text: bytes, command: AddBehavior) -> TextState:
-    _free(outline(text), "behavior", command.name)
-    parent = command.parent
+@command
+def add_behavior(text: bytes, parent: Path, kind: str, name: str, priority: int = 1) -> TextState:
+    """Add a node of the behavior tree.
+
+    Args:
+        text: The text.
+        parent: A behavior; the mission or its ``<behaviors>`` for a root.
+        kind: Its type.
+        name: Its name.
+        priority: Among its siblings.
+    """
+    _free(outline(text), "behavior", name)
     if outline(text).at(parent).tag == "mission":
         text, parent = _section(text, "behaviors")
-    _must_have_type(text, command.type)
-    values = {"type": command.type, "name": command.name, "priority": str(command.priority)}
-    return _add(text, parent, NewElement("behavior", values))
+    _must_have_type(text, kind)
+    values = {"type": kind, "name": name, "priority": str(priority)}
+    return _added(text, parent, NewElement("behavior", values))
 
 
 class _Marked:
@@ -156,28 +113,31 @@ class _Marked:
         return (*outline(text).all(self._tag)[self._before].path, *self._below) if self._tag else ()
 
 
-def _claim(text: bytes, command: ClaimArc) -> TextState:
-    node = outline(text).at(command.behavior)
+@command
+def claim_arc(text: bytes, behavior: Path, kind: str, minimum_runtime_s: str) -> TextState:
+    """Set the ARC that a behavior claims, in place of its present one."""
+    node = outline(text).at(behavior)
     if node.tag != "behavior":
         raise DesignRefused(f"a <{node.tag}> claims no ARC", remedy="Pick a behavior.")
-    path = command.behavior
-    _must_have_type(text, command.kind)
-    arc = outline(text).at(path).first("arc")
+    _must_have_type(text, kind)
+    arc = node.first("arc")
     if arc is not None:
-        text = set_attribute(text, arc.path, "kind", command.kind)
-        return TextState(set_attribute(text, arc.path, "minimum-runtime-s", command.minimum_runtime_s), arc.path)
-    values = {"kind": command.kind, "minimum-runtime-s": command.minimum_runtime_s, **RADIO_RATE}
-    return _add(text, path, NewElement("arc", values))
+        text = edit.set_attribute(text, arc.path, "kind", kind)
+        return TextState(edit.set_attribute(text, arc.path, "minimum-runtime-s", minimum_runtime_s), arc.path)
+    values = {"kind": kind, "minimum-runtime-s": minimum_runtime_s, **RADIO_RATE}
+    return _added(text, behavior, NewElement("arc", values))
 
 
-def _add_resource(text: bytes, kind: str, name: str) -> TextState:
+@command
+def add_resource(text: bytes, kind: str, name: str) -> TextState:
+    """Add a piece of hardware in its first shape, tied to existing hardware, and its body if there is a world."""
     _free(outline(text), "resource", name)
     _must_have_type(text, kind)
     text, section = _section(text, "resources")
     root = outline(text)
     shape = stock_resource(kind)
     if shape is None:
-        return _add(text, section, NewElement("resource", {"type": kind, "name": name}))
+        return _added(text, section, NewElement("resource", {"type": kind, "name": name}))
     children = []
     for part in shape.children:
         if part.tag == "uses":
@@ -191,13 +151,15 @@ def _add_resource(text: bytes, kind: str, name: str) -> TextState:
         else:
             children.append(_copy(part))
     values = {**shape.attributes, "name": name}
-    step = _add(text, section, NewElement("resource", values, children))
+    step = _added(text, section, NewElement("resource", values, children))
     return TextState(_with_bodies(step.text, name), step.touched)
 
 
-def _add_world(text: bytes, command: AddWorld) -> TextState:
-    room = NewElement("room", {"width-m": command.width_m, "depth-m": command.depth_m})
-    step = _add(text, (), NewElement("world", {"name": "world", "type": "simulated_world"}, [room]))
+@command
+def add_world(text: bytes, width_m: str, depth_m: str) -> TextState:
+    """Add the simulated room, with a body for every robot."""
+    room = NewElement("room", {"width-m": width_m, "depth-m": depth_m})
+    step = _added(text, (), NewElement("world", {"name": "world", "type": "simulated_world"}, [room]))
     return TextState(_with_bodies(step.text), step.touched)
 
 
@@ -223,7 +185,7 @@ def _with_bodies(text: bytes, only: str = "") -> bytes:
             continue
         x_m = (BODY_STEP_M * (len(bodies) + 1)) % width_m or width_m / 2
         place = {"name": name, "x-m": f"{x_m:g}", "y-m": f"{min(BODY_STEP_M, depth_m) / 2:g}", "heading-deg": "90"}
-        text = add(text, world.path, NewElement("robot", place))
+        text = edit.add(text, world.path, NewElement("robot", place))
         bodies.append(name)
     return text
 
@@ -248,9 +210,11 @@ def _free_network_id(root: Node) -> int:
     return free
 
 
-def _remove(text: bytes, path: Path) -> TextState:
+@command
+def remove(text: bytes, path: Path) -> TextState:
+    """Remove an element and all in it; with a robot goes its body."""
     node = outline(text).at(path)
-    text = remove(text, path)
+    text = edit.remove(text, path)
     if node.tag == "resource":
         world = outline(text).first("world")
         bodies = (
@@ -258,7 +222,7 @@ def _remove(text: bytes, path: Path) -> TextState:
         )
         marked = _Marked(text, path[:-1])
         for body in bodies[:1]:
-            text = remove(text, body.path)
+            text = edit.remove(text, body.path)
         parent = marked.now(text)
     else:
         parent = path[:-1]
@@ -266,10 +230,12 @@ def _remove(text: bytes, path: Path) -> TextState:
     return TextState(text, (*parent, min(path[-1], len(siblings) - 1)) if siblings else parent)
 
 
-def _move(text: bytes, path: Path, parent: Path, at: int) -> TextState:
+@command
+def relocate(text: bytes, path: Path, parent: Path, at: int) -> TextState:
+    """Move an element; ``at`` is its number among its siblings afterwards."""
     root = outline(text)
     node = root.at(path)
-    after = move(text, path, parent, at)
+    after = edit.move(text, path, parent, at)
     depth = len(path) - 1
     if len(parent) > depth and parent[:depth] == path[:-1] and parent[depth] > path[-1]:
         parent = (*parent[:depth], parent[depth] - 1, *parent[depth + 1 :])
@@ -280,17 +246,24 @@ def _move(text: bytes, path: Path, parent: Path, at: int) -> TextState:
     return TextState(after, (*parent, number))
 
 
-def _set_parameter(text: bytes, command: WriteParameter) -> TextState:
-    node = outline(text).at(command.path)
-    found = next((one for one in node.all("parameter") if one.text("name") == command.name), None)
+@command
+def set_value(text: bytes, path: Path, attribute: str, value: str | None) -> TextState:
+    """Set an attribute; None leaves it out."""
+    return TextState(edit.set_attribute(text, path, attribute, value), path)
+
+
+@command
+def write_parameter(text: bytes, path: Path, name: str, value: str | None) -> TextState:
+    """Set a parameter of a behavior, a resource or a service; None leaves it out."""
+    node = outline(text).at(path)
+    found = next((one for one in node.all("parameter") if one.text("name") == name), None)
     if found is None:
-        if command.value is None:
-            return TextState(text, command.path)
-        new = NewElement("parameter", {"name": command.name, "value": command.value})
-        return TextState(add(text, command.path, new), command.path)
-    if command.value is None:
-        return TextState(remove(text, found.path), command.path)
-    return TextState(set_attribute(text, found.path, "value", command.value), command.path)
+        if value is None:
+            return TextState(text, path)
+        return TextState(edit.add(text, path, NewElement("parameter", {"name": name, "value": value})), path)
+    if value is None:
+        return TextState(edit.remove(text, found.path), path)
+    return TextState(edit.set_attribute(text, found.path, "value", value), path)
 
 
 # ---------------------------------------------------------------------- names
@@ -316,21 +289,23 @@ def _is_named(root: Node, node: Node) -> bool:
     return node.tag not in ("wish", "uses", "parameter") and node is not root
 
 
-def _rename(text: bytes, path: Path, name: str) -> TextState:
+@command
+def rename(text: bytes, path: Path, name: str) -> TextState:
+    """Rename an element, and all references to it."""
     root = outline(text)
     node = root.at(path)
     old = node.text("name")
     if name == old:
         return TextState(text, path)
     if node.tag in ("wish", "uses", "parameter"):
-        return TextState(set_attribute(text, path, "name", name), path)
+        return TextState(edit.set_attribute(text, path, "name", name), path)
     if node.tag == "robot" and old:
         owner = next((one for one in root if one.tag == "resource" and one.text("name") == old), None)
         node = owner or node
     _free(root, node.tag, name)
-    text = set_attribute(text, node.path, "name", name)
+    text = edit.set_attribute(text, node.path, "name", name)
     for other, attribute, value in _mentions(root, node, old, name):
-        text = set_attribute(text, other.path, attribute, value)
+        text = edit.set_attribute(text, other.path, attribute, value)
     return TextState(text, path)
 
 

@@ -16,8 +16,8 @@ from backbone.errors import Refusal
 from backbone.mission.document import MAX_BYTES
 from backbone.mission.edit import outline
 from backbone.mission.report import MissionInvalid
+from ui_console.design.commands import TextState
 from ui_console.design.draft import Draft
-from ui_console.design.effects import TextState
 
 FORMAT = 1
 MOST_BYTES = 4 * MAX_BYTES  # two texts in Base64 and their envelope

@@ -15,17 +15,8 @@ from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import NewElement, Node, Path
 from backbone.mission.report import listed, quoted
 from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
-from ui_console.design.commands import (
-    Add,
-    AddBehavior,
-    AddResource,
-    AddType,
-    AddWorld,
-    ClaimArc,
-    Command,
-    DesignRefused,
-    WriteParameter,
-)
+from ui_console.design.commands import Command, DesignRefused
+from ui_console.design.effects import add, add_behavior, add_resource, add_type, add_world, claim_arc, write_parameter
 from ui_console.design.properties import choices
 
 MINIMUM_RUNTIME_S = "5"  # RAM 2002, "Experiments": slices of five seconds
@@ -180,7 +171,7 @@ def _behaviors(mission: Node, node: Node) -> list[Offer]:
     def build(entry: TypeEntry, given: Sequence[str]) -> Command:
         if not re.fullmatch(r"-?\d{1,9}", given[1].strip()):
             raise DesignRefused(f"{given[1]!r} is no priority", remedy="Write a whole number; larger is higher.")
-        return AddBehavior(node.path, entry.name, given[0], int(given[1]))
+        return add_behavior(node.path, entry.name, given[0], int(given[1]))
 
     return [offer(entry) for entry in _of(mission, Role.BEHAVIOR)]
 
@@ -191,7 +182,7 @@ def _claims(mission: Node, node: Node) -> list[Offer]:
 
     def offer(entry: TypeEntry) -> Offer:
         what = f"claims one each of: {', '.join(entry.needs)}"
-        return Offer(f"arc {entry.name}", what, asks, lambda given: ClaimArc(node.path, entry.name, given[0].strip()))
+        return Offer(f"arc {entry.name}", what, asks, lambda given: claim_arc(node.path, entry.name, given[0].strip()))
 
     return [offer(entry) for entry in _of(mission, Role.ARC)]
 
@@ -208,7 +199,7 @@ def _wishes(mission: Node, node: Node) -> list[Offer]:
             f"wish {role}",
             vocabulary()["wish"].documentation,
             asks,
-            lambda given: Add(node.path, NewElement("wish", {"type": role, "name": given[0]})),
+            lambda given: add(node.path, NewElement("wish", {"type": role, "name": given[0]})),
         )
 
     return [offer(role, kind) for role, kind in needs.items() if role not in wished]
@@ -219,7 +210,7 @@ def _resources(mission: Node) -> list[Offer]:
         shape = stock_resource(entry.name)
         name = shape.text("name") if shape is not None else entry.name
         asks = (Prompt("name", vocabulary()["resource"].attributes["name"].documentation, free_name(mission, name)),)
-        return Offer(f"resource {entry.name}", entry.class_path, asks, lambda given: AddResource(entry.name, given[0]))
+        return Offer(f"resource {entry.name}", entry.class_path, asks, lambda given: add_resource(entry.name, given[0]))
 
     return [offer(entry) for entry in _of(mission, Role.RESOURCE)]
 
@@ -231,13 +222,13 @@ def _world() -> Offer:
         Prompt("depth-m", rules["depth-m"].documentation, "6"),
     )
     return Offer(
-        "world", vocabulary()["world"].documentation, asks, lambda given: AddWorld(given[0].strip(), given[1].strip())
+        "world", vocabulary()["world"].documentation, asks, lambda given: add_world(given[0].strip(), given[1].strip())
     )
 
 
 def _types(mission: Node) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
-        return Offer(f"type {entry.name}", entry.class_path, (), lambda _given: AddType(entry.name))
+        return Offer(f"type {entry.name}", entry.class_path, (), lambda _given: add_type(entry.name))
 
     return [offer(entry) for entry in entries(mission) if not entry.is_declared]
 
@@ -252,7 +243,7 @@ def _parameter(node: Node) -> Offer:
         "parameter",
         vocabulary()["parameter"].documentation,
         asks,
-        lambda given: WriteParameter(node.path, given[0], given[1]),
+        lambda given: write_parameter(node.path, given[0], given[1]),
     )
 
 
@@ -276,7 +267,7 @@ def _generic(mission: Node, node: Node, tag: str) -> list[Offer]:
     def build(given: Sequence[str]) -> Command:
         values = {name: value for name, value in zip(required, given, strict=False) if value}
         points = _points(given[-1]) if tag == "target" else []
-        return Add(node.path, NewElement(tag, values, points))
+        return add(node.path, NewElement(tag, values, points))
 
     return [Offer(tag, rule.documentation, tuple(asks), build)]
 

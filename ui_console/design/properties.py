@@ -13,7 +13,8 @@ from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path
 from ui_console.design.catalogue import Role, entries
-from ui_console.design.commands import Command, Rename, SetValue, WriteParameter
+from ui_console.design.commands import Command
+from ui_console.design.effects import rename, set_value, write_parameter
 
 HAVE_PARAMETERS = ("behavior", "resource", "world")
 WITH_NAMES = ("host", "type", "resource", "world", "behavior", "target", "robot")
@@ -44,10 +45,10 @@ class Property(msgspec.Struct, frozen=True):
     def command(self, path: Path, tag: str, value: str) -> Command:
         """Return the command that sets it; an empty text leaves it out."""
         if self.is_parameter:
-            return WriteParameter(path, self.name, value or None)
+            return write_parameter(path, self.name, value or None)
         if self.name == "name" and tag in WITH_NAMES and value:
-            return Rename(path, value)
-        return SetValue(path, self.name, value or None)
+            return rename(path, value)
+        return set_value(path, self.name, value or None)
 
 
 def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> list[Property]:

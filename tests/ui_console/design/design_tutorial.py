@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import NewElement, Node
-from ui_console.design.commands import Add, AddBehavior, AddResource, AddWorld, ClaimArc, SetValue
 from ui_console.design.draft import Draft
+from ui_console.design.effects import add, add_behavior, add_resource, add_world, claim_arc, set_value
 
 WATCH = "mission_control.behaviors.watch_for_motion:WatchForMotion"
 VIEW_S = {"type": "number", "minimum": 0, "default": 0.0}
@@ -20,20 +20,20 @@ def tutorial_draft(source: str = "guard.xml") -> Draft:
     def path_of(tag: str, name: str) -> tuple[int, ...]:
         return next(node.path for node in draft.mission if (node.tag, node.text("name")) == (tag, name))
 
-    draft = Draft.new(source).do(AddWorld("9", "6"))
+    draft = Draft.new(source).do(add_world("9", "6"))
     points = [NewElement("point", {"x-m": x, "y-m": "3"}) for x in ("0", "9")]
     pioneer = {"name": "pioneer", "shape": "pioneer", "speed-m-s": "0.5"}
-    draft = draft.do(Add(path_of("world", "world"), NewElement("target", pioneer, points)))
+    draft = draft.do(add(path_of("world", "world"), NewElement("target", pioneer, points)))
     for kind, name in (("command_radio", "radio"), ("video_frequency", "video1"), ("framegrabber", "grabber")):
-        draft = draft.do(AddResource(kind, name))
+        draft = draft.do(add_resource(kind, name))
     for name in ("scout1", "scout2"):
-        draft = draft.do(AddResource("scout", name))
-    draft = draft.do(SetValue(path_of("robot", "scout2"), "x-m", "7.2"))
-    draft = draft.do(AddBehavior((), "surveillance", "surveillance", 5))
+        draft = draft.do(add_resource("scout", name))
+    draft = draft.do(set_value(path_of("robot", "scout2"), "x-m", "7.2"))
+    draft = draft.do(add_behavior((), "surveillance", "surveillance", 5))
     for robot in ("scout1", "scout2"):
-        draft = draft.do(AddBehavior(path_of("behavior", "surveillance"), "watch_for_motion", f"watch-{robot}"))
-        draft = draft.do(ClaimArc(draft.step.touched, "capture", "5"))
-        draft = draft.do(Add(draft.step.touched, NewElement("wish", {"type": "scout", "name": robot})))
+        draft = draft.do(add_behavior(path_of("behavior", "surveillance"), "watch_for_motion", f"watch-{robot}"))
+        draft = draft.do(claim_arc(draft.step.touched, "capture", "5"))
+        draft = draft.do(add(draft.step.touched, NewElement("wish", {"type": "scout", "name": robot})))
     return draft
 
 

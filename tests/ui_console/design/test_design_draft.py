@@ -15,25 +15,21 @@ from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import NewElement, Node, outline
 from backbone.mission.reader import MissionInvalid, read_mission
 from ui_console.design.catalogue import Role, entries, stock
-from ui_console.design.commands import (
-    Add,
-    AddBehavior,
-    AddResource,
-    AddType,
-    AddWorld,
-    ClaimArc,
-    Command,
-    DesignRefused,
-    ElementNameTaken,
-    NothingToUndo,
-    Relocate,
-    Remove,
-    Rename,
-    SetValue,
-    WriteParameter,
-)
+from ui_console.design.commands import Command, DesignRefused, ElementNameTaken, NothingToUndo, TextState
 from ui_console.design.draft import Draft
-from ui_console.design.effects import TextState
+from ui_console.design.effects import (
+    add,
+    add_behavior,
+    add_resource,
+    add_type,
+    add_world,
+    claim_arc,
+    relocate,
+    remove,
+    rename,
+    set_value,
+    write_parameter,
+)
 from ui_console.design.file import FileChanged, NotSaved, save
 from ui_console.design.offers import free_name, offers
 from ui_console.design.properties import properties
@@ -62,19 +58,19 @@ def only(draft: Draft, tag: str, name: str) -> Node:
 
 def watchers() -> Draft:
     draft = designed(
-        AddWorld("9", "6"),
-        AddResource("command_radio", "radio"),
-        AddResource("video_frequency", "video1"),
-        AddResource("framegrabber", "grabber"),
-        AddResource("scout", "scout1"),
-        AddResource("scout", "scout2"),
-        AddBehavior((), "surveillance", "surveillance", 5),
+        add_world("9", "6"),
+        add_resource("command_radio", "radio"),
+        add_resource("video_frequency", "video1"),
+        add_resource("framegrabber", "grabber"),
+        add_resource("scout", "scout1"),
+        add_resource("scout", "scout2"),
+        add_behavior((), "surveillance", "surveillance", 5),
     )
     for robot in ("scout1", "scout2"):
         parent = only(draft, "behavior", "surveillance").path
-        draft = draft.do(AddBehavior(parent, "watch_for_motion", f"watch-{robot}"))
-        draft = draft.do(ClaimArc(draft.step.touched, "capture", "5"))
-        draft = draft.do(Add(draft.step.touched, NewElement("wish", {"type": "scout", "name": robot})))
+        draft = draft.do(add_behavior(parent, "watch_for_motion", f"watch-{robot}"))
+        draft = draft.do(claim_arc(draft.step.touched, "capture", "5"))
+        draft = draft.do(add(draft.step.touched, NewElement("wish", {"type": "scout", "name": robot})))
     return draft
 
 
@@ -87,17 +83,17 @@ def commands(draft: Draft) -> st.SearchStrategy[Command]:
     paths = st.sampled_from([node.path for node in draft.mission])
     kinds = st.sampled_from([entry.name for entry in entries(draft.mission)])
     return st.one_of(
-        st.builds(Remove, paths),
-        st.builds(Rename, paths, NAMES),
-        st.builds(Relocate, paths, paths, st.integers(0, 5)),
-        st.builds(SetValue, paths, st.sampled_from(["name", "priority", "host", "x-m"]), NAMES | st.none()),
-        st.builds(WriteParameter, paths, NAMES, NAMES | st.none()),
-        st.builds(AddBehavior, paths, kinds, NAMES, st.integers(-3, 3)),
-        st.builds(AddResource, kinds, NAMES),
-        st.builds(AddType, kinds),
-        st.builds(AddWorld, st.just("9"), st.sampled_from(["6", "x"])),
-        st.builds(ClaimArc, paths, kinds, st.sampled_from(["5", "none"])),
-        st.builds(Add, paths, st.builds(NewElement, st.sampled_from(["wish", "uses", "behavior", "furniture"]))),
+        st.builds(remove, paths),
+        st.builds(rename, paths, NAMES),
+        st.builds(relocate, paths, paths, st.integers(0, 5)),
+        st.builds(set_value, paths, st.sampled_from(["name", "priority", "host", "x-m"]), NAMES | st.none()),
+        st.builds(write_parameter, paths, NAMES, NAMES | st.none()),
+        st.builds(add_behavior, paths, kinds, NAMES, st.integers(-3, 3)),
+        st.builds(add_resource, kinds, NAMES),
+        st.builds(add_type, kinds),
+        st.builds(add_world, st.just("9"), st.sampled_from(["6", "x"])),
+        st.builds(claim_arc, paths, kinds, st.sampled_from(["5", "none"])),
+        st.builds(add, paths, st.builds(NewElement, st.sampled_from(["wish", "uses", "behavior", "furniture"]))),
     )
 
 
@@ -134,9 +130,9 @@ def done(draft: Draft, command: Command) -> Draft:
 
 
 def removed_by(draft: Draft, command: Command) -> bytes:
-    if not isinstance(command, Remove):
+    if command.effect is not remove(()).effect:
         return b""
-    node = draft.mission.at(command.path)
+    node = draft.mission.at(command.arguments[0])
     return draft.text[node.begin : node.end]
 
 
@@ -159,7 +155,7 @@ def test_the_problems_are_those_of_check(tmp_path: Path) -> None:
     file = tmp_path / "mission.xml"
     draft = Draft.opened(str(SHIPPED[0]))
     draft = designed(
-        Remove(only(draft, "resource", "video1").path), Rename(only(draft, "host", "base").path, "b"), draft=draft
+        remove(only(draft, "resource", "video1").path), rename(only(draft, "host", "base").path, "b"), draft=draft
     )
     draft = save(Draft(str(file), draft.step), file)
     with pytest.raises(MissionInvalid) as invalid:
@@ -215,10 +211,10 @@ def test_a_last_branch_is_offered_once_gets_one_root_and_is_told_with_its_time()
     [patrol] = [one for one in offers(draft.mission, last) if one.label == "behavior patrol"]
     draft = designed(
         patrol.command(["drive-home", "1"]),
-        SetValue(last, "within-s", "30"),
-        WriteParameter((*last, 0), "waypoints", "1,1"),
-        WriteParameter((*last, 0), "localizer", "world"),
-        ClaimArc((*last, 0), "drive", "5"),
+        set_value(last, "within-s", "30"),
+        write_parameter((*last, 0), "waypoints", "1,1"),
+        write_parameter((*last, 0), "localizer", "world"),
+        claim_arc((*last, 0), "drive", "5"),
         draft=draft,
     )
     assert problems_view(draft) == []
@@ -230,7 +226,7 @@ def test_a_last_branch_is_offered_once_gets_one_root_and_is_told_with_its_time()
     roots = next(node for node in draft.mission if node.tag == "behaviors")
     assert "last" not in [one.label for one in offers(draft.mission, roots.path)]
     with pytest.raises(Refusal, match="has its <behavior> already"):
-        draft.do(AddBehavior(last, "wait", "rest"))
+        draft.do(add_behavior(last, "wait", "rest"))
 
 
 def test_the_shipped_types_are_those_that_an_old_file_declares() -> None:
@@ -255,7 +251,7 @@ def test_every_behavior_of_the_project_is_at_hand() -> None:
 
 
 def test_a_robot_gets_what_it_is_tied_to_the_next_network_id_and_a_body() -> None:
-    draft = watchers().do(AddResource("scout", "scout3"))
+    draft = watchers().do(add_resource("scout", "scout3"))
     robot = draft.mission.at(draft.step.touched)
     assert [(one.text("type"), one.text("name")) for one in robot.all("uses")] == [
         ("command_radio", "radio"),
@@ -264,13 +260,13 @@ def test_a_robot_gets_what_it_is_tied_to_the_next_network_id_and_a_body() -> Non
     assert [one.text("value") for one in robot.all("parameter")] == ["3"]
     assert only(draft, "robot", "scout3").attributes["x-m"] == "3"
     assert draft.problems == ()
-    assert draft.do(Remove(robot.path)).text != draft.text
-    assert draft.do(Remove(robot.path)).problems == ()
+    assert draft.do(remove(robot.path)).text != draft.text
+    assert draft.do(remove(robot.path)).problems == ()
 
 
 def test_a_body_that_was_removed_stays_away() -> None:
     draft = watchers()
-    draft = draft.do(Remove(only(draft, "robot", "scout1").path)).do(AddResource("scout", "scout3"))
+    draft = draft.do(remove(only(draft, "robot", "scout1").path)).do(add_resource("scout", "scout3"))
     world = draft.mission.first("world")
     assert world is not None
     assert [body.text("name") for body in world.all("robot")] == ["scout2", "scout3"]
@@ -278,10 +274,10 @@ def test_a_body_that_was_removed_stays_away() -> None:
 
 def test_to_rename_a_robot_renames_what_speaks_of_it() -> None:
     draft = watchers()
-    draft = draft.do(Rename(only(draft, "resource", "scout1").path, "spy"))
+    draft = draft.do(rename(only(draft, "resource", "scout1").path, "spy"))
     assert draft.problems == ()
     assert b"scout1" not in draft.text.replace(b"watch-scout1", b"")
-    draft = draft.do(Rename(only(draft, "robot", "spy").path, "scout1"))
+    draft = draft.do(rename(only(draft, "robot", "spy").path, "scout1"))
     assert draft.text == watchers().text
 
 
@@ -290,16 +286,16 @@ def test_to_rename_a_robot_renames_what_speaks_of_it() -> None:
 )
 def test_to_rename_anything_keeps_the_mission_fine(tag: str, old: str) -> None:
     draft = Draft.opened(str(EVERYTHING_DECLARED))
-    after = draft.do(Rename(only(draft, tag, old).path, "renamed"))
+    after = draft.do(rename(only(draft, tag, old).path, "renamed"))
     assert [fault for fault in after.problems if "core service" not in fault.message and tag != "type"] == []
-    assert after.do(Rename(only(after, tag, "renamed").path, old)).text == draft.text
+    assert after.do(rename(only(after, tag, "renamed").path, old)).text == draft.text
 
 
 def test_a_claim_replaces_the_one_before_and_declares_no_shipped_type() -> None:
-    draft = designed(AddBehavior((), "patrol", "guard"))
-    draft = draft.do(ClaimArc(draft.step.touched, "drive", "5"))
+    draft = designed(add_behavior((), "patrol", "guard"))
+    draft = draft.do(claim_arc(draft.step.touched, "drive", "5"))
     assert draft.mission.first("types") is None
-    draft = draft.do(ClaimArc(draft.step.touched[:-1], "capture", "7"))
+    draft = draft.do(claim_arc(draft.step.touched[:-1], "capture", "7"))
     (arc,) = [node for node in draft.mission if node.tag == "arc"]
     assert (arc.text("kind"), arc.text("minimum-runtime-s")) == ("capture", "7")
 
@@ -307,25 +303,25 @@ def test_a_claim_replaces_the_one_before_and_declares_no_shipped_type() -> None:
 def test_a_parameter_is_set_changed_and_left_out() -> None:
     draft = watchers()
     path = only(draft, "behavior", "watch-scout1").path
-    more = draft.do(WriteParameter(path, "view_s", "6"))
+    more = draft.do(write_parameter(path, "view_s", "6"))
     assert more.description is not None
     assert more.description.behaviors[0].children[0].parameters == {"view_s": 6}
-    again = more.do(WriteParameter(path, "view_s", "7")).do(WriteParameter(path, "view_s", None))
+    again = more.do(write_parameter(path, "view_s", "7")).do(write_parameter(path, "view_s", None))
     assert again.text == draft.text
-    assert draft.do(WriteParameter(path, "view_s", None)) is draft
+    assert draft.do(write_parameter(path, "view_s", None)) is draft
 
 
 def test_what_cannot_be_meant_is_refused_and_changes_nothing() -> None:
     draft = watchers()
     refused: list[tuple[Command, type[Refusal]]] = [
-        (AddResource("scout", "scout1"), ElementNameTaken),
-        (AddBehavior((), "patrol", "world"), ElementNameTaken),
-        (Rename(only(draft, "host", "base").path, "Base Station"), Refusal),
-        (AddResource("submarine", "nautilus"), DesignRefused),
-        (AddBehavior((), "no_such", "x"), DesignRefused),
-        (ClaimArc(only(draft, "host", "base").path, "drive", "5"), DesignRefused),
-        (AddWorld("1", "1"), Refusal),
-        (Remove(()), Refusal),
+        (add_resource("scout", "scout1"), ElementNameTaken),
+        (add_behavior((), "patrol", "world"), ElementNameTaken),
+        (rename(only(draft, "host", "base").path, "Base Station"), Refusal),
+        (add_resource("submarine", "nautilus"), DesignRefused),
+        (add_behavior((), "no_such", "x"), DesignRefused),
+        (claim_arc(only(draft, "host", "base").path, "drive", "5"), DesignRefused),
+        (add_world("1", "1"), Refusal),
+        (remove(()), Refusal),
     ]
     for command, kind in refused:
         with pytest.raises(kind) as refusal:
@@ -345,7 +341,7 @@ def test_the_last_network_id_is_the_last_robot() -> None:
     text = draft.text.replace(b"  </resources>", many.encode() + b"</resources>")
     full = Draft("many.xml", TextState(text))
     with pytest.raises(DesignRefused, match="254 network ids"):
-        full.do(AddResource("scout", "one-more"))
+        full.do(add_resource("scout", "one-more"))
 
 
 def test_names_are_proposed_that_nobody_has() -> None:
@@ -372,7 +368,7 @@ def test_an_opened_file_is_saved_to_the_byte(tmp_path: Path) -> None:
     file.chmod(0o640)
     draft = Draft.opened(str(file))
     assert not draft.is_changed
-    changed = draft.do(SetValue((), "priority", "11"))
+    changed = draft.do(set_value((), "priority", "11"))
     assert changed.is_changed
     kept = save(changed, file)
     assert not kept.is_changed
@@ -386,7 +382,7 @@ def test_somebody_elses_change_is_not_overwritten_unasked(tmp_path: Path) -> Non
     draft = save(Draft.new(str(file)), file)
     file.write_bytes(draft.text + b"<!-- theirs -->")
     with pytest.raises(FileChanged, match="holds something else"):
-        save(draft.do(SetValue((), "priority", "11")), file)
+        save(draft.do(set_value((), "priority", "11")), file)
     assert file.read_bytes().endswith(b"<!-- theirs -->")
     assert save(draft, file, overwrite=True).text == file.read_bytes()
 
@@ -439,13 +435,13 @@ def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: by
 
 def test_parameters_of_shipped_classes_are_judged_and_of_others_once_they_were_looked_up() -> None:
     draft = watchers()
-    wrong = draft.do(WriteParameter(only(draft, "behavior", "watch-scout1").path, "veiw_s", "6"))
+    wrong = draft.do(write_parameter(only(draft, "behavior", "watch-scout1").path, "veiw_s", "6"))
     assert [fault.message for fault in wrong.problems] == [
         "watch_for_motion has no parameter 'veiw_s' (did you mean 'view_s'?)"
     ]
     own = {"name": "own", "class": "backbone.naming:Subsystem", "subsystem": "mission_control"}
-    draft = draft.do(Add((), NewElement("types", {}, [NewElement("type", own)])))
-    draft = draft.do(AddBehavior((), "own", "mine")).do(WriteParameter((4, 1), "depth_m", "deep"))
+    draft = draft.do(add((), NewElement("types", {}, [NewElement("type", own)])))
+    draft = draft.do(add_behavior((), "own", "mine")).do(write_parameter((4, 1), "depth_m", "deep"))
     assert draft.problems == ()
     depth = ParameterFacts("depth_m", {"type": "number", "default": 1.0})
     known = draft.knowing({"backbone.naming:Subsystem": ClassFacts(parameters=(depth,))})

@@ -12,20 +12,21 @@ from hypothesis import strategies as st
 
 from backbone.errors import Refusal
 from backbone.mission.edit import Node
-from ui_console.design.commands import AddBehavior, AddResource, AddType, Command, Relocate, Remove, Rename, SetValue
+from ui_console.design.commands import Command
 from ui_console.design.draft import Draft
+from ui_console.design.effects import add_behavior, add_resource, add_type, relocate, remove, rename, set_value
 from ui_console.design.following import follower
 
 BUILT = Draft("guard.xml", tutorial_draft().step)
 PATHS = st.sampled_from([node.path for node in BUILT.mission])
 COMMANDS = st.one_of(
-    st.builds(Remove, PATHS),
-    st.builds(Relocate, PATHS, PATHS, st.integers(0, 5)),
-    st.builds(SetValue, PATHS, st.sampled_from(["name", "priority", "x-m"]), st.sampled_from(["spy", "7"])),
-    st.builds(Rename, PATHS, st.just("spy")),
-    st.builds(AddBehavior, PATHS, st.sampled_from(["patrol", "surveillance"]), st.just("other")),
-    st.builds(AddResource, st.sampled_from(["scout", "framegrabber"]), st.just("other")),
-    st.builds(AddType, st.sampled_from(["drive", "hide"])),
+    st.builds(remove, PATHS),
+    st.builds(relocate, PATHS, PATHS, st.integers(0, 5)),
+    st.builds(set_value, PATHS, st.sampled_from(["name", "priority", "x-m"]), st.sampled_from(["spy", "7"])),
+    st.builds(rename, PATHS, st.just("spy")),
+    st.builds(add_behavior, PATHS, st.sampled_from(["patrol", "surveillance"]), st.just("other")),
+    st.builds(add_resource, st.sampled_from(["scout", "framegrabber"]), st.just("other")),
+    st.builds(add_type, st.sampled_from(["drive", "hide"])),
 )
 
 
@@ -55,21 +56,21 @@ def test_a_cursor_behind_what_is_added_or_removed_stays_on_its_element(tag: str)
     name = {"behavior": "watch-scout2", "resource": "scout2"}[tag]
     chosen = element(BUILT, tag, name)
     before_it = {"behavior": "watch-scout1", "resource": "radio"}[tag]
-    after = BUILT.do(Remove(element(BUILT, tag, before_it).path))
+    after = BUILT.do(remove(element(BUILT, tag, before_it).path))
     assert follower(BUILT, after)(chosen.path) == element(after, tag, name).path != chosen.path
 
 
 def test_what_is_written_twice_is_told_apart_by_what_it_stands_in() -> None:
     arc = element(BUILT, "behavior", "watch-scout2").children[0]
-    more = BUILT.do(AddBehavior((), "patrol", "guard", 9))  # adds a type before, and a behavior behind
+    more = BUILT.do(add_behavior((), "patrol", "guard", 9))  # adds a type before, and a behavior behind
     found = more.mission.at(follower(BUILT, more)(arc.path))
     assert found.path[:-1] == element(more, "behavior", "watch-scout2").path
 
 
 def test_a_renamed_element_is_the_same_one_and_a_removed_one_leads_to_what_held_it() -> None:
     scout = element(BUILT, "robot", "scout2")
-    renamed = BUILT.do(Rename(scout.path, "spy"))
+    renamed = BUILT.do(rename(scout.path, "spy"))
     assert follower(BUILT, renamed)(scout.path) == element(renamed, "robot", "spy").path
     behavior = element(BUILT, "behavior", "watch-scout2")
-    gone = BUILT.do(Remove(behavior.path))
+    gone = BUILT.do(remove(behavior.path))
     assert follower(BUILT, gone)(behavior.children[0].path) == behavior.path[:-1]

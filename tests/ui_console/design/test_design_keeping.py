@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 from design_tutorial import tutorial_draft
 
-from ui_console.design.commands import SetValue
 from ui_console.design.draft import Draft
+from ui_console.design.effects import set_value
 from ui_console.design.file import FileChanged, save
 from ui_console.design.keeping import DraftFile, DraftNotKept, DraftUnreadable, path_of_draft
 
 
 def test_what_was_not_saved_is_there_again_with_what_the_file_held(tmp_path: Path) -> None:
     file = str(tmp_path / "guard.xml")
-    draft = save(tutorial_draft(file), Path(file)).do(SetValue((), "priority", "11"))
+    draft = save(tutorial_draft(file), Path(file)).do(set_value((), "priority", "11"))
     DraftFile(file).keep(draft)
     resumed = DraftFile(file).resume()
     assert resumed is not None
@@ -29,7 +29,7 @@ def test_what_was_not_saved_is_there_again_with_what_the_file_held(tmp_path: Pat
 
 def test_a_file_that_changed_while_the_server_was_away_is_not_overwritten_unasked(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
-    draft = save(tutorial_draft(str(file)), file).do(SetValue((), "priority", "11"))
+    draft = save(tutorial_draft(str(file)), file).do(set_value((), "priority", "11"))
     DraftFile(str(file)).keep(draft)
     file.write_bytes(file.read_bytes() + b"<!-- theirs -->")
     resumed = DraftFile(str(file)).resume()
@@ -43,7 +43,7 @@ def test_the_draft_file_goes_when_there_is_nothing_to_lose(tmp_path: Path) -> No
     kept, draft = DraftFile(str(file)), tutorial_draft(str(file))
     kept.keep(draft)
     assert [one.name for one in tmp_path.iterdir()] == [".guard.xml.draft"]
-    kept.keep(draft.do(SetValue((), "priority", "12")))
+    kept.keep(draft.do(set_value((), "priority", "12")))
     kept.keep(save(draft, file))
     assert [one.name for one in tmp_path.iterdir()] == ["guard.xml"]
     kept.keep(save(draft, file))

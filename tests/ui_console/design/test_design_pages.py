@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from backbone.errors import Refusal
 from backbone.mission.edit import outline
 from ui_console.design.changes import MustAsk, changed, sections, sibling_file, touched_by
-from ui_console.design.commands import DesignRefused, Remove
+from ui_console.design.commands import DesignRefused, TextState
 from ui_console.design.draft import Draft
-from ui_console.design.effects import TextState
+from ui_console.design.effects import remove
 from ui_console.design.offers import offer_at, offers
 from ui_console.design.protocol import Change, MoveElement, Redo, RemoveElement, SetProperty, TakeOffer, Undo
 from ui_console.design.views import element_view, palette, places, problems_view, rehearsal_view, tree_view
@@ -107,7 +107,7 @@ def test_every_part_of_the_palette_goes_somewhere_or_asks_or_says_where_it_belon
 def test_a_wish_let_go_of_on_a_behavior_goes_into_its_arc_and_asks_which() -> None:
     draft = tutorial_draft()
     watcher = element(draft, "behavior", "watch-scout1")
-    without = draft.do(Remove(next(node.path for node in watcher if node.tag == "wish")))
+    without = draft.do(remove(next(node.path for node in watcher if node.tag == "wish")))
     with pytest.raises(MustAsk) as must:
         changed(without, TakeOffer(1, watcher.path, "wish scout"))
     assert must.value.offer.asks[0].choices == ("scout1", "scout2")
