@@ -19,12 +19,12 @@ from ui_console.model.driving import DIRECTIONS, STICK_LASTS_S, Direction, faste
 from ui_console.model.profile import Profile
 from ui_console.model.views import AlarmView
 from ui_console.session.gamepad import buttons_help
-from ui_console.terminal.dialogs import CommandDialog, Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker
+from ui_console.terminal.dialogs import Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker, command_dialog
 from ui_console.terminal.display import ConsoleDisplay
 from ui_console.terminal.keys import keys_help, stop_meant
 from ui_console.terminal.lines import robot_rows
 from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
-from ui_console.terminal.order_dialog import OrderDialog
+from ui_console.terminal.order_dialog import order_dialog
 from ui_console.terminal.tables import FIXED, PanelName
 from ui_console.terminal.view_dialogs import ViewDialog, ViewPicker
 from ui_console.terminal.widgets import DrivePad, Panel
@@ -108,7 +108,7 @@ class ConsoleApp(ConsoleDisplay):
             self.notify(f"{self._session.model.robot or 'the ARC'} {what}", severity="warning")
         else:
             stale = "not given: the robot was stopped, freed, granted or lost meanwhile. Press o again."
-            dialog = CommandDialog(self._session.model.robot, self._abilities.commands)
+            dialog = command_dialog(self._session.model.robot, self._abilities.commands)
             self._open(dialog, self._session.give, stale=stale)
 
     def action_order(self) -> None:
@@ -118,7 +118,7 @@ class ConsoleApp(ConsoleDisplay):
             self.notify("which robot? take one first", severity="warning")
             return
         stale = "not ordered: the robot was stopped, freed, granted or lost meanwhile. Press O again."
-        self._open(OrderDialog(robot, others), self._session.order_group, stale=stale)
+        self._open(order_dialog(robot, others), self._session.order_group, stale=stale)
 
     @property
     def _abilities(self) -> ArcAbilities | None:

@@ -7,8 +7,9 @@ while a line is typed.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
-from typing import ClassVar, TypeVar
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Generic, TypeVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -150,18 +151,36 @@ class LineQuestion(Dialog[str]):
         self.answer(event.value)
 
 
-class CommandDialog(Dialog[GiveWish]):
-    """Choose one of the robot's commands, then fill in its fields; answers with the command.
+@dataclass(frozen=True, slots=True)
+class Choice(Generic[T]):
+    """One line of a ``ChoiceDialog``.
 
-    Args:
-        robot: The robot.
-        commands: To choose from.
+    Attributes:
+        line: The line.
+        title: Title of its fields.
+        fields: Label and first text of each of them.
+        result: Returns the answer for the typed values, or raises ``WrongValue``.
     """
 
-    def __init__(self, robot: str, commands: Sequence[RoleCommand]) -> None:
+    line: Text
+    title: str
+    fields: Sequence[tuple[str, str]]
+    result: Callable[[list[str]], T]
+
+
+class ChoiceDialog(Dialog[T]):
+    """Choose a line, then fill in its fields, if it has any; answers with the result of the choice.
+
+    Args:
+        robot: The robot it is about.
+        question: Title of the list.
+        choices: To choose from.
+    """
+
+    def __init__(self, robot: str, question: str, choices: Sequence[Choice[T]]) -> None:
         super().__init__()
-        self._robot, self._commands = robot, commands
-        self._chosen: RoleCommand | None = None
+        self._robot, self._question, self._choices = robot, question, choices
+        self._chosen: Choice[T] | None = None
 
     @property
     def subject(self) -> str:
@@ -170,27 +189,25 @@ class CommandDialog(Dialog[GiveWish]):
 
     def compose(self) -> ComposeResult:
         """Lay out the list."""
-        with Vertical(id="command") as box:
-            box.border_title = f"which command for {self._robot}? (enter chooses it)"
-            yield OptionList(*(Option(_line(command)) for command in self._commands))
+        with Vertical(id="choice") as box:
+            box.border_title = self._question
+            yield OptionList(*(Option(choice.line) for choice in self._choices))
 
     async def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Answer, or ask for the command's fields first."""
-        chosen = self._commands[event.option_index]
-        if self._chosen is None and not chosen.form.fields:
-            self.answer(GiveWish(chosen.form.word, {}, chosen.role))
-        elif self._chosen is None:
-            self._chosen = chosen
-            await self._ask(chosen)
-
-    async def _ask(self, chosen: RoleCommand) -> None:
-        box = self.query_one("#command", Vertical)
+        """Answer, or ask for the fields of the choice first."""
+        if self._chosen is not None:
+            return
+        chosen = self._chosen = self._choices[event.option_index]
+        if not chosen.fields:
+            self.answer(chosen.result([]))
+            return
+        box = self.query_one("#choice", Vertical)
         await box.remove_children()
-        box.border_title = f"{chosen.title} (enter gives it)"
-        for label, form in zip(chosen.labels, chosen.form.fields, strict=True):
-            field = Field(default_text(form), select_on_focus=True)
+        box.border_title = chosen.title
+        for label, text in chosen.fields:
+            field = Field(text, select_on_focus=True)
             field.cursor_blink = False
-            await box.mount(Static(Text(f"{label}{f'  {form.doc}' if form.doc else ''}")), field)
+            await box.mount(Static(Text(label)), field)
         await box.mount(Static(Text(FIELD_REMARK), classes="remark", id="fault"))
         self.query(Field).first().focus()
 
@@ -200,17 +217,27 @@ class CommandDialog(Dialog[GiveWish]):
         following = fields[fields.index(event.input) + 1 :] if isinstance(event.input, Field) else []
         if following:
             following[0].focus()
-        elif (chosen := self._chosen) is not None:
+        elif self._chosen is not None:
             try:
-                values = read_fields(chosen.form.fields, [field.value for field in fields])
+                self.answer(self._chosen.result([field.value for field in fields]))
             except WrongValue as wrong:
                 self.query_one("#fault", Static).update(Text(f"{wrong.detail}. {wrong.remedy}", "bold red"))
-                return
-            self.answer(GiveWish(chosen.form.word, values, chosen.role))
 
 
-def _line(command: RoleCommand) -> Text:
-    return Text.assemble((command.title, "bold"), f"  {command.form.doc}" if command.form.doc else "")
+def command_dialog(robot: str, commands: Sequence[RoleCommand]) -> ChoiceDialog[GiveWish]:
+    """Return the dialog that answers with one of these commands of the robot."""
+    return ChoiceDialog(robot, f"which command for {robot}? (enter chooses it)", list(map(_command_choice, commands)))
+
+
+def _command_choice(command: RoleCommand) -> Choice[GiveWish]:
+    form = command.form
+    labels = zip(command.labels, form.fields, strict=True)
+    return Choice(
+        Text.assemble((command.title, "bold"), f"  {form.doc}" if form.doc else ""),
+        f"{command.title} (enter gives it)",
+        [(f"{label}{f'  {field.doc}' if field.doc else ''}", default_text(field)) for label, field in labels],
+        lambda values: GiveWish(form.word, read_fields(form.fields, values), command.role),
+    )
 
 
 class LiftQuestion(Dialog[int]):
