@@ -11,10 +11,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from mission_control.laboratory.experiments.conditions import PUBLISHED
-from mission_control.laboratory.experiments.harness import Progress as OnProgress
 from mission_control.laboratory.experiments.intervals import wilson
 from mission_control.laboratory.experiments.servoing import ServoOutcome, ServoTrial
 from mission_control.laboratory.experiments.surveillance import ConditionRow, SurveillanceOutcome, trials_line
+from mission_control.laboratory.harness import Progress as OnProgress
 
 AGREES_WITHIN = 3.0
 """Standard errors between rate and prediction that are no disagreement."""

@@ -23,8 +23,8 @@ from backbone.bus.clock import run_virtual
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from mission_control.behavior import Behavior
-from mission_control.laboratory.experiments.harness import Progress, run_all
 from mission_control.laboratory.experiments.intervals import wilson
+from mission_control.laboratory.harness import Progress, run_all
 from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
 from mission_control.messages import BehaviorStatus
 from resource_pool.localization import AskPose, Pose

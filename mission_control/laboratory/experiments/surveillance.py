@@ -14,10 +14,10 @@ import msgspec
 
 from mission_control.laboratory.experiments import geometry
 from mission_control.laboratory.experiments.conditions import PUBLISHED, Condition
-from mission_control.laboratory.experiments.harness import Progress, run_all
 from mission_control.laboratory.experiments.intervals import standard_errors_apart, wilson
 from mission_control.laboratory.experiments.prediction import predicted
 from mission_control.laboratory.experiments.trial import Trial, run_trial
+from mission_control.laboratory.harness import Progress, run_all
 
 TRIALS = 200
 """S105: number of trials of each condition, by default."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
-import multiprocessing
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 
 import msgspec
 
+from mission_control.laboratory.harness import results_of
 from mission_control.laboratory.simulation.faults import Fault, Hang, KillFault, MessageFault
 from mission_control.laboratory.simulation.laws import Broken, story_of
 from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
@@ -141,17 +140,16 @@ def simulate(
     """
     began_s = time.monotonic()
     batches = [range(at, min(at + BATCH, first + seeds)) for at in range(first, first + seeds, BATCH)]
-    workers = processes or (1 if seeds <= ALONE else min(os.cpu_count() or 1, len(batches)))
-    counted, failed = CampaignCount(), list[int]()
-    for count, seed in _in_turn(batches, chaos) if workers == 1 else _spread(batches, chaos, workers):
-        counted += count
-        if seed is not None:
-            failed.append(seed)
-        tell(f"{counted.runs} of {seeds} missions")
-    finding = None
-    if failed:
-        tell(f"seed {min(failed)} breaks a law; looking for the fewest faults that do")
-        finding = find(min(failed), chaos=chaos)
+    workers = processes or (1 if seeds <= ALONE else 0)
+    counted, failed, finding = CampaignCount(), None, None
+    with closing(results_of(partial(_run_batch, chaos=chaos), batches, jobs=workers)) as results:
+        while failed is None and (result := next(results, None)) is not None:
+            count, failed = result
+            counted += count
+            tell(f"{counted.runs} of {seeds} missions")
+    if failed is not None:
+        tell(f"seed {failed} breaks a law; looking for the fewest faults that do")
+        finding = find(failed, chaos=chaos)
     return CampaignOutcome(counted, finding, time.monotonic() - began_s)
 
 
@@ -177,30 +175,7 @@ def find(seed: int, *, chaos: bool) -> Finding | None:
     return Finding(seed, supervised, chaos, broken, least.faults, faults_before, story)
 
 
-def _in_turn(batches: Sequence[range], chaos: bool) -> Iterator[tuple[CampaignCount, int | None]]:
-    for batch in batches:
-        count, failed = _run_batch(batch, chaos)
-        yield count, failed
-        if failed is not None:
-            return
-
-
-def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tuple[CampaignCount, int | None]]:
-    """Run the batches in fresh processes, one for each worker; begin none after a broken law."""
-    waiting = iter(batches)
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        running = {pool.submit(_run_batch, batch, chaos) for batch in itertools.islice(waiting, workers)}
-        while running:
-            done, running = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
-                count, failed = future.result()
-                yield count, failed
-                if failed is not None:
-                    waiting = iter(())
-            running |= {pool.submit(_run_batch, batch, chaos) for batch in itertools.islice(waiting, len(done))}
-
-
-def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[CampaignCount, int | None]:
+def _run_batch(batch: Sequence[int], *, chaos: bool) -> tuple[CampaignCount, int | None]:
     """Run missions until one breaks a law; return the counts, and the seed of that mission."""
     counted = CampaignCount()
     for seed in batch:

@@ -10,10 +10,10 @@ import pytest
 from trace_checker import check
 
 from mission_control.laboratory.experiments.conditions import ALWAYS, EVERYTHING, PAPERS, PUBLISHED, QUARTER, Condition
-from mission_control.laboratory.experiments.harness import run_all
 from mission_control.laboratory.experiments.intervals import wilson
 from mission_control.laboratory.experiments.surveillance import TrialOrder, run_order, run_surveillance
 from mission_control.laboratory.experiments.trial import Trial, run_trial
+from mission_control.laboratory.harness import run_all
 
 
 def sound(trial: Trial) -> Trial:

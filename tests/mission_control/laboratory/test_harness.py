@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from mission_control.laboratory.experiments.harness import run_all
+from mission_control.laboratory.harness import run_all
 
 
 def squared(number: int) -> tuple[int, int]:

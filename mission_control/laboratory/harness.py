@@ -1,10 +1,10 @@
-"""Many trials on all cores: the same trials give the same results, with any number of processes."""
+"""Many trials or missions on all cores: the same give the same results, with any number of processes."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import TypeVar
 
@@ -35,20 +35,31 @@ def run_all(
         Exception: The first exception of the work; no further order is begun.
     """
     results: list[Result] = []
-    for result in _results(work, orders, jobs or os.cpu_count() or 1):
+    for result in results_of(work, orders, jobs=jobs, chunk=BATCH):
         results.append(result)
         if progress is not None:
             progress(len(results), len(orders))
     return results
 
 
-def _results(work: Callable[[Order], Result], orders: Sequence[Order], jobs: int) -> Iterator[Result]:
+def results_of(
+    work: Callable[[Order], Result], orders: Sequence[Order], *, jobs: int = 0, chunk: int = 1
+) -> Generator[Result, None, None]:
+    """Yield the results in the order of the orders; no further order is begun once the generator is closed.
+
+    Args:
+        work: As for ``run_all``.
+        orders: Same.
+        jobs: Same.
+        chunk: Number of orders that a process gets at a time.
+    """
+    jobs = jobs or os.cpu_count() or 1
     if jobs == 1 or len(orders) <= 1:
         yield from map(work, orders)
         return
     # Spawned, not forked: a fork of a process with threads of its own may hang.
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         try:
-            yield from pool.map(work, orders, chunksize=BATCH)
+            yield from pool.map(work, orders, chunksize=chunk)
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
