@@ -28,7 +28,7 @@ from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.preconditions import refuse_if_up
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
 from backbone.recording.comparison import compared
-from backbone.recording.decisions import Comparison, OtherDecision, decided_anew
+from backbone.recording.decisions import DecisionComparison, OtherDecision, decided_anew
 from backbone.recording.known_messages import message_classes
 from backbone.recording.playback import NoSuchTime
 from backbone.recording.player import Player
@@ -200,5 +200,5 @@ def _line(record: Record) -> str:
     return f"    {record.line['ev']} {json.dumps(line)}{f'  because {record.cause}' if record.cause else ''}"
 
 
-def _json(found: Comparison) -> dict[str, object]:
+def _json(found: DecisionComparison) -> dict[str, object]:
     return {**plain(found), "event": type(found.difference.event).__name__ if found.difference else None}

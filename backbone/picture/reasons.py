@@ -145,7 +145,7 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         _or_error(bus, NAMESERVER, Resolve(name), Resolved),
         _seen(bus, clock),
     )
-    told = await story_of(bus, text, clock) if asked.message else Told(())
+    told = await story_of(bus, text, clock) if asked.message else FoundEvents(())
     remarks = [*host_remarks(name, picture), *person_remarks(name, picture)]
     if asked.message and not told.events:
         remarks.append(
@@ -196,7 +196,7 @@ def person_remarks(name: str, picture: MissionPicture) -> list[str]:
 
 
 @dataclass(frozen=True)
-class Told:
+class FoundEvents:
     """Events from the stories of a mission's components.
 
     Attributes:
@@ -210,7 +210,7 @@ class Told:
     people: People = field(default_factory=People)
 
 
-async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
+async def story_of(bus: Bus, text: str, clock: Clock) -> FoundEvents:
     """Ask every component for the events about a name, an address or a message.
 
     Raises:
@@ -234,7 +234,7 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     missing += [f"{each.name}: it is absent, {each.cause}" for each in absent]
     if not listing.complete:
         missing.append("the nameserver began a moment ago: components may be missing in its list")
-    return printable_all(Told(sorted(events, key=lambda event: event.at_s), missing, picture.people))
+    return printable_all(FoundEvents(sorted(events, key=lambda event: event.at_s), missing, picture.people))
 
 
 async def _seen(bus: Bus, clock: Clock) -> MissionPicture:

@@ -111,7 +111,7 @@ class OtherDecision:
 
 
 @dataclass(slots=True)
-class Comparison:
+class DecisionComparison:
     """Decisions that were made anew, beside the recorded ones.
 
     Attributes:
@@ -128,7 +128,7 @@ class Comparison:
 
 
 @dataclass(slots=True)
-class _Step:
+class _RecordedDecision:
     """One recorded decision.
 
     Attributes:
@@ -147,7 +147,7 @@ class _Step:
         return {*range(self.heard[0], self.last + 2)} <= {*self.heard}
 
 
-def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> Comparison:
+def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> DecisionComparison:
     """Let today's schedule manager decide on the recorded events, up to the first difference.
 
     Args:
@@ -160,7 +160,7 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> Co
         WrongPlanner: The planner among the rules is none.
         NoSnapshot, OtherForm: The recording is of another release.
     """
-    found = Comparison()
+    found = DecisionComparison()
     anew: _Anew | None = None
     number, began = 0, False
     for step in _steps(recording, since_s):
@@ -243,9 +243,9 @@ def _first(begin: ScheduleSnapshot, rules: dict[str, Any]) -> ScheduleManager:
     return manager.begun_anew(chosen, load_planner(chosen.planner))
 
 
-def _steps(recording: Recording, since_s: float) -> Iterator[ScheduleSnapshot | _Step]:
+def _steps(recording: Recording, since_s: float) -> Iterator[ScheduleSnapshot | _RecordedDecision]:
     """Yield the snapshots, and the decisions with their lines."""
-    step: _Step | None = None
+    step: _RecordedDecision | None = None
     for message in _in_order(recording.messages(since_s=since_s, source=RC_MANAGER)):
         told = _told(message)
         if step is not None:
@@ -257,7 +257,7 @@ def _steps(recording: Recording, since_s: float) -> Iterator[ScheduleSnapshot | 
             case ScheduleSnapshot():
                 yield told
             case Decided():
-                step = _Step(told, message.sequence, [message.sequence])
+                step = _RecordedDecision(told, message.sequence, [message.sequence])
             case TraceLine() if step is not None:
                 step.last = message.sequence
                 step.records.append(Record(told.line, told.cause))

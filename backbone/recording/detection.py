@@ -46,13 +46,13 @@ class Mark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     what: Mention = ""
     robot: Mention = ""
 
-    def has(self, sighting: Sighting) -> bool:
+    def has(self, sighting: WatcherReport) -> bool:
         """Return whether the sighting is one of this."""
         return self.from_s <= sighting.at_s <= self.to_s and self.robot in ("", sighting.robot)
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
+class WatcherReport:
     """A watcher saw something.
 
     Attributes:
@@ -126,13 +126,13 @@ def read_marks(text: str) -> list[Mark]:
     return marks
 
 
-def sightings(messages: Iterable[Recorded]) -> list[Sighting]:
+def sightings(messages: Iterable[Recorded]) -> list[WatcherReport]:
     """Return the sightings among these messages; one that lacks its time or robot is none."""
     seen = (one.body for one in messages if one.schema.partition("/")[0] == SIGHTING and isinstance(one.body, dict))
-    return [Sighting(body["at_s"], body["robot"]) for body in seen if {"at_s", "robot"} <= body.keys()]
+    return [WatcherReport(body["at_s"], body["robot"]) for body in seen if {"at_s", "robot"} <= body.keys()]
 
 
-def detected(marks: Sequence[Mark], seen: Iterable[Sighting], lasted_s: float) -> Detection:
+def detected(marks: Sequence[Mark], seen: Iterable[WatcherReport], lasted_s: float) -> Detection:
     """Return what was seen of the marks in a recording of this length."""
     ordered = sorted(seen, key=lambda sighting: sighting.at_s)
     firsts = [next((one.at_s - mark.from_s for one in ordered if mark.has(one)), None) for mark in marks]

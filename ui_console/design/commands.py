@@ -47,7 +47,7 @@ class TextState:
 
 
 @dataclass(frozen=True)
-class Command:
+class DesignCommand:
     """A change that can be carried out on any text.
 
     Attributes:
@@ -69,10 +69,10 @@ class Command:
         return self.effect(text, *self.arguments, **self.named)
 
 
-def command(effect: Callable[Concatenate[bytes, P], TextState]) -> Callable[P, Command]:
+def command(effect: Callable[Concatenate[bytes, P], TextState]) -> Callable[P, DesignCommand]:
     """Return the function that makes a command of an effect's arguments behind the text."""
 
-    def made(*arguments: P.args, **named: P.kwargs) -> Command:
-        return Command(effect, arguments, named)
+    def made(*arguments: P.args, **named: P.kwargs) -> DesignCommand:
+        return DesignCommand(effect, arguments, named)
 
     return made

@@ -23,7 +23,7 @@ from backbone.mission.reader import Fault, MissionInvalid, read_mission_bytes
 from backbone.mission.report import Report
 from backbone.naming import is_legal
 from ui_console.design.catalogue import new_text
-from ui_console.design.commands import Command, NothingToUndo, TextState
+from ui_console.design.commands import DesignCommand, NothingToUndo, TextState
 
 UNDO_MOST = 1000  # chosen: more than a sitting; a mission file is small
 
@@ -114,7 +114,7 @@ class Draft:
         return None if self.description is None else dry_run(self.description)
 
     # ------------------------------------------------------------------ steps
-    def do(self, command: Command) -> Draft:
+    def do(self, command: DesignCommand) -> Draft:
         """Return the draft after a command; itself if that changes nothing.
 
         Raises:

@@ -15,7 +15,7 @@ from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import NewElement, Node, Path
 from backbone.mission.report import listed, quoted
 from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
-from ui_console.design.commands import Command, DesignRefused
+from ui_console.design.commands import DesignCommand, DesignRefused
 from ui_console.design.effects import add, add_behavior, add_resource, add_type, add_world, claim_arc, write_parameter
 from ui_console.design.properties import choices
 
@@ -55,14 +55,14 @@ class Offer:
     label: str
     doc: str
     asks: tuple[Prompt, ...]
-    build: Callable[[Sequence[str]], Command]
+    build: Callable[[Sequence[str]], DesignCommand]
 
     @property
     def must_ask(self) -> bool:
         """True if a question has no proposal, or several sensible answers."""
         return any(not asked.proposed or len(asked.choices) > 1 for asked in self.asks)
 
-    def command(self, answers: Sequence[str]) -> Command:
+    def command(self, answers: Sequence[str]) -> DesignCommand:
         """Return the command for these answers; without answers, for the proposed ones.
 
         Raises:
@@ -168,7 +168,7 @@ def _behaviors(mission: Node, node: Node) -> list[Offer]:
         )
         return Offer(f"behavior {entry.name}", entry.class_path, asks, lambda given: build(entry, given))
 
-    def build(entry: TypeEntry, given: Sequence[str]) -> Command:
+    def build(entry: TypeEntry, given: Sequence[str]) -> DesignCommand:
         if not re.fullmatch(r"-?\d{1,9}", given[1].strip()):
             raise DesignRefused(f"{given[1]!r} is no priority", remedy="Write a whole number; larger is higher.")
         return add_behavior(node.path, entry.name, given[0], int(given[1]))
@@ -264,7 +264,7 @@ def _generic(mission: Node, node: Node, tag: str) -> list[Offer]:
     if tag == "target":
         asks.append(Prompt("path", "Its way points, x,y in meters, separated by blanks.", "1,1 2,1"))
 
-    def build(given: Sequence[str]) -> Command:
+    def build(given: Sequence[str]) -> DesignCommand:
         values = {name: value for name, value in zip(required, given, strict=False) if value}
         points = _points(given[-1]) if tag == "target" else []
         return add(node.path, NewElement(tag, values, points))

@@ -13,7 +13,7 @@ from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path
 from ui_console.design.catalogue import Role, entries
-from ui_console.design.commands import Command
+from ui_console.design.commands import DesignCommand
 from ui_console.design.effects import rename, set_value, write_parameter
 
 HAVE_PARAMETERS = ("behavior", "resource", "world")
@@ -42,7 +42,7 @@ class Property(msgspec.Struct, frozen=True):
     doc: str
     choices: tuple[str, ...] = ()
 
-    def command(self, path: Path, tag: str, value: str) -> Command:
+    def command(self, path: Path, tag: str, value: str) -> DesignCommand:
         """Return the command that sets it; an empty text leaves it out."""
         if self.is_parameter:
             return write_parameter(path, self.name, value or None)

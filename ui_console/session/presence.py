@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ui_console.session.observer import AnyObserver
 
 
-class Presence:
+class OperatorPresence:
     """Shows when the operator turns away and comes back.
 
     Args:

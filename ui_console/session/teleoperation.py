@@ -37,7 +37,7 @@ from ui_console.session.hand_over import AskHandOver, HandOver
 from ui_console.session.kind_finder import KindFinder
 from ui_console.session.order_keeper import OrderKeeper
 from ui_console.session.order_verbs import OrderVerbs
-from ui_console.session.presence import Presence
+from ui_console.session.presence import OperatorPresence
 from ui_console.session.stop_ear import StopEar
 from ui_console.session.waiting import Waiting
 
@@ -100,7 +100,7 @@ class Teleoperation(OrderVerbs):
         self._hand_over = HandOver(self, self.give_back)
         self._waiting = Waiting(self, self._hand_over, self._waits_for)
         self._ear = StopEar(self, self._heard_stop)
-        self._presence = Presence(self)
+        self._presence = OperatorPresence(self)
         self._orders = OrderKeeper(self, lambda: self._robot, self._hand_to_order, self._take_back)
         self._holding = ""
         self._next = ("", "")

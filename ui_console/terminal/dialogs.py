@@ -152,7 +152,7 @@ class LineQuestion(Dialog[str]):
 
 
 @dataclass(frozen=True, slots=True)
-class Choice(Generic[T]):
+class DialogChoice(Generic[T]):
     """One line of a ``ChoiceDialog``.
 
     Attributes:
@@ -177,10 +177,10 @@ class ChoiceDialog(Dialog[T]):
         choices: To choose from.
     """
 
-    def __init__(self, robot: str, question: str, choices: Sequence[Choice[T]]) -> None:
+    def __init__(self, robot: str, question: str, choices: Sequence[DialogChoice[T]]) -> None:
         super().__init__()
         self._robot, self._question, self._choices = robot, question, choices
-        self._chosen: Choice[T] | None = None
+        self._chosen: DialogChoice[T] | None = None
 
     @property
     def subject(self) -> str:
@@ -229,10 +229,10 @@ def command_dialog(robot: str, commands: Sequence[RoleCommand]) -> ChoiceDialog[
     return ChoiceDialog(robot, f"which command for {robot}? (enter chooses it)", list(map(_command_choice, commands)))
 
 
-def _command_choice(command: RoleCommand) -> Choice[GiveWish]:
+def _command_choice(command: RoleCommand) -> DialogChoice[GiveWish]:
     form = command.form
     labels = zip(command.labels, form.fields, strict=True)
-    return Choice(
+    return DialogChoice(
         Text.assemble((command.title, "bold"), f"  {form.doc}" if form.doc else ""),
         f"{command.title} (enter gives it)",
         [(f"{label}{f'  {field.doc}' if field.doc else ''}", default_text(field)) for label, field in labels],

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from ui_console.model.fields import WrongValue
 from ui_console.model.orders import Order, OrderKind, group
-from ui_console.terminal.dialogs import Choice, ChoiceDialog
+from ui_console.terminal.dialogs import ChoiceDialog, DialogChoice
 
 LABELS = {
     OrderKind.GO_TO: ("x in meters, along the width of the room", "y in meters, along its depth"),
@@ -36,11 +36,11 @@ def order_dialog(robot: str, held: Sequence[str]) -> ChoiceDialog[Sequence[Order
     return ChoiceDialog(robot, f"what is {robot} to do by itself? (enter chooses it)", choices)
 
 
-def _choice(kind: OrderKind, robot: str, robots: tuple[str, ...], who: str) -> Choice[Sequence[Order]]:
+def _choice(kind: OrderKind, robot: str, robots: tuple[str, ...], who: str) -> DialogChoice[Sequence[Order]]:
     words = who + WORDS[kind]
     fields = [(label, "") for label in LABELS.get(kind, ())]
     title = f"{words} (enter gives the order)"
-    return Choice(Text(words), title, fields, lambda values: group(order_of(kind, robot, values), robots))
+    return DialogChoice(Text(words), title, fields, lambda values: group(order_of(kind, robot, values), robots))
 
 
 def order_of(kind: OrderKind, robot: str, values: Sequence[str]) -> Order:

@@ -32,7 +32,7 @@ class PlayOn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field=
     speed: Annotated[float, msgspec.Meta(ge=SLOWEST, le=FASTEST)] = 1.0
 
 
-class Pause(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="pause"):
+class StandStill(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="pause"):
     """Stand still."""
 
 
@@ -40,13 +40,13 @@ class StepOn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field=
     """Go on to the next picture, decision or event, and stand still there."""
 
 
-class GoTo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="go_to"):
+class ShowTime(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="go_to"):
     """Show another time."""
 
     at_s: Instant
 
 
-Playing = PlayOn | Pause | StepOn | GoTo
+Playing = PlayOn | StandStill | StepOn | ShowTime
 _intents: msgspec.json.Decoder[Hello | BeatRequest | Intent | Playing] = msgspec.json.Decoder(
     Hello | BeatRequest | Intent | Playing
 )

@@ -31,7 +31,7 @@ from ui_console.web.hub import WebHub
 from ui_console.web.login import ProtocolViolation, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
-from ui_console.web.playing import GoTo, Looking, Pause, Playing, PlayOn, StepOn
+from ui_console.web.playing import Looking, Playing, PlayOn, ShowTime, StandStill, StepOn
 from ui_console.web.protocol import Intent, ParametersRequest, SearchLog, WhyRequest
 
 CLASSES = message_classes()
@@ -181,11 +181,11 @@ class RecordingRoom:
                 if self.playback.now_s() >= self.playback.end_s:
                     self._go_to(self.playback.begin_s)
                 self.playback.play(speed)
-            case Pause():
+            case StandStill():
                 self.playback.pause()
             case StepOn():
                 self._step()
-            case GoTo(at_s):
+            case ShowTime(at_s):
                 self._go_to(at_s)
             case WhyRequest() | ParametersRequest() | SearchLog():
                 await self._arrived.wait()  # the answer is of the time that is asked about

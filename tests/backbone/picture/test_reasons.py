@@ -22,7 +22,7 @@ from backbone.component.messages import (
 from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.picture.reasons import AskedName, Reasons, Told, reasons_for, story_of
+from backbone.picture.reasons import AskedName, FoundEvents, Reasons, reasons_for, story_of
 
 CAUSE = "backbone/rc_manager#112"
 SCOUT = ComponentState(
@@ -76,8 +76,8 @@ def mission(complete: bool = True, unknown: tuple[str, ...] = ()) -> Bus:
     return network.join("ui_console/asker", VirtualClock())
 
 
-def story(text: str, **listing: Any) -> Told:
-    async def main() -> Told:
+def story(text: str, **listing: Any) -> FoundEvents:
+    async def main() -> FoundEvents:
         return await story_of(mission(**listing), text, VirtualClock())
 
     return run_virtual(main())

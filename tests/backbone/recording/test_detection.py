@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from backbone.command_line.comparing import compare_detection
 from backbone.launcher.endings import ExitCode
-from backbone.recording.detection import SIGHTING, Mark, NoMarks, Sighting, detected, read_marks, worse
+from backbone.recording.detection import SIGHTING, Mark, NoMarks, WatcherReport, detected, read_marks, worse
 from backbone.recording.known_messages import message_classes
 from backbone.recording.presence import Presence
 from backbone.recording.writer import RecordingWriter
@@ -21,7 +21,7 @@ from mission_control.messages import MotionSeen, Region
 LASTED_S = 120.0
 ROBOTS = ("scout1", "scout2")
 times = st.integers(0, 100).map(float)
-sightings = st.lists(st.builds(Sighting, times, st.sampled_from(ROBOTS)), max_size=8)
+sightings = st.lists(st.builds(WatcherReport, times, st.sampled_from(ROBOTS)), max_size=8)
 marks = st.lists(
     st.builds(
         lambda from_s, lasts_s, robot: Mark(from_s, from_s + lasts_s, "intruder", robot),
@@ -35,7 +35,7 @@ marks = st.lists(
 
 
 @given(marks, sightings)
-def test_each_mark_is_detected_or_missed_and_each_sighting_counts(told: list[Mark], seen: list[Sighting]) -> None:
+def test_each_mark_is_detected_or_missed_and_each_sighting_counts(told: list[Mark], seen: list[WatcherReport]) -> None:
     found = detected(told, seen, LASTED_S)
     assert len(found.seen_after_s) + found.missed == len(told)
     assert found.false_alarms + sum(any(mark.has(one) for mark in told) for one in seen) == len(seen)
@@ -48,27 +48,29 @@ def test_each_mark_is_detected_or_missed_and_each_sighting_counts(told: list[Mar
 
 @given(marks)
 def test_who_sees_each_mark_at_its_begin_misses_nothing(told: list[Mark]) -> None:
-    found = detected(told, [Sighting(mark.from_s, mark.robot or ROBOTS[0]) for mark in told], LASTED_S)
+    found = detected(told, [WatcherReport(mark.from_s, mark.robot or ROBOTS[0]) for mark in told], LASTED_S)
     assert (found.missed, found.false_alarms, found.largest_delay_s) == (0, 0, 0.0)
 
 
 @given(marks, sightings, st.integers(0, 10_000))
-def test_a_shift_of_all_times_changes_nothing(told: list[Mark], seen: list[Sighting], by_s: int) -> None:
+def test_a_shift_of_all_times_changes_nothing(told: list[Mark], seen: list[WatcherReport], by_s: int) -> None:
     later = [Mark(mark.from_s + by_s, mark.to_s + by_s, mark.what, mark.robot) for mark in told]
-    assert detected(later, [Sighting(one.at_s + by_s, one.robot) for one in seen], LASTED_S) == detected(
+    assert detected(later, [WatcherReport(one.at_s + by_s, one.robot) for one in seen], LASTED_S) == detected(
         told, seen, LASTED_S
     )
 
 
 @given(marks, sightings, st.randoms(use_true_random=False))
-def test_the_order_of_sightings_does_not_matter(told: list[Mark], seen: list[Sighting], rng: object) -> None:
+def test_the_order_of_sightings_does_not_matter(told: list[Mark], seen: list[WatcherReport], rng: object) -> None:
     mixed = [*seen]
     rng.shuffle(mixed)  # type: ignore[attr-defined]
     assert detected(told, mixed, LASTED_S) == detected(told, seen, LASTED_S)
 
 
-@given(marks, sightings, st.builds(Sighting, times, st.sampled_from(ROBOTS)))
-def test_a_sighting_more_is_worse_only_as_a_false_alarm(told: list[Mark], seen: list[Sighting], more: Sighting) -> None:
+@given(marks, sightings, st.builds(WatcherReport, times, st.sampled_from(ROBOTS)))
+def test_a_sighting_more_is_worse_only_as_a_false_alarm(
+    told: list[Mark], seen: list[WatcherReport], more: WatcherReport
+) -> None:
     before, after = detected(told, seen, LASTED_S), detected(told, [*seen, more], LASTED_S)
     assert worse(before, before) == []
     assert bool(worse(before, after)) is not any(mark.has(more) for mark in told)
@@ -76,8 +78,8 @@ def test_a_sighting_more_is_worse_only_as_a_false_alarm(told: list[Mark], seen: 
 
 def test_a_mark_that_is_missed_or_detected_later_is_worse() -> None:
     told = [Mark(10, 20), Mark(30, 40)]
-    soon = detected(told, [Sighting(11, "scout1"), Sighting(31, "scout1")], LASTED_S)
-    late = detected(told, [Sighting(14, "scout1")], LASTED_S)
+    soon = detected(told, [WatcherReport(11, "scout1"), WatcherReport(31, "scout1")], LASTED_S)
+    late = detected(told, [WatcherReport(14, "scout1")], LASTED_S)
     assert worse(soon, late) == ["mark 1 is detected 3.000 s later", "mark 2 is missed"]
     assert worse(soon, late, later_s=3.0) == ["mark 2 is missed"]
     assert worse(late, soon) == []

@@ -15,7 +15,7 @@ from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import NewElement, Node, outline
 from backbone.mission.reader import MissionInvalid, read_mission
 from ui_console.design.catalogue import Role, entries, stock
-from ui_console.design.commands import Command, DesignRefused, ElementNameTaken, NothingToUndo, TextState
+from ui_console.design.commands import DesignCommand, DesignRefused, ElementNameTaken, NothingToUndo, TextState
 from ui_console.design.draft import Draft
 from ui_console.design.effects import (
     add,
@@ -44,7 +44,7 @@ SHIPPED = [
 COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 
 
-def designed(*commands: Command, draft: Draft | None = None) -> Draft:
+def designed(*commands: DesignCommand, draft: Draft | None = None) -> Draft:
     draft = draft or Draft.new("guard.xml")
     for command in commands:
         draft = draft.do(command)
@@ -79,7 +79,7 @@ NAMES = st.sampled_from(["scout1", "scout9", "radio", "world", "watch-scout1", "
 START = st.sampled_from([*(Draft.opened(str(file)) for file in SHIPPED), Draft.new("new.xml")])
 
 
-def commands(draft: Draft) -> st.SearchStrategy[Command]:
+def commands(draft: Draft) -> st.SearchStrategy[DesignCommand]:
     paths = st.sampled_from([node.path for node in draft.mission])
     kinds = st.sampled_from([entry.name for entry in entries(draft.mission)])
     return st.one_of(
@@ -122,14 +122,14 @@ def test_any_sequence_of_commands_can_be_read_loses_no_comment_and_is_undone_to_
     assert first.saved == states[-1].saved
 
 
-def done(draft: Draft, command: Command) -> Draft:
+def done(draft: Draft, command: DesignCommand) -> Draft:
     try:
         return draft.do(command)
     except Refusal:
         return draft
 
 
-def removed_by(draft: Draft, command: Command) -> bytes:
+def removed_by(draft: Draft, command: DesignCommand) -> bytes:
     if command.effect is not remove(()).effect:
         return b""
     node = draft.mission.at(command.arguments[0])
@@ -313,7 +313,7 @@ def test_a_parameter_is_set_changed_and_left_out() -> None:
 
 def test_what_cannot_be_meant_is_refused_and_changes_nothing() -> None:
     draft = watchers()
-    refused: list[tuple[Command, type[Refusal]]] = [
+    refused: list[tuple[DesignCommand, type[Refusal]]] = [
         (add_resource("scout", "scout1"), ElementNameTaken),
         (add_behavior((), "patrol", "world"), ElementNameTaken),
         (rename(only(draft, "host", "base").path, "Base Station"), Refusal),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from backbone.errors import Refusal
 from backbone.mission.edit import Node
-from ui_console.design.commands import Command
+from ui_console.design.commands import DesignCommand
 from ui_console.design.draft import Draft
 from ui_console.design.effects import add_behavior, add_resource, add_type, relocate, remove, rename, set_value
 from ui_console.design.following import follower
@@ -36,7 +36,7 @@ def head(draft: Draft, node: Node) -> bytes:
 
 @settings(max_examples=share(150), suppress_health_check=list(HealthCheck))
 @given(COMMANDS)
-def test_what_is_written_like_nothing_else_is_found_again_wherever_it_went(command: Command) -> None:
+def test_what_is_written_like_nothing_else_is_found_again_wherever_it_went(command: DesignCommand) -> None:
     try:
         after = BUILT.do(command)
     except Refusal:

@@ -129,7 +129,7 @@ def round_at(at_s: float) -> str:
 def test_a_time_shows_the_same_however_one_got_there(times: list[float]):
     async def scene(room: RecordingRoom, page: Page) -> None:
         for at_s in times:
-            await page.does(playing.GoTo(at_s))
+            await page.does(playing.ShowTime(at_s))
             assert await page.round() == round_at(at_s)
             assert room.playback.now_s() == at_s
             assert page.view["playback"]["at_s"] == pytest.approx(at_s, abs=1e-3)
@@ -147,7 +147,7 @@ def test_it_is_played_paused_and_stops_at_the_end():
         assert odd(page.view, inspect.type_info(View)) == ["view.beat"], "the page was not asked for a sign of life"
         await page.does(playing.PlayOn(2.0))
         await page.looks(10.0)
-        await page.does(playing.Pause())
+        await page.does(playing.StandStill())
         assert await page.round() == round_at(room.playback.now_s()) == "round 3"
         await page.does(playing.PlayOn(10.0))
         view = await page.looks(10.0)
@@ -160,12 +160,12 @@ def test_it_is_played_paused_and_stops_at_the_end():
 
 def test_a_step_goes_to_the_next_picture_or_event():
     async def scene(room: RecordingRoom, page: Page) -> None:
-        await page.does(playing.GoTo(12.5))
+        await page.does(playing.ShowTime(12.5))
         await page.looks()
         await page.does(playing.StepOn())
         assert room.playback.now_s() == 17.0
         assert await page.round() == "round 3"
-        await page.does(playing.GoTo(LAST_S))
+        await page.does(playing.ShowTime(LAST_S))
         await page.looks()
         await page.does(playing.StepOn())
         assert room.playback.now_s() == LAST_S
@@ -176,7 +176,7 @@ def test_a_step_goes_to_the_next_picture_or_event():
 def test_pictures_come_also_where_time_stands_still():
     async def scene(_room: RecordingRoom, page: Page) -> None:
         await page.does(protocol.Watch(["scout1"]))
-        await page.does(playing.GoTo(33.0))
+        await page.does(playing.ShowTime(33.0))
         await page.looks(4.0)
         assert page.pictures
 
@@ -205,7 +205,7 @@ def test_nothing_can_be_commanded(intent: protocol.Intent):
 
 def test_what_was_so_can_be_asked():
     async def scene(_room: RecordingRoom, page: Page) -> None:
-        await page.does(playing.GoTo(20.0))
+        await page.does(playing.ShowTime(20.0))
         await page.does(protocol.WhyRequest("scout1"))  # at once: the answer is of that time all the same
         await page.looks()
         assert any("round 3" in line for line in page.answers[0]["lines"]), page.answers
@@ -216,10 +216,10 @@ def test_what_was_so_can_be_asked():
 def test_pages_see_the_same_time_and_one_may_leave():
     async def scene(room: RecordingRoom, page: Page) -> None:
         other = Page(room)
-        await other.does(playing.GoTo(47.0))
+        await other.does(playing.ShowTime(47.0))
         await page.looks()
         await room.leave(other.viewer, "has gone away")
-        await page.does(playing.GoTo(7.0))
+        await page.does(playing.ShowTime(7.0))
         assert await page.round() == "round 1"
         assert len(room.clients) == 1
 

@@ -558,11 +558,6 @@ export interface GiveRequest {
   role: string;
 }
 
-export interface GoTo {
-  do: "go_to";
-  at_s: number;
-}
-
 export interface Hello {
   do: "hello";
   token: string;
@@ -614,10 +609,6 @@ export interface ParametersRequest {
   name: string;
 }
 
-export interface Pause {
-  do: "pause";
-}
-
 export interface PictureOrder {
   do: "order_in_picture";
   moment: number;
@@ -654,6 +645,15 @@ export interface SetRequest {
   name: string;
   parameter: string;
   value: unknown;
+}
+
+export interface ShowTime {
+  do: "go_to";
+  at_s: number;
+}
+
+export interface StandStill {
+  do: "pause";
 }
 
 export interface Steer {
@@ -735,6 +735,6 @@ export type Said =
   | SetRequest
   | Here
   | PlayOn
-  | Pause
+  | StandStill
   | StepOn
-  | GoTo;
+  | ShowTime;
