@@ -131,21 +131,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.views = DebugViews(bus, clock)
         """Its debug views: pictures and values that cost nothing unless a console looks."""
         self.times_resumed = self.times_suspended = self.frames_seen = 0
-        self._nodes = {node.name: node for node in self.parameters.children}
-        self._children = ChildrenLoop(
-            bus,
-            clock,
-            self._nodes,
-            lambda: self.path,
-            self.rules(list(self._nodes)),
-            self,
-            owner=self.name,
-            begin=self._begin,
-            note=self.story.note,
-            publish_event=self.publish_event,
-            changed=self.changed,
-            arranged=self._children_arranged,
-        )
+        self.child_nodes = {node.name: node for node in self.parameters.children}
+        """Name of a child → its node of the tree."""
+        self._children = ChildrenLoop(self, self.rules(list(self.child_nodes)))
         self._suspended_because = self._reported_because = ""
         self._is_wound_up = self._has_begun = False
         self._tree_version, self._left = 0, set[str]()
@@ -201,7 +189,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             self._children.give_up(self.name, self.payload)
         failed = status is BehaviorStatus.FAILURE
         self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
-        self._begin(self._wind_up(), "wind-up")
+        self.begin_task(self._wind_up(), "wind-up")
 
     def tell_parent(self, payload: Mapping[str, object]) -> None:
         """Send a report of progress to the parent; while the parent cannot be reached, only the newest is kept."""
@@ -216,12 +204,12 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             self._parent = KeeperReports(self.bus, self.clock, self.parameters.keeper, self._report)
         elif len(self.path) > 2:
             parent = address(Subsystem.MISSION_CONTROL, self.path[-2][0])
-            self._parent = ParentReports(self.bus, self.clock, parent, self._report, self._begin)
+            self._parent = ParentReports(self.bus, self.clock, parent, self._report, self.begin_task)
 
     async def serve(self) -> None:
         """Start, claim the ARC, start the children; then react to events."""
         if isinstance(self._parent, KeeperReports):
-            self._begin(self._end_with_keeper(self._parent), "keeper")
+            self.begin_task(self._end_with_keeper(self._parent), "keeper")
             await self._parent.wait_noted()
         await self.start()
         need = self.need()
@@ -229,7 +217,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self, self.not_now)
             self.arc.frames(self._saw)
             self._suspended_because = NO_GRANT_YET
-            self._keeping = self._begin(self._keep(self.arc, need), "arc")
+            self._keeping = self.begin_task(self._keep(self.arc, need), "arc")
         self._has_begun = True
         self._reported_because = self.suspended_because
         self._send_report()  # it takes the place of an earlier life's
@@ -239,7 +227,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Answer the ARC, the children, who asks about it or looks at debug views, and ``TakeBranch``."""
         match asked.body:
             case ChildReport(child=child) as report:
-                if child not in self._nodes or child != component_of(asked.source):
+                if child not in self.child_nodes or child != component_of(asked.source):
                     raise NotAChild(f"{asked.source} is no child of {self.name}", child=child)
                 self._children.reported(child, report.status, report.payload, report.suspended_because)
                 return ReportNoted()
@@ -312,7 +300,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         await self.resumed(notice.rcs)
         if self.rcs and not self.status.is_final:
             await self._stop_acting()
-            self._acting = self._begin(self._act(), "act")
+            self._acting = self.begin_task(self._act(), "act")
 
     async def arc_suspending(self, notice: Suspending) -> None:
         """Call the hooks; see ``ArcListener``."""
@@ -416,10 +404,10 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             anew = taken.anew if taken.version > self._tree_version else []
             self._tree_version = taken.version
             arc, self.parameters = self.parameters.arc, self._with_parameters(taken.place)
-            before, nodes = set(self._nodes), {node.name: node for node in self.parameters.children}
+            before, nodes = set(self.child_nodes), {node.name: node for node in self.parameters.children}
             self._left = (self._left | before) - nodes.keys()
-            self._nodes.clear()
-            self._nodes.update(nodes)
+            self.child_nodes.clear()
+            self.child_nodes.update(nodes)
             if self._need is not None:
                 self._need = (self.need() if self.parameters.arc != arc else None) or self._need
                 self._claim.update(self._claim_of(self._need))
@@ -429,7 +417,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         return BranchTaken(str(self.status) if self.status.is_final else "")
 
     # ------------------------------------------------------------------ the children and the parent
-    def _children_arranged(self) -> None:
+    def rules_applied(self) -> None:
+        """Report what the rules of the children have made of an event; see ``ParentOfChildren``."""
         self.children_arranged()
         self._send_report_if_suspension_changed()
 
@@ -481,7 +470,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         status = self.status if self._is_wound_up else BehaviorStatus.RUNNING
         return ChildReport(self.name, status, self.payload, self.suspended_because)
 
-    def _begin(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:
+    def begin_task(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:
         """Run the coroutine as a task, unless the component is ending."""
         if self.state is not LifeState.READY:
             work.close()

@@ -5,16 +5,18 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Coroutine, Mapping, Sequence
+from typing import Protocol
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.asking import ask_until_answered
 from backbone.component.messages import Absence, LogLevel
+from backbone.component.story import StoryBook
 from backbone.creator.messages import ProcessFell, creator_name
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import PathStep
-from backbone.naming import Subsystem, address, component_of
+from backbone.naming import Subsystem, address
 from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
 from backbone.wire import Envelope
@@ -30,40 +32,51 @@ START_PATIENCE_S = 60.0  # chosen: a link cut of 30 s, and the tries that began 
 AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
 
 
+class Parent(Protocol):
+    """The behavior, as the keeper of its children needs it."""
+
+    bus: Bus
+    clock: Clock
+    story: StoryBook
+    child_nodes: dict[str, BehaviorNode]
+    """Name of a child → its node, as they are now."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def path(self) -> Sequence[PathStep]:
+        """Names and priorities from the mission's root to it, as they are now."""
+
+    def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
+        """Run work as a task, unless the behavior is ending."""
+
+    def changed(self) -> None:
+        """Note that ``absences`` may have changed."""
+
+    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
+        """Publish an event about the subject to the mission's log."""
+
+
 class ChildKeeper:
     """Starts, adopts and stops the children of one behavior."""
 
     def __init__(
         self,
-        bus: Bus,
-        clock: Clock,
-        nodes: Mapping[str, BehaviorNode],
-        path: Callable[[], Sequence[PathStep]],
-        *,
+        parent: Parent,
         reported: Callable[[str, BehaviorStatus, Mapping[str, object], str], None],
         left: Callable[[str], None],
-        begin: Callable[[Coroutine[object, None, None], str], asyncio.Task[None] | None],
-        note: Callable[[str, str], object],
-        publish_event: Callable[..., None],
-        changed: Callable[[], None],
     ) -> None:
         """Keep no child yet.
 
         Args:
-            bus: Bus of the behavior.
-            clock: The mission's clock.
-            nodes: Name of a child → its node, as they are now.
-            path: Names and priorities from the mission's root to the behavior, as they are now.
+            parent: The behavior.
             reported: A child's status, payload, and why it is suspended: it finished, cannot run, or is adopted.
             left: An order stopped a child.
-            begin: Runs work as a task, unless the behavior is ending.
-            note: Subject, event → the story.
-            publish_event: The same, for people.
-            changed: Called when ``absences`` may have changed.
         """
-        self._bus, self._clock, self._nodes, self._path, self._owner = bus, clock, nodes, path, bus.source
-        self._reported, self._left, self._begin = reported, left, begin
-        self._note, self._publish_event, self._changed = note, publish_event, changed
+        self._parent, self._reported, self._left = parent, reported, left
+        self._bus, self._clock, self._nodes = parent.bus, parent.clock, parent.child_nodes
         self._kept: dict[str, asyncio.Task[None]] = {}
         self._wishes: dict[str, Wish] = {}
         self._heard_creators: dict[str, Subscription] = {}
@@ -74,7 +87,7 @@ class ChildKeeper:
 
     async def start(self, name: str) -> None:
         """Start the child and keep it running."""
-        keeping = self._begin(self._keep_child(name), f"child {name}")
+        keeping = self._parent.begin_task(self._keep_child(name), f"child {name}")
         if keeping is not None:
             self._kept[name] = keeping
 
@@ -89,7 +102,7 @@ class ChildKeeper:
         def order() -> Start:
             nonlocal latest
             latest = self._nodes.get(name, latest)
-            return latest.order(self._path())
+            return latest.order(self._parent.path)
 
         try:
             stopped = await keep_placed(
@@ -99,22 +112,22 @@ class ChildKeeper:
                 order,
                 at,
                 on_placed=self._child_placed,
-                on_changed=self._changed,
+                on_changed=self._parent.changed,
                 patience_s=START_PATIENCE_S,
             )
         except Refusal as refusal:
-            self._publish_event(name, f"could not be started: {refusal}", LogLevel.WARNING)
+            self._parent.publish_event(name, f"could not be started: {refusal}", LogLevel.WARNING)
             self._reported(name, BehaviorStatus.FAILURE, why(refusal), "")
             return
-        self._publish_event(name, f"is not wanted any more: {stopped}")
+        self._parent.publish_event(name, f"is not wanted any more: {stopped}")
         del self._kept[name], self._wishes[name]
         self._left(name)
 
     def _child_placed(self, placement: Placement, was_there: bool) -> None:
         self._hear_creator(placement.host)
         if was_there:
-            self._note(placement.name, "was running and is adopted")
-            self._begin(self._adopt(placement.name), f"adopt {placement.name}")
+            self._parent.story.note(placement.name, "was running and is adopted")
+            self._parent.begin_task(self._adopt(placement.name), f"adopt {placement.name}")
 
     async def _adopt(self, name: str) -> None:
         """Ask an adopted child for its progress."""
@@ -151,16 +164,18 @@ class ChildKeeper:
                 within_s=ADOPT_WITHIN_S,
             )
         except LinkError as error:
-            log.warning("%s does not know which children it left running: %s", component_of(self._owner), error)
+            log.warning("%s does not know which children it left running: %s", self._parent.name, error)
             return
-        mine = [each.name for each in placed.placements if each.requester == self._owner and each.name in self._nodes]
+        mine = [
+            each.name for each in placed.placements if each.requester == self._bus.source and each.name in self._nodes
+        ]
         await asyncio.gather(*(self.stop(name) for name in mine if not started(name)))
 
     async def stop(self, name: str) -> None:
         """Return when the placer has ended the child, or does not have it."""
         await end_task(self._kept.pop(name, None))
         self._wishes.pop(name, None)
-        await end_by_placer(self._bus, self._clock, name, f"{component_of(self._owner)} ends it")
+        await end_by_placer(self._bus, self._clock, name, f"{self._parent.name} ends it")
 
     def _hear_creator(self, host: str) -> None:
         if host not in self._heard_creators:

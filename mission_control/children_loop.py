@@ -9,16 +9,12 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Collection, Coroutine, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import assert_never
+from typing import Protocol, assert_never
 
-from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence
-from backbone.mission.behavior_orders import PathStep
-from mission_control.behavior_hooks import BehaviorHooks
-from mission_control.behavior_tree import BehaviorNode
-from mission_control.child_keeper import ChildKeeper
+from mission_control.child_keeper import ChildKeeper, Parent
 from mission_control.children import Children, Decision, FinishParent, Instruction, StartChild, StopChild
 from mission_control.messages import BehaviorStatus
 
@@ -32,57 +28,32 @@ class ChildOrder:
     is_done: asyncio.Event = field(default_factory=asyncio.Event)
 
 
+class ParentOfChildren(Parent, Protocol):
+    """The behavior, as the loop of its children needs it; see ``BehaviorHooks`` for its decisions."""
+
+    async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:
+        """Decide what follows the end of a child."""
+
+    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
+        """Conclude after the end of all children."""
+
+    def rules_applied(self) -> None:
+        """Note that the rules have handled an event."""
+
+
 class ChildrenLoop:
-    """Feeds the events of children, and the time, to the rules, and carries out the answers."""
+    """Feeds the events of children, and the time, to the rules, and carries out the answers.
 
-    def __init__(
-        self,
-        bus: Bus,
-        clock: Clock,
-        nodes: Mapping[str, BehaviorNode],
-        path: Callable[[], Sequence[PathStep]],
-        rules: Children,
-        hooks: BehaviorHooks,
-        *,
-        owner: str,
-        begin: Callable[[Coroutine[object, None, None], str], asyncio.Task[None] | None],
-        note: Callable[[str, str], object],
-        publish_event: Callable[..., None],
-        changed: Callable[[], None],
-        arranged: Callable[[], None],
-    ) -> None:
-        """Start no child yet.
+    Args:
+        parent: The behavior.
+        rules: What follows an event.
+    """
 
-        Args:
-            bus: Bus of the behavior.
-            clock: The mission's clock.
-            nodes: Name of a child → its node, as they are now.
-            path: Names and priorities from the mission's root to the behavior, as they are now.
-            rules: What follows an event.
-            hooks: The behavior's decisions.
-            owner: Name of the behavior.
-            begin: Runs work as a task, unless the behavior is ending.
-            note: Subject, event → the story.
-            publish_event: The same, for people.
-            changed: Called when ``absences`` may have changed.
-            arranged: Called after each event that the rules have handled.
-        """
+    def __init__(self, parent: ParentOfChildren, rules: Children) -> None:
         self.rules = rules
         """The state of the children."""
-        self._clock, self._hooks, self._owner, self._nodes = clock, hooks, owner, nodes
-        self._begin, self._note, self._changed, self._arranged = begin, note, changed, arranged
-        self._keeper = ChildKeeper(
-            bus,
-            clock,
-            nodes,
-            path,
-            reported=self.reported,
-            left=self._child_left,
-            begin=begin,
-            note=note,
-            publish_event=publish_event,
-            changed=changed,
-        )
+        self._parent, self._clock, self._nodes = parent, parent.clock, parent.child_nodes
+        self._keeper = ChildKeeper(parent, self.reported, self._child_left)
         self._given_up: dict[str, Absence] = {}
         self._last_orders: dict[str, asyncio.Event] = {}
         self._waking: asyncio.Task[None] | None = None
@@ -94,7 +65,7 @@ class ChildrenLoop:
         """Start the children that run first; end those of an earlier life that do not."""
         self._carry_out(self.rules.begin(self._now_s()))
         if self._nodes:
-            self._begin(
+            self._parent.begin_task(
                 self._keeper.stop_those_of_an_earlier_life(lambda name: name in self.rules.status),
                 "children of an earlier life",
             )
@@ -104,8 +75,8 @@ class ChildrenLoop:
     ) -> None:
         """Handle a child's report; a final status leads to a decision."""
         if self.rules.reported(name, status, payload):
-            self._note(name, f"finished: {status}")
-            self._begin(self._decide(name, status, payload), f"decide on {name}")
+            self._parent.story.note(name, f"finished: {status}")
+            self._parent.begin_task(self._decide(name, status, payload), f"decide on {name}")
         elif not status.is_final:
             self._carry_out(self.rules.suspended(name, suspended_because, self._now_s()))
 
@@ -122,7 +93,7 @@ class ChildrenLoop:
         """
         for name in (*gone, *anew):
             if self._given_up.pop(name, None) is not None:
-                self._changed()
+                self._parent.changed()
         self._carry_out(self.rules.rearranged(list(self._nodes), anew, self._now_s()))
         for name in gone:
             if name in self._last_orders:
@@ -141,27 +112,29 @@ class ChildrenLoop:
     def give_up(self, name: str, payload: Mapping[str, object]) -> None:
         """Report a behavior that could not work as a lasting absence; one that finished and failed is no absence."""
         if "code" in payload:
-            remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self._owner} and start it again"
+            remedy = (
+                f"see 'scout-backbone story {name}', mend the cause, then stop {self._parent.name} and start it again"
+            )
             cause = str(payload.get("detail", "it failed"))
             self._given_up[name] = Absence(name, self._clock.now_s(), cause, remedy=remedy)
-            self._changed()
+            self._parent.changed()
 
     # ------------------------------------------------------------------ within
     def _child_left(self, name: str) -> None:
         self._carry_out(self.rules.left(name, self._now_s()))
 
     async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
-        decision = await self._hooks.child_finished(name, status, payload)
-        self._note(name, f"{decision} after {status}")
+        decision = await self._parent.child_finished(name, status, payload)
+        self._parent.story.note(name, f"{decision} after {status}")
         if decision is not Decision.RETRY and not self.rules.expects_failures:
             self.give_up(name, payload)
         self._carry_out(self.rules.decided(name, decision, self._now_s()))
 
     def _carry_out(self, instructions: Sequence[Instruction]) -> None:
         if instructions:
-            self._begin(self._obey_in_order([self._order(each) for each in instructions]), "children")
+            self._parent.begin_task(self._obey_in_order([self._order(each) for each in instructions]), "children")
         self._arm()
-        self._arranged()
+        self._parent.rules_applied()
 
     def _order(self, instruction: Instruction) -> ChildOrder:
         if isinstance(instruction, FinishParent):
@@ -187,7 +160,7 @@ class ChildrenLoop:
             case StopChild(name):
                 await self._keeper.stop(name)
             case FinishParent(status, payload):
-                await self._hooks.children_finished(status, payload)
+                await self._parent.children_finished(status, payload)
             case _:
                 assert_never(instruction)
 
@@ -200,7 +173,7 @@ class ChildrenLoop:
         if waking is not None:
             waking.cancel()
         if at_s < math.inf:
-            self._waking = self._begin(self._wake(at_s), "wake")
+            self._waking = self._parent.begin_task(self._wake(at_s), "wake")
 
     async def _wake(self, at_s: float) -> None:
         await self._clock.sleep_until_s(at_s)
