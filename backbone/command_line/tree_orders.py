@@ -26,7 +26,7 @@ from backbone.launcher.messages import (
     TreeChange,
     TreeChanged,
 )
-from backbone.mission.outline import Node, outline
+from backbone.mission.document import Element, outline
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
@@ -153,11 +153,11 @@ def _mission(now: Tree) -> str:
     return outline(now.text.encode()).text("name")
 
 
-def _behaviors(node: Node | None) -> list[Node]:
+def _behaviors(node: Element | None) -> list[Element]:
     return [] if node is None else node.all("behavior")
 
 
-def _lines(node: Node | None, running: dict[str, ComponentState], margin: str) -> Iterator[str]:
+def _lines(node: Element | None, running: dict[str, ComponentState], margin: str) -> Iterator[str]:
     for one in _behaviors(node):
         state = running.get(one.text("name"))
         doing = f"{state.host}, process {state.pid}: {state.feedback or state.state}" if state else "not started"
@@ -165,7 +165,7 @@ def _lines(node: Node | None, running: dict[str, ComponentState], margin: str) -
         yield from _lines(one, running, margin + "  ")
 
 
-def _plain(node: Node, running: dict[str, ComponentState]) -> dict[str, object]:
+def _plain(node: Element, running: dict[str, ComponentState]) -> dict[str, object]:
     state = running.get(node.text("name"))
     return {
         "name": node.text("name"),

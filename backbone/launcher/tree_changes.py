@@ -27,7 +27,7 @@ from backbone.launcher.messages import (
 from backbone.mission import edit
 from backbone.mission.behavior_orders import PathStep, behavior_order
 from backbone.mission.document import parse
-from backbone.mission.edit import NewElement, Node, Path
+from backbone.mission.edit import Element, NewElement, Path
 from backbone.mission.model import BehaviorDescription, MissionDescription
 from backbone.mission.report import Fault, Report
 from backbone.naming import did_you_mean
@@ -50,7 +50,7 @@ class Branch:
 
     text: bytes
     source: str
-    root: Node
+    root: Element
 
     @property
     def name(self) -> str:
@@ -81,10 +81,14 @@ class EditedFile:
             return fault
         root, whole = self.branch.root, edit.outline(self.text)
         here = whole.at(_path_of(whole, self.branch.name))
-        line = fault.line - here.line + root.line
-        if not here.line <= fault.line <= here.line + self.text.count(b"\n", here.begin, here.end):
+        line = fault.line - here.place.line + root.place.line
+        if (
+            not here.place.line
+            <= fault.line
+            <= here.place.line + self.text.count(b"\n", here.span.begin, here.span.end)
+        ):
             return fault
-        column = fault.column - _column(self.text, here) + _column(self.branch.text, root)
+        column = fault.column - here.place.column + root.place.column
         return Fault(self.branch.source, line, max(1, column), fault.message, fault.remedy)
 
 
@@ -155,7 +159,7 @@ def _branch(change: AddBranch | ReplaceBranch) -> Branch:
         raise TreeInvalid("\n".join(map(str, faults)), faults=len(faults))
     root = edit.outline(data)
     if root.tag != BEHAVIOR:
-        raise TreeInvalid(f"{change.source}:{root.line}:1: a branch is one <{BEHAVIOR}>, not a <{root.tag[:40]}>")
+        raise TreeInvalid(f"{change.source}:{root.place.line}:1: a branch is one <{BEHAVIOR}>, not a <{root.tag[:40]}>")
     return Branch(data, change.source, root)
 
 
@@ -167,11 +171,11 @@ def _with_section(text: bytes) -> tuple[bytes, Path]:
     return text, _section_of(whole)
 
 
-def _section_of(whole: Node) -> Path:
+def _section_of(whole: Element) -> Path:
     return next((child.path for child in whole.children if child.tag == SECTION), ())
 
 
-def _path_of(whole: Node, name: str) -> Path:
+def _path_of(whole: Element, name: str) -> Path:
     section = whole.first(SECTION)
     behaviors = {} if section is None else {one.text("name"): one.path for one in section if one.tag == BEHAVIOR}
     if name not in behaviors:
@@ -179,17 +183,13 @@ def _path_of(whole: Node, name: str) -> Path:
     return behaviors[name]
 
 
-def _number(parent: Node, place: int, without: Path | None = None) -> int:
+def _number(parent: Element, place: int, without: Path | None = None) -> int:
     """Return the number among all elements of the parent, once one is taken out, of a place among its behaviors."""
     children = [child for child in parent.children if child.path != without]
     numbers = [number for number, child in enumerate(children) if child.tag == BEHAVIOR]
     if 0 < place <= len(numbers):
         return numbers[place - 1]
     return numbers[-1] + 1 if numbers else len(children)
-
-
-def _column(text: bytes, node: Node) -> int:
-    return len(text[text.rfind(b"\n", 0, node.begin) + 1 : node.begin].decode())
 
 
 # ---------------------------------------------------------------------- what follows

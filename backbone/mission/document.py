@@ -16,12 +16,13 @@ import bisect
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import NamedTuple
 from xml.parsers import expat
 
+from backbone.errors import Refusal
 from backbone.mission.declaration.values import decimal, flag
-from backbone.mission.report import Place, Report, quoted
+from backbone.mission.report import MissionInvalid, Place, Report, quoted
 
 MAX_BYTES = 1024 * 1024  # chosen: a robot with its behavior is 600 bytes, so this is more than a thousand robots
 MAX_ELEMENTS = 20_000  # chosen: same; a robot with its behavior is 10 elements
@@ -31,6 +32,17 @@ BEGINNING = Place(1, 1)
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _ATTRIBUTE = re.compile(rb"""(\s+)([^\s=<>"'/]+)\s*=\s*("[^"]*"|'[^']*')""")
+
+
+Path = tuple[int, ...]
+"""Path of an element: its number among its parent's children, from 0, from the root down; the root's is empty."""
+
+
+class EditRefused(Refusal):
+    """A change of a mission file that cannot be made; the text is as it was."""
+
+    code = "mission.edit"
+    remedy = "Look at the tree: docs/reference/mission-file.md lists the place of each element."
 
 
 @dataclass(slots=True)
@@ -72,6 +84,9 @@ class Element:
 
     The reading methods never fail: a value that is missing or illegal is reported by the validation, and reads as
     empty here.
+
+    Attributes:
+        path: Where it stands among the elements of its file.
     """
 
     tag: str
@@ -79,12 +94,38 @@ class Element:
     attributes: dict[str, Attribute] = field(default_factory=dict)
     children: list[Element] = field(default_factory=list)
     span: Span = NOWHERE
+    path: Path = ()
+
+    @property
+    def values(self) -> dict[str, str]:
+        """Its attributes in the order of the text."""
+        return {name: attribute.value for name, attribute in self.attributes.items()}
 
     def __iter__(self) -> Iterator[Element]:
         """Yield this element and all below it, in the order of the file."""
         yield self
         for child in self.children:
             yield from child
+
+    def at(self, path: Path) -> Element:
+        """Return the element at a path below this one.
+
+        Raises:
+            EditRefused: There is none.
+        """
+        element = self
+        for number in path:
+            if not 0 <= number < len(element.children):
+                raise EditRefused(f"no element stands at {'/'.join(map(str, path))}", remedy="Pick another.")
+            element = element.children[number]
+        return element
+
+    def nearest(self, path: Path) -> Path:
+        """Return the path as far down as elements stand there."""
+        element, depth = self, 0
+        while depth < len(path) and path[depth] < len(element.children):
+            element, depth = element.children[path[depth]], depth + 1
+        return path[:depth]
 
     def all(self, tag: str) -> list[Element]:
         """Return the children of this tag."""
@@ -152,7 +193,7 @@ def attribute_spans(data: bytes, begin: int, content: int) -> dict[str, Attribut
     }
 
 
-def read_bytes(path: Path, report: Report) -> bytes | None:
+def read_bytes(path: FilePath, report: Report) -> bytes | None:
     """Return what the file holds; None, with a fault, if it cannot be a mission file."""
     try:
         if path.exists() and not path.is_file():
@@ -179,6 +220,19 @@ def parse(data: bytes, report: Report) -> Element | None:
         report.fault(lines.place(error.start), f"byte 0x{data[error.start]:02x} is no UTF-8", "Save the file in UTF-8.")
         return None
     return _Parse(data, lines, report).root()
+
+
+def outline(data: bytes) -> Element:
+    """Return the root of a mission file's text, as it is written: nothing is filled in.
+
+    Raises:
+        MissionInvalid: It is not well-formed XML, or is hostile; with the reader's faults.
+    """
+    report = Report("mission")
+    root = parse(data, report)
+    if root is None:
+        raise MissionInvalid(report.faults())
+    return root
 
 
 def _first_byte(data: bytes) -> int:
@@ -274,7 +328,9 @@ class _Parse:
             name: Attribute(value, self._lines.place(spans[name].name)) for name, value in values.items()
         }
         if self._open:
-            self._open[-1].children.append(element)
+            parent = self._open[-1]
+            element.path = (*parent.path, len(parent.children))
+            parent.children.append(element)
         else:
             self._root = element
         self._open.append(element)

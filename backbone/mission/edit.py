@@ -5,7 +5,7 @@ as a person would have written it: one element a line, indented like its neighbo
 
 Rules of this file:
 
-* What stands where is the reader's to say: a node is one of the elements it found.
+* What stands where is the reader's to say: an element is one of those it found.
 * A change is made in text, then read again; one after which the text could not be read is refused.
 * Only what can be written down is refused here. Whether names and values fit is the reader's to say.
 """
@@ -17,14 +17,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from backbone.mission.declaration.vocabulary import vocabulary
-from backbone.mission.document import MAX_BYTES, attribute_spans, parse
-from backbone.mission.outline import EditRefused, Node, Path, outline
+from backbone.mission.document import MAX_BYTES, EditRefused, Element, Path, attribute_spans, outline, parse
 from backbone.mission.report import Report, listed, quoted
 
 __all__ = [
     "EditRefused",
+    "Element",
     "NewElement",
-    "Node",
     "Path",
     "add",
     "insert",
@@ -72,7 +71,7 @@ def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> byte
     """
     node = outline(data).at(path)
     _may_have(node.tag, name)
-    spans = attribute_spans(data, node.begin, node.content)
+    spans = attribute_spans(data, node.span.begin, node.span.content)
     if value is None:
         if name not in spans:
             return data
@@ -83,13 +82,13 @@ def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> byte
         return _readable(data[:begin] + _quoted(value, quote) + data[spans[name].end :])
     order = list(vocabulary()[node.tag].attributes)
     before = [span.end for other, span in spans.items() if other in order[: order.index(name)]]
-    head = node.begin + 1 + len(node.tag.encode())
+    head = node.span.begin + 1 + len(node.tag.encode())
     at = max(before, default=head)
     text = f"{name}=".encode() + _quoted(value)
     blank = b" "
     line_begin, line_end = data.rfind(b"\n", 0, at) + 1, data.find(b"\n", at)
     if spans and len(data[line_begin:line_end].rstrip().decode()) + 1 + len(text.decode()) > LINE_LENGTH:
-        blank = _newline(data) + _indent(data, node.begin).encode() + b" " * (len(node.tag) + 2)
+        blank = _newline(data) + _indent(data, node.span.begin).encode() + b" " * (len(node.tag) + 2)
     return _readable(data[:at] + blank + text + data[at:])
 
 
@@ -128,11 +127,13 @@ def insert(data: bytes, parent: Path, other: bytes, at: int) -> bytes:
     """
     node, new = outline(data).at(parent), outline(other)
     _may_hold(node, new.tag)
-    text = _indented(other[new.begin : new.end], _indent(other, new.begin), _indent_of_children(data, node))
+    text = _indented(
+        other[new.span.begin : new.span.end], _indent(other, new.span.begin), _indent_of_children(data, node)
+    )
     return _insert(data, node, min(max(at, 0), len(node.children)), text)
 
 
-def place_for(parent: Node, tag: str, at: int | None = None) -> int:
+def place_for(parent: Element, tag: str, at: int | None = None) -> int:
     """Return the number a new child would have among its siblings.
 
     Args:
@@ -184,8 +185,8 @@ def move(data: bytes, path: Path, parent: Path, at: int) -> bytes:
     if len(parent) > depth and parent[:depth] == path[:-1] and parent[depth] > path[-1]:
         parent = (*parent[:depth], parent[depth] - 1, *parent[depth + 1 :])
     after = outline(cut).at(parent)
-    old_indent, new_indent = _indent(data, node.begin), _indent_of_children(cut, after)
-    text = _indented(data[node.begin : node.end], old_indent, new_indent)
+    old_indent, new_indent = _indent(data, node.span.begin), _indent_of_children(cut, after)
+    text = _indented(data[node.span.begin : node.span.end], old_indent, new_indent)
     return _insert(cut, after, min(max(at, 0), len(after.children)), text)
 
 
@@ -199,7 +200,7 @@ def _may_have(tag: str, name: str) -> None:
         )
 
 
-def _may_hold(node: Node, tag: str) -> None:
+def _may_hold(node: Element, tag: str) -> None:
     rule = vocabulary().get(node.tag)
     allowed = {} if rule is None else rule.children
     if tag not in allowed:
@@ -267,43 +268,43 @@ def _written(new: NewElement, indent: str) -> bytes:
     return "\n".join(lines).encode()
 
 
-def _insert(data: bytes, parent: Node, number: int, text: bytes, *, apart: bool = False) -> bytes:
+def _insert(data: bytes, parent: Element, number: int, text: bytes, *, apart: bool = False) -> bytes:
     """Return the data with a text in the parent, before its child of this number."""
     newline = _newline(data)
     text = re.sub(rb"\r?\n", newline, text)
-    own_indent, indent = _indent(data, parent.begin).encode(), _indent_of_children(data, parent).encode()
-    if not parent.children and not data[parent.content : parent.close].strip():
+    own_indent, indent = _indent(data, parent.span.begin).encode(), _indent_of_children(data, parent).encode()
+    if not parent.children and not data[parent.span.content : parent.span.close].strip():
         inside = newline + indent + text + newline + own_indent
-        if parent.is_empty:
-            head = data[parent.begin : parent.content - 2].rstrip()
-            tail = data[parent.end :]
-            return _readable(data[: parent.begin] + head + b">" + inside + f"</{parent.tag}>".encode() + tail)
-        return _readable(data[: parent.content] + inside + data[parent.close :])
+        if parent.span.content == parent.span.end:
+            head = data[parent.span.begin : parent.span.content - 2].rstrip()
+            tail = data[parent.span.end :]
+            return _readable(data[: parent.span.begin] + head + b">" + inside + f"</{parent.tag}>".encode() + tail)
+        return _readable(data[: parent.span.content] + inside + data[parent.span.close :])
     gap = newline * 2 if apart else newline
     if not parent.children:
-        at = len(data[: parent.close].rstrip())
+        at = len(data[: parent.span.close].rstrip())
         return _readable(data[:at] + gap + indent + text + data[at:])
     if number > 0:
         before = parent.children[number - 1]
-        if not _is_first_in_line(data, before.begin):
-            return _readable(data[: before.end] + text + data[before.end :])
+        if not _is_first_in_line(data, before.span.begin):
+            return _readable(data[: before.span.end] + text + data[before.span.end :])
         at = _behind(data, before)
         return _readable(data[:at] + gap + indent + text + data[at:])
     first = parent.children[0]
-    if _is_first_in_line(data, first.begin):
-        start = data.rfind(b"\n", 0, first.begin) + 1
+    if _is_first_in_line(data, first.span.begin):
+        start = data.rfind(b"\n", 0, first.span.begin) + 1
         return _readable(data[:start] + indent + text + gap + data[start:])
-    return _readable(data[: first.begin] + text + data[first.begin :])
+    return _readable(data[: first.span.begin] + text + data[first.span.begin :])
 
 
-def _behind(data: bytes, node: Node) -> int:
+def _behind(data: bytes, node: Element) -> int:
     """Return where the element ends, with a comment that ends its line."""
-    comment = _LINE_END_COMMENT.match(data, node.end)
-    return comment.end() if comment else node.end
+    comment = _LINE_END_COMMENT.match(data, node.span.end)
+    return comment.end() if comment else node.span.end
 
 
-def _cut(data: bytes, node: Node, parent: Node) -> bytes:
-    begin, end = node.begin, node.end
+def _cut(data: bytes, node: Element, parent: Element) -> bytes:
+    begin, end = node.span.begin, node.span.end
     rest = re.compile(rb"[ \t]*(\r?\n)").match(data, end)
     if _is_first_in_line(data, begin) and rest:
         begin, end = data.rfind(b"\n", 0, begin) + 1, rest.end()
@@ -311,11 +312,11 @@ def _cut(data: bytes, node: Node, parent: Node) -> bytes:
         if blank and re.search(rb"(?:^|\n)[ \t]*\r?\n\Z", data[:begin]):
             end = blank.end()
     left, right = data[:begin], data[end:]
-    inside = data[parent.content : begin] + data[end : parent.close]
+    inside = data[parent.span.content : begin] + data[end : parent.span.close]
     if inside.strip():
         return left + right
-    head = data[parent.begin : parent.content - 1].rstrip()
-    return data[: parent.begin] + head + b"/>" + data[parent.end :]
+    head = data[parent.span.begin : parent.span.content - 1].rstrip()
+    return data[: parent.span.begin] + head + b"/>" + data[parent.span.end :]
 
 
 def _newline(data: bytes) -> bytes:
@@ -331,11 +332,11 @@ def _indent(data: bytes, at: int) -> str:
     return line[: len(line) - len(line.lstrip())].decode()
 
 
-def _indent_of_children(data: bytes, node: Node) -> str:
+def _indent_of_children(data: bytes, node: Element) -> str:
     for child in node.children:
-        if _is_first_in_line(data, child.begin):
-            return _indent(data, child.begin)
-    return _indent(data, node.begin) + STEP
+        if _is_first_in_line(data, child.span.begin):
+            return _indent(data, child.span.begin)
+    return _indent(data, node.span.begin) + STEP
 
 
 def _indented(text: bytes, old: str, new: str) -> bytes:
@@ -362,6 +363,6 @@ def _shifted(text: bytes, old: str, new: str) -> bytes:
     return re.sub(rb"\n" + re.escape(old.encode()) + rb"(?!\r?\n)", b"\n" + new.encode(), text)
 
 
-def _stands_apart(data: bytes, node: Node) -> bool:
+def _stands_apart(data: bytes, node: Element) -> bool:
     """Return whether there is an empty line between the children."""
-    return bool(re.search(rb"\n[ \t]*\r?\n", data[node.content : node.close]))
+    return bool(re.search(rb"\n[ \t]*\r?\n", data[node.span.content : node.span.close]))

@@ -13,7 +13,7 @@ from functools import lru_cache
 from importlib import resources
 
 from backbone.mission.class_facts import ClassFacts
-from backbone.mission.edit import Node, outline
+from backbone.mission.edit import Element, outline
 from backbone.mission.shipped_types import shipped_text
 from backbone.naming import Subsystem
 
@@ -52,7 +52,7 @@ class TypeEntry:
     is_declared: bool
 
 
-def stock() -> Node:
+def stock() -> Element:
     """Return the project's own types, as a mission without anything else."""
     return outline(shipped_text())
 
@@ -62,17 +62,17 @@ def new_text() -> bytes:
     return resources.files("ui_console.design").joinpath("new.xml").read_bytes()
 
 
-def stock_type(name: str) -> Node | None:
+def stock_type(name: str) -> Element | None:
     """Return the type of this name from the project's own list."""
     return _types().get(name)
 
 
-def stock_resource(kind: str) -> Node | None:
+def stock_resource(kind: str) -> Element | None:
     """Return the first shape of a resource of this type."""
     return next((one for one in _shapes() if one.text("type") == kind), None)
 
 
-def entries(mission: Node) -> list[TypeEntry]:
+def entries(mission: Element) -> list[TypeEntry]:
     """Return every type: the file's own in its order, then the project's.
 
     Args:
@@ -119,19 +119,19 @@ def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
 
 
 @lru_cache(maxsize=1)
-def _types() -> dict[str, Node]:
+def _types() -> dict[str, Element]:
     found = stock().first("types")
     return {} if found is None else {one.text("name"): one for one in found.children}
 
 
 @lru_cache(maxsize=1)
-def _shapes() -> tuple[Node, ...]:
+def _shapes() -> tuple[Element, ...]:
     shapes = outline(resources.files("ui_console.design").joinpath("stock.xml").read_bytes())
     found = shapes.first("resources")
-    return () if found is None else found.children
+    return () if found is None else tuple(found.children)
 
 
-def _entry(declared: Node, world_type: str, *, is_stock: bool, is_declared: bool) -> TypeEntry:
+def _entry(declared: Element, world_type: str, *, is_stock: bool, is_declared: bool) -> TypeEntry:
     needs = {needed.text("role") or needed.text("type"): needed.text("type") for needed in declared.all("needs")}
     return TypeEntry(
         declared.text("name"),
@@ -144,7 +144,7 @@ def _entry(declared: Node, world_type: str, *, is_stock: bool, is_declared: bool
     )
 
 
-def _role(declared: Node, needs: Mapping[str, str], world_type: str) -> Role:
+def _role(declared: Element, needs: Mapping[str, str], world_type: str) -> Role:
     match declared.text("subsystem"):
         case Subsystem.MISSION_CONTROL:
             return Role.BEHAVIOR

@@ -17,7 +17,7 @@ from backbone.atomic_file import remove_leftover
 from backbone.dry_run.run import DryRun, dry_run
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.document import read_bytes
-from backbone.mission.edit import Node, Path, outline, set_attribute
+from backbone.mission.edit import Element, Path, outline, set_attribute
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import Fault, MissionInvalid, read_mission_bytes
 from backbone.mission.report import Report
@@ -87,7 +87,7 @@ class Draft:
         return self.text != self.saved
 
     @cached_property
-    def mission(self) -> Node:
+    def mission(self) -> Element:
         """The tree of the text."""
         return outline(self.text)
 
@@ -166,17 +166,10 @@ class Draft:
 
     def element_of(self, fault: Fault) -> Path:
         """Return the element of a problem: the last one that begins before its place."""
-        positions, paths = self._beginnings
-        return paths[max(0, bisect.bisect_right(positions, (fault.line, fault.column)) - 1)]
+        before = bisect.bisect_right(self._elements, (fault.line, fault.column), key=lambda element: element.place)
+        return self._elements[max(0, before - 1)].path
 
     @cached_property
-    def _beginnings(self) -> tuple[list[tuple[int, int]], list[Path]]:
-        """Return line and column of every element in the order of the text, and the elements."""
-        text, line, before = self.text, 1, 0
-        positions, paths = [], []
-        for node in self.mission:
-            line, before = line + text.count(b"\n", before, node.begin), node.begin
-            line_begin = text.rfind(b"\n", 0, node.begin) + 1
-            positions.append((line, len(text[line_begin : node.begin].decode("utf-8-sig")) + 1))
-            paths.append(node.path)
-        return positions, paths
+    def _elements(self) -> list[Element]:
+        """All elements in the order of the text."""
+        return list(self.mission)

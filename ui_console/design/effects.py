@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from backbone.mission import edit
-from backbone.mission.edit import NewElement, Node, Path, outline, place_for
+from backbone.mission.edit import Element, NewElement, Path, outline, place_for
 from backbone.mission.report import quoted
 from backbone.mission.tables import NETWORK_ID, WORLD
 from backbone.naming import legal
@@ -77,8 +77,8 @@ def _no_type(name: str) -> DesignRefused:
     )
 
 
-def _copy(node: Node) -> NewElement:
-    return NewElement(node.tag, dict(node.attributes), [_copy(child) for child in node.children])
+def _copy(node: Element) -> NewElement:
+    return NewElement(node.tag, dict(node.values), [_copy(child) for child in node.children])
 
 
 @command
@@ -150,7 +150,7 @@ def add_resource(text: bytes, kind: str, name: str) -> TextState:
             children.append(NewElement("parameter", {"name": NETWORK_ID, "value": str(_free_network_id(root))}))
         else:
             children.append(_copy(part))
-    values = {**shape.attributes, "name": name}
+    values = {**shape.values, "name": name}
     step = _added(text, section, NewElement("resource", values, children))
     return TextState(_with_bodies(step.text, name), step.touched)
 
@@ -198,11 +198,11 @@ def _number(value: str, otherwise: float) -> float:
     return found if 0 < found <= 1000 else otherwise
 
 
-def _network_id(resource: Node) -> str | None:
+def _network_id(resource: Element) -> str | None:
     return next((one.text("value") for one in resource.all("parameter") if one.text("name") == NETWORK_ID), None)
 
 
-def _free_network_id(root: Node) -> int:
+def _free_network_id(root: Element) -> int:
     taken = {_network_id(node) for node in root if node.tag == "resource"}
     free = next((number for number in range(1, LAST_NETWORK_ID + 1) if str(number) not in taken), None)
     if free is None:
@@ -267,7 +267,7 @@ def write_parameter(text: bytes, path: Path, name: str, value: str | None) -> Te
 
 
 # ---------------------------------------------------------------------- names
-def _free(root: Node, tag: str, name: str) -> None:
+def _free(root: Element, tag: str, name: str) -> None:
     """Refuse a name that is illegal, or another's of its kind.
 
     Raises:
@@ -284,7 +284,7 @@ def _free(root: Node, tag: str, name: str) -> None:
 _ONE_SPACE = ("resource", "behavior", "world")  # components of the mission; all their names differ
 
 
-def _is_named(root: Node, node: Node) -> bool:
+def _is_named(root: Element, node: Element) -> bool:
     """Return whether the element has a name of its own, so is no reference to another one."""
     return node.tag not in ("wish", "uses", "parameter") and node is not root
 
@@ -309,7 +309,7 @@ def rename(text: bytes, path: Path, name: str) -> TextState:
     return TextState(text, path)
 
 
-def _mentions(root: Node, node: Node, old: str, new: str) -> Iterator[tuple[Node, str, str]]:
+def _mentions(root: Element, node: Element, old: str, new: str) -> Iterator[tuple[Element, str, str]]:
     """Yield each element that refers to another by its name, the attribute, and the attribute's new value."""
     find = _MENTIONS.get(node.tag)
     for other in root:
@@ -319,7 +319,7 @@ def _mentions(root: Node, node: Node, old: str, new: str) -> Iterator[tuple[Node
                 yield other, attribute, " ".join(new if word == old else word for word in words)
 
 
-def _of_type(_node: Node, other: Node) -> list[str]:
+def _of_type(_node: Element, other: Element) -> list[str]:
     match other.tag:
         case "service" | "resource" | "world" | "behavior" | "needs" | "wish" | "uses":
             return ["type"]
@@ -331,18 +331,18 @@ def _of_type(_node: Node, other: Node) -> list[str]:
             return []
 
 
-def _of_resource(node: Node, other: Node) -> list[str]:
+def _of_resource(node: Element, other: Element) -> list[str]:
     if other.tag == "robot":
         return ["name"]
     is_mention = other.tag in ("wish", "uses") and other.text("type") == node.text("type")
     return ["name"] if is_mention else []
 
 
-def _of_world(_node: Node, other: Node) -> list[str]:
+def _of_world(_node: Element, other: Element) -> list[str]:
     return ["value"] if other.tag == "parameter" and other.text("name") in WORLD_NAMED_BY else []
 
 
-_MENTIONS: dict[str, Callable[[Node, Node], list[str]]] = {
+_MENTIONS: dict[str, Callable[[Element, Element], list[str]]] = {
     "host": lambda _node, other: ["host"] if other.tag in ("service", "resource", "world") else [],
     "type": _of_type,
     "resource": _of_resource,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-from backbone.mission.edit import Node, Path
+from backbone.mission.edit import Element, Path
 from ui_console.design.draft import Draft
 
 
@@ -26,18 +26,18 @@ def follower(before: Draft, after: Draft) -> Callable[[Path], Path]:
     prefix = _alike(old, new)
     most = min(len(old), len(new)) - prefix
     suffix = _alike(old[len(old) - most :][::-1], new[len(new) - most :][::-1])
-    once = Counter(old[node.begin : node.content] for node in before.mission)
-    by_begin = {node.begin: node.path for node in after.mission}
+    once = Counter(old[node.span.begin : node.span.content] for node in before.mission)
+    by_begin = {node.span.begin: node.path for node in after.mission}
     by_head: dict[bytes, list[Path]] = {}
     for node in after.mission:
-        by_head.setdefault(new[node.begin : node.content], []).append(node.path)
+        by_head.setdefault(new[node.span.begin : node.span.content], []).append(node.path)
 
-    def same(node: Node) -> Path | None:
-        if node.content <= prefix:
-            return by_begin.get(node.begin)
-        if node.begin >= len(old) - suffix:
-            return by_begin.get(node.begin + len(new) - len(old))
-        head = old[node.begin : node.content]
+    def same(node: Element) -> Path | None:
+        if node.span.content <= prefix:
+            return by_begin.get(node.span.begin)
+        if node.span.begin >= len(old) - suffix:
+            return by_begin.get(node.span.begin + len(new) - len(old))
+        head = old[node.span.begin : node.span.content]
         found = by_head.get(head, [])
         return found[0] if len(found) == once[head] == 1 else None
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import msgspec
 
 from backbone.mission.declaration.vocabulary import vocabulary
-from backbone.mission.edit import NewElement, Node, Path
+from backbone.mission.edit import Element, NewElement, Path
 from backbone.mission.report import listed, quoted
 from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
 from ui_console.design.commands import DesignCommand, DesignRefused
@@ -75,7 +75,7 @@ class Offer:
         return self.build(answers)
 
 
-def offers(mission: Node, path: Path) -> list[Offer]:
+def offers(mission: Element, path: Path) -> list[Offer]:
     """Return the possible additions: to an element first, then to its ancestors, each kind at the nearest place.
 
     Args:
@@ -89,7 +89,7 @@ def offers(mission: Node, path: Path) -> list[Offer]:
     return list(found.values())
 
 
-def offer_at(mission: Node, path: Path, label: str) -> Offer:
+def offer_at(mission: Element, path: Path, label: str) -> Offer:
     """Return the offer of this label at an element; for an addition to an ARC, a behavior stands for its ARC.
 
     Raises:
@@ -109,7 +109,7 @@ def offer_at(mission: Node, path: Path, label: str) -> Offer:
     )
 
 
-def free_name(mission: Node, wished: str) -> str:
+def free_name(mission: Element, wished: str) -> str:
     """Return the name, or the first one like it with another number, that no component has.
 
     Example: with ``scout1`` taken, ``scout1`` gives ``scout2``.
@@ -123,7 +123,7 @@ def free_name(mission: Node, wished: str) -> str:
     return f"{stem}{number}"
 
 
-def _offers(mission: Node, node: Node) -> list[Offer]:
+def _offers(mission: Element, node: Element) -> list[Offer]:
     match node.tag:
         case "mission":
             missing = [] if mission.first("world") is not None else [_world()]
@@ -155,11 +155,11 @@ def _offers(mission: Node, node: Node) -> list[Offer]:
             return [offer for tag in tags for offer in _generic(mission, node, tag)]
 
 
-def _of(mission: Node, role: Role) -> list[TypeEntry]:
+def _of(mission: Element, role: Role) -> list[TypeEntry]:
     return [one for one in entries(mission) if one.role is role]
 
 
-def _behaviors(mission: Node, node: Node) -> list[Offer]:
+def _behaviors(mission: Element, node: Element) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
         rules = vocabulary()["behavior"].attributes
         asks = (
@@ -176,7 +176,7 @@ def _behaviors(mission: Node, node: Node) -> list[Offer]:
     return [offer(entry) for entry in _of(mission, Role.BEHAVIOR)]
 
 
-def _claims(mission: Node, node: Node) -> list[Offer]:
+def _claims(mission: Element, node: Element) -> list[Offer]:
     doc = vocabulary()["arc"].attributes["minimum-runtime-s"].documentation
     asks = (Prompt("minimum-runtime-s", doc, MINIMUM_RUNTIME_S),)
 
@@ -187,7 +187,7 @@ def _claims(mission: Node, node: Node) -> list[Offer]:
     return [offer(entry) for entry in _of(mission, Role.ARC)]
 
 
-def _wishes(mission: Node, node: Node) -> list[Offer]:
+def _wishes(mission: Element, node: Element) -> list[Offer]:
     needs: Mapping[str, str] = next((one.needs for one in entries(mission) if one.name == node.text("kind")), {})
     wished = {one.text("type") for one in node.all("wish")}
 
@@ -205,7 +205,7 @@ def _wishes(mission: Node, node: Node) -> list[Offer]:
     return [offer(role, kind) for role, kind in needs.items() if role not in wished]
 
 
-def _resources(mission: Node) -> list[Offer]:
+def _resources(mission: Element) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
         shape = stock_resource(entry.name)
         name = shape.text("name") if shape is not None else entry.name
@@ -226,14 +226,14 @@ def _world() -> Offer:
     )
 
 
-def _types(mission: Node) -> list[Offer]:
+def _types(mission: Element) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
         return Offer(f"type {entry.name}", entry.class_path, (), lambda _given: add_type(entry.name))
 
     return [offer(entry) for entry in entries(mission) if not entry.is_declared]
 
 
-def _parameter(node: Node) -> Offer:
+def _parameter(node: Element) -> Offer:
     rules = vocabulary()["parameter"].attributes
     asks = (
         Prompt("name", rules["name"].documentation),
@@ -247,10 +247,10 @@ def _parameter(node: Node) -> Offer:
     )
 
 
-def _generic(mission: Node, node: Node, tag: str) -> list[Offer]:
+def _generic(mission: Element, node: Element, tag: str) -> list[Offer]:
     """Return an offer of an element by its schema, with a question for each required attribute."""
     rule = vocabulary()[tag]
-    new = Node((*node.path, 0), tag, {}, (), 0, 0, 0, 0, 0, is_empty=True)
+    new = Element(tag, node.place, path=(*node.path, 0))
     required = [name for name, one in rule.attributes.items() if one.required]
     asks = [
         Prompt(

@@ -11,7 +11,7 @@ import msgspec
 
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
-from backbone.mission.edit import Node, Path
+from backbone.mission.edit import Element, Path
 from ui_console.design.catalogue import Role, entries
 from ui_console.design.commands import DesignCommand
 from ui_console.design.effects import rename, set_value, write_parameter
@@ -51,7 +51,7 @@ class Property(msgspec.Struct, frozen=True):
         return set_value(path, self.name, value or None)
 
 
-def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> list[Property]:
+def properties(mission: Element, node: Element, facts: Mapping[str, ClassFacts]) -> list[Property]:
     """Return all properties of an element, attributes first.
 
     Args:
@@ -65,9 +65,9 @@ def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> li
     found = [
         Property(
             name,
-            node.attributes.get(name),
+            node.values.get(name),
             one.default,
-            one.required and name not in node.attributes,
+            one.required and name not in node.values,
             is_parameter=False,
             doc=one.documentation,
             choices=choices(mission, node, name, one.words),
@@ -77,7 +77,7 @@ def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> li
     return found + (_parameters(mission, node, facts) if node.tag in HAVE_PARAMETERS else [])
 
 
-def choices(mission: Node, node: Node, attribute: str, words: tuple[str, ...] = ()) -> tuple[str, ...]:
+def choices(mission: Element, node: Element, attribute: str, words: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the sensible values of an attribute at its place; none if they cannot be listed."""
     match node.tag, attribute:
         case (_, "host"):
@@ -103,12 +103,12 @@ def choices(mission: Node, node: Node, attribute: str, words: tuple[str, ...] = 
             return words
 
 
-def class_of(mission: Node, node: Node) -> str:
+def class_of(mission: Element, node: Element) -> str:
     """Return the class path of an element's component; empty if that is not known."""
     return next((one.class_path for one in entries(mission) if one.name == node.text("type")), "")
 
 
-def _parameters(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> list[Property]:
+def _parameters(mission: Element, node: Element, facts: Mapping[str, ClassFacts]) -> list[Property]:
     given = {one.text("name"): one.text("value") for one in node.all("parameter")}
     known = facts.get(class_of(mission, node), ClassFacts()).parameters
     found = [
@@ -132,10 +132,10 @@ def _parameters(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> l
     ]
 
 
-def _names(mission: Node, section: str) -> tuple[str, ...]:
+def _names(mission: Element, section: str) -> tuple[str, ...]:
     found = mission.first(section)
     return () if found is None else tuple(one.text("name") for one in found.children)
 
 
-def _of_role(mission: Node, role: Role) -> tuple[str, ...]:
+def _of_role(mission: Element, role: Role) -> tuple[str, ...]:
     return tuple(one.name for one in entries(mission) if one.role is role)

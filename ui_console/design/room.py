@@ -183,7 +183,7 @@ class DesignRoom:
             case LookUp(type=name):
                 await self._learn_type(name)
             case ReadText():
-                text, line = self.draft.text.decode("utf-8-sig"), self.draft.mission.at(client.at).line
+                text, line = self.draft.text.decode("utf-8-sig"), self.draft.mission.at(client.at).place.line
                 client.answer(TextAnswer(text, line, self.draft.source))
             case _:
                 assert_never(intent)

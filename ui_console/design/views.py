@@ -12,7 +12,7 @@ import msgspec
 from backbone.dry_run.run import DryRun
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
-from backbone.mission.edit import Node, Path
+from backbone.mission.edit import Element, Path
 from backbone.scheduling.rehearsal import Run
 from backbone.spoken import counted
 from ui_console.design.catalogue import Role, TypeEntry, description, entries
@@ -217,7 +217,7 @@ def tree_view(draft: Draft) -> list[ElementRow]:
     ]
 
 
-def summary(node: Node) -> str:
+def summary(node: Element) -> str:
     """Return a few words that distinguish an element from its siblings."""
     words = [node.text(name) for name in ("name", "type", "kind") if node.text(name)]
     if node.tag in ("wish", "uses"):
@@ -248,7 +248,7 @@ def places() -> dict[str, list[str]]:
     return {tag: list(rule.children) for tag, rule in vocabulary().items()}
 
 
-def palette(mission: Node, facts: Mapping[str, ClassFacts]) -> list[PaletteRow]:
+def palette(mission: Element, facts: Mapping[str, ClassFacts]) -> list[PaletteRow]:
     """Return the rows that can be dragged into the tree: component types, wishes for resources, parts of a room.
 
     Args:
@@ -285,7 +285,7 @@ def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> E
         path,
         node.tag,
         summary(node),
-        node.line,
+        node.place.line,
         "" if rule is None else rule.documentation,
         () if known is None else tuple(known.doc.splitlines()),
         tuple(properties(mission, node, facts)),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.document import MAX_BYTES
-from backbone.mission.edit import EditRefused, NewElement, Node, add, move, outline, remove, set_attribute
+from backbone.mission.edit import EditRefused, Element, NewElement, add, move, outline, remove, set_attribute
 from backbone.mission.reader import MissionInvalid
 
 MISSION = (FilePath(__file__).parent / "everything_declared.xml").read_bytes()
@@ -44,8 +44,8 @@ COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 Tree = list  # [tag, attributes, children], as a person would keep book
 
 
-def tree(node: Node) -> Tree:
-    return [node.tag, dict(node.attributes), [tree(child) for child in node.children]]
+def tree(node: Element) -> Tree:
+    return [node.tag, dict(node.values), [tree(child) for child in node.children]]
 
 
 def at(root: Tree, path: tuple[int, ...]) -> Tree:
@@ -99,7 +99,7 @@ def test_any_sequence_of_changes_does_to_the_text_what_it_does_to_a_tree(text: b
             case "remove":
                 if not node.path:
                     continue
-                inside = comments(text[node.begin : node.end])
+                inside = comments(text[node.span.begin : node.span.end])
                 text = remove(text, node.path)
                 at(expected, node.path[:-1])[2].pop(node.path[-1])
                 assert comments(text) == sorted(rest(before, inside))
@@ -145,7 +145,7 @@ def test_what_is_added_and_removed_again_leaves_no_trace(text: bytes, data: st.D
     more = add(text, node.path, NewElement(data.draw(st.sampled_from(tags))), number)
     again = remove(more, (*node.path, number))
     assert b" ".join(again.split()) == b" ".join(text.split())
-    if node.line != node.children[0].line:
+    if node.place.line != node.children[0].place.line:
         assert again == text
 
 
@@ -222,7 +222,7 @@ def test_an_element_that_moves_is_indented_anew_with_all_in_it() -> None:
 def test_line_breaks_inside_a_value_do_not_move_with_it() -> None:
     text = move(SMALL, (2, 1), (2,), 0)
     deeper = move(text, (2, 0), (2, 1), 0)
-    assert outline(deeper).at((2, 0, 0, 0)).attributes == outline(SMALL).at((2, 1, 0)).attributes
+    assert outline(deeper).at((2, 0, 0, 0)).values == outline(SMALL).at((2, 1, 0)).values
     assert b"of the parameter" in deeper
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backbone.mission.class_facts import ClassFacts, ParameterFacts
-from backbone.mission.edit import NewElement, Node
+from backbone.mission.edit import Element, NewElement
 from ui_console.design.draft import Draft
 from ui_console.design.effects import add, add_behavior, add_resource, add_world, claim_arc, set_value
 
@@ -37,7 +37,7 @@ def tutorial_draft(source: str = "guard.xml") -> Draft:
     return draft
 
 
-def element(draft: Draft, tag: str, name: str) -> Node:
+def element(draft: Draft, tag: str, name: str) -> Element:
     """Return the one element of this tag and name."""
     (found,) = [node for node in draft.mission if (node.tag, node.text("name")) == (tag, name)]
     return found

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from backbone.errors import Refusal
 from backbone.mission.class_facts import ClassFacts, ParameterFacts
-from backbone.mission.edit import NewElement, Node, outline
+from backbone.mission.edit import Element, NewElement, outline
 from backbone.mission.reader import MissionInvalid, read_mission
 from ui_console.design.catalogue import Role, entries, stock
 from ui_console.design.commands import DesignCommand, DesignRefused, ElementNameTaken, NothingToUndo, TextState
@@ -51,7 +51,7 @@ def designed(*commands: DesignCommand, draft: Draft | None = None) -> Draft:
     return draft
 
 
-def only(draft: Draft, tag: str, name: str) -> Node:
+def only(draft: Draft, tag: str, name: str) -> Element:
     (found,) = [node for node in draft.mission if node.tag == tag and node.text("name") == name]
     return found
 
@@ -133,7 +133,7 @@ def removed_by(draft: Draft, command: DesignCommand) -> bytes:
     if command.effect is not remove(()).effect:
         return b""
     node = draft.mission.at(command.arguments[0])
-    return draft.text[node.begin : node.end]
+    return draft.text[node.span.begin : node.span.end]
 
 
 @settings(max_examples=share(25), suppress_health_check=list(HealthCheck))
@@ -231,12 +231,12 @@ def test_a_last_branch_is_offered_once_gets_one_root_and_is_told_with_its_time()
 
 def test_the_shipped_types_are_those_that_an_old_file_declares() -> None:
     written = {
-        one.text("name"): (one.attributes, [needed.attributes for needed in one.all("needs")])
+        one.text("name"): (one.values, [needed.values for needed in one.all("needs")])
         for file in [EVERYTHING_DECLARED]
         for one in Draft.opened(str(file)).mission.first("types").all("type")  # type: ignore[union-attr]
     }
     listed = {
-        one.text("name"): (one.attributes, [needed.attributes for needed in one.all("needs")])
+        one.text("name"): (one.values, [needed.values for needed in one.all("needs")])
         for one in stock().first("types").all("type")  # type: ignore[union-attr]
     }
     assert written == {name: listed[name] for name in written}
@@ -258,7 +258,7 @@ def test_a_robot_gets_what_it_is_tied_to_the_next_network_id_and_a_body() -> Non
         ("video_frequency", "video1"),
     ]
     assert [one.text("value") for one in robot.all("parameter")] == ["3"]
-    assert only(draft, "robot", "scout3").attributes["x-m"] == "3"
+    assert only(draft, "robot", "scout3").values["x-m"] == "3"
     assert draft.problems == ()
     assert draft.do(remove(robot.path)).text != draft.text
     assert draft.do(remove(robot.path)).problems == ()
@@ -336,7 +336,7 @@ def test_what_cannot_be_meant_is_refused_and_changes_nothing() -> None:
 def test_the_last_network_id_is_the_last_robot() -> None:
     draft = watchers()
     robot = only(draft, "resource", "scout1")
-    section = draft.text[robot.begin : robot.end].decode()
+    section = draft.text[robot.span.begin : robot.span.end].decode()
     many = "\n".join(section.replace("scout1", f"s{number}").replace('"1"', f'"{number}"') for number in range(3, 255))
     text = draft.text.replace(b"  </resources>", many.encode() + b"</resources>")
     full = Draft("many.xml", TextState(text))

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from backbone.errors import Refusal
-from backbone.mission.edit import Node
+from backbone.mission.edit import Element
 from ui_console.design.commands import DesignCommand
 from ui_console.design.draft import Draft
 from ui_console.design.effects import add_behavior, add_resource, add_type, relocate, remove, rename, set_value
@@ -30,8 +30,8 @@ COMMANDS = st.one_of(
 )
 
 
-def head(draft: Draft, node: Node) -> bytes:
-    return draft.text[node.begin : node.content]
+def head(draft: Draft, node: Element) -> bytes:
+    return draft.text[node.span.begin : node.span.content]
 
 
 @settings(max_examples=share(150), suppress_health_check=list(HealthCheck))

@@ -78,13 +78,13 @@ def test_what_is_dropped_before_a_sibling_stands_directly_before_it(data: st.Dat
     count = len(section.children)
     moved, before = data.draw(st.integers(0, count - 1)), data.draw(st.none() | st.integers(0, count))
     change = MoveElement(1, section.children[moved].path, section.path, before)
-    tags = [draft.text[child.begin : child.end] for child in section.children]
+    tags = [draft.text[child.span.begin : child.span.end] for child in section.children]
     expected = tags[:moved] + tags[moved + 1 :]
     at = count if before is None else before
     expected.insert(at - (moved < at), tags[moved])
     after = changed(draft, change)
     got = after.mission.at(section.path)
-    assert [after.text[child.begin : child.end] for child in got.children] == expected
+    assert [after.text[child.span.begin : child.span.end] for child in got.children] == expected
 
 
 @settings(max_examples=share(40), suppress_health_check=list(HealthCheck))
