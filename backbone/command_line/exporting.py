@@ -4,64 +4,120 @@ from __future__ import annotations
 
 import csv
 from collections import defaultdict
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 from backbone.command_line.recording_work import opened
 from backbone.command_line.unusable_file import FileUnusable
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.hearing import is_meant
-from backbone.recording.reader import Recording
+from backbone.recording.reader import Recorded, Recording
 from backbone.recording.tables import FIRST_COLUMNS, Commanders, row_of, table_of
 from backbone.spoken import counted
 
 VIDEOS = "mission_control.vision.recorded_video"  # named, because imports run downwards only
-ROWS_AT_ONCE = 1000  # chosen: a table is open for a moment only, and there may be hundreds
+ROWS_AT_ONCE = 1000  # chosen: so many rows of each table are in memory, and in a row group of Parquet
 
 
-async def export(path: Path, folder: Path, keys: tuple[str, ...], *, with_videos: bool) -> ExitCode:
-    """Write a CSV file for each key and schema into a new folder, and if wanted an MP4 file for each camera."""
-    with opened(path) as recording, _new_folder(folder):
-        tables, rows = _write_tables(recording, folder, keys)
+class Tables(Protocol):
+    """Files of tables in a folder; ``learn`` gets all rows before ``write`` gets the first."""
+
+    splits_lists: ClassVar[bool]
+    """True: each item of a list is a column."""
+
+    def learn(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Note which columns the table has."""
+
+    def write(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Append rows to the table's file."""
+
+    def close(self) -> None:
+        """Write the ends of all files."""
+
+
+class CsvTables:
+    """CSV files; an open one for a moment only, because there may be hundreds."""
+
+    splits_lists: ClassVar[bool] = True
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._columns: dict[str, dict[str, None]] = defaultdict(lambda: dict.fromkeys(FIRST_COLUMNS))
+        self._begun: set[str] = set()
+
+    def learn(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Note the names of the columns."""
+        for row in rows:
+            self._columns[table].update(dict.fromkeys(row))
+
+    def write(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Append rows, the first below a line with the names."""
+        with (self._folder / f"{table}.csv").open("a", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(self._columns[table]))
+            if table not in self._begun:
+                self._begun.add(table)
+                writer.writeheader()
+            writer.writerows({**row, "at_s": f"{row['at_s']:.6f}"} for row in rows)
+
+    def close(self) -> None:
+        """Do nothing: each file is whole."""
+
+
+async def export(
+    path: Path, folder: Path, keys: tuple[str, ...], make_tables: Callable[[Path], Tables], *, with_videos: bool
+) -> ExitCode:
+    """Write a file for each key and schema into a new folder, and if wanted an MP4 file for each camera."""
+    with opened(path) as recording, new_folder(folder):
+        with closing(make_tables(folder)) as tables:
+            names, rows = _write_tables(recording, tables, keys)
         videos = import_module(VIDEOS).write_videos(recording, folder, keys) if with_videos else []
-    said = f"{folder}: {counted(tables, 'table')} with {counted(rows, 'row')}"
+    said = f"{folder}: {counted(names, 'table')} with {counted(rows, 'row')}"
     say(f"{said}, {counted(len(videos), 'video')}" if with_videos else said)
     return ExitCode.DONE
 
 
-def _write_tables(recording: Recording, folder: Path, keys: tuple[str, ...]) -> tuple[int, int]:
-    columns: dict[str, dict[str, None]] = defaultdict(lambda: dict.fromkeys(FIRST_COLUMNS))
-    for message in recording.messages(keys):
-        columns[table_of(message)].update(dict.fromkeys(row_of(message)))
-    waiting: dict[str, list[dict[str, Any]]] = defaultdict(list)
-    for table, names in columns.items():
-        with (folder / f"{table}.csv").open("x", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow(names)
-    commanders, count = Commanders(), 0
+def _write_tables(recording: Recording, tables: Tables, keys: tuple[str, ...]) -> tuple[int, int]:
+    split, names, count = tables.splits_lists, set(), 0
+    for table, rows in _batches((one, row_of(one, splits_lists=split)) for one in recording.messages(keys)):
+        tables.learn(table, rows)
+        names.add(table)
+        count += len(rows)
+    for table, rows in _batches(_commanded_rows(recording, keys, splits_lists=split)):
+        tables.write(table, rows)
+    return len(names), count
+
+
+def _commanded_rows(
+    recording: Recording, keys: tuple[str, ...], *, splits_lists: bool
+) -> Iterator[tuple[Recorded, dict[str, Any]]]:
+    commanders = Commanders()
     for message in recording.messages():
         commanders.take(message)
-        if keys and not is_meant(message.key, keys):
-            continue
+        if not keys or is_meant(message.key, keys):
+            yield message, row_of(message, commanders.of(message), splits_lists=splits_lists)
+
+
+def _batches(rows: Iterable[tuple[Recorded, dict[str, Any]]]) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Yield table and rows, up to ``ROWS_AT_ONCE`` of them."""
+    waiting: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for message, row in rows:
         table = table_of(message)
-        waiting[table].append(row_of(message, commanders.of(message)))
-        count += 1
+        waiting[table].append(row)
         if len(waiting[table]) >= ROWS_AT_ONCE:
-            _append(folder / f"{table}.csv", columns[table], waiting.pop(table))
-    for table, rows in waiting.items():
-        _append(folder / f"{table}.csv", columns[table], rows)
-    return len(columns), count
-
-
-def _append(file: Path, columns: dict[str, None], rows: list[dict[str, Any]]) -> None:
-    with file.open("a", newline="", encoding="utf-8") as opened_file:
-        csv.DictWriter(opened_file, list(columns)).writerows(rows)
+            yield table, waiting.pop(table)
+    yield from waiting.items()
 
 
 @contextmanager
-def _new_folder(folder: Path) -> Iterator[None]:
+def new_folder(folder: Path) -> Iterator[None]:
+    """Make a folder for what a command writes.
+
+    Raises:
+        FileUnusable: It exists, or a file cannot be written into it.
+    """
     try:
         folder.mkdir(parents=True)
         yield

@@ -11,7 +11,7 @@ from backbone.command_line.options import DISTRIBUTION
 from backbone.errors import Refusal
 from backbone.launcher.endings import complaint_of, say
 
-EXTRAS = {"foxglove": "foxglove", "prometheus_client": "metrics"}
+EXTRAS = {"foxglove": "foxglove", "prometheus_client": "metrics", "pyarrow": "parquet"}
 """Library → the extra that installs it."""
 
 

@@ -5,8 +5,10 @@ Rules of this file: as those of ``cli``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +23,9 @@ from backbone.command_line.options import (
     named_value,
     run,
 )
+
+if TYPE_CHECKING:
+    from backbone.command_line.exporting import Tables
 
 record = typer.Typer(cls=CommandTable, rich_markup_mode=None, help="Record a mission that is up, until Ctrl-C.")
 recording = typer.Typer(
@@ -48,6 +53,15 @@ Tolerances = Annotated[
 ]
 DELAY = "delay_s"
 MOST_LINES = 1_000_000
+
+
+class TableFormat(StrEnum):
+    """Formats of exported tables."""
+
+    CSV = "csv"
+    PARQUET = "parquet"
+
+
 MOST_TOLERANCE = 1e18  # as the largest number of a message
 
 
@@ -166,12 +180,22 @@ def export(
     file: File,
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A new folder.")],
     keys: Keys = None,
+    table_format: Annotated[
+        TableFormat, typer.Option("--format", help="parquet: columns keep their types, lists stay lists.")
+    ] = TableFormat.CSV,
     video: Annotated[bool, typer.Option("--video", help="Also an MP4 file for each camera.")] = False,
 ) -> None:
-    """Write a CSV file for each key, with who commanded the robot in each row."""
+    """Write a table for each key, with who commanded the robot in each row."""
+    from backbone.command_line.exporting import CsvTables
     from backbone.command_line.exporting import export as export_to
+    from backbone.command_line.extras import needing_extras
 
-    run(lambda: export_to(file, folder, tuple(keys or ()), with_videos=video))
+    make_tables: Callable[[Path], Tables] = CsvTables
+    if table_format is TableFormat.PARQUET:
+        with needing_extras():
+            from backbone.recording.parquet_tables import ParquetTables
+        make_tables = ParquetTables
+    run(lambda: export_to(file, folder, tuple(keys or ()), make_tables, with_videos=video))
 
 
 @recording.command()

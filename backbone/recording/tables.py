@@ -23,20 +23,22 @@ def table_of(message: Recorded) -> str:
     return "_".join([*message.key.split("/")[2:], message.schema.partition("/")[0] or "bytes"])
 
 
-def row_of(message: Recorded, commanded_by: str = "") -> dict[str, Any]:
+def row_of(message: Recorded, commanded_by: str = "", *, splits_lists: bool = True) -> dict[str, Any]:
     """Return column → value. Fields inside others have their names joined by dots, as ``rcs.0.rc``.
 
     Args:
         commanded_by: Who commanded the robot then; see ``Commanders``.
+        splits_lists: True: each item of a list has a column of its own, and long lists have none. False: a list is one
+            value.
     """
     row: dict[str, Any] = {
-        "at_s": f"{message.at_s:.6f}",
+        "at_s": message.at_s,
         "source": message.source,
         "sequence": message.sequence,
         "cause": message.cause,
         "commanded_by": commanded_by,
     }
-    for path, value in _flat(message.body, ""):
+    for path, value in _flat(message.body, "", splits_lists=splits_lists):
         row[f"{path}_" if path in row else path] = value
     return row
 
@@ -46,19 +48,19 @@ def columns_of(rows: Iterable[Mapping[str, Any]]) -> list[str]:
     return list(dict.fromkeys((*FIRST_COLUMNS, *(column for row in rows for column in row))))
 
 
-def _flat(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+def _flat(value: Any, path: str, *, splits_lists: bool) -> Iterator[tuple[str, Any]]:
     if isinstance(value, dict):
         for name, inner in value.items():
             if name != BYTES_OF:
-                yield from _flat(inner, f"{path}.{name}" if path else name)
-    elif isinstance(value, list):
+                yield from _flat(inner, f"{path}.{name}" if path else name, splits_lists=splits_lists)
+    elif isinstance(value, list) and splits_lists:
         if len(value) <= LONGEST_LIST:
             for place, inner in enumerate(value):
-                yield from _flat(inner, f"{path}.{place}" if path else str(place))
+                yield from _flat(inner, f"{path}.{place}" if path else str(place), splits_lists=splits_lists)
     elif isinstance(value, bytes):
         yield path or "bytes", value.hex()
     else:
-        yield path, value
+        yield path or "body", value
 
 
 class Commanders:
@@ -71,19 +73,27 @@ class Commanders:
     def __init__(self) -> None:
         self._owners: dict[str, str] = {}
         self._users: dict[str, str] = {}
+        self._arcs: dict[tuple[str, int], str] = {}
 
     def take(self, message: Recorded) -> None:
-        """Note whose each ARC is, and who sits at each console."""
+        """Note whose each ARC is, which ARC each epoch of an RC is of, and who sits at each console."""
         body = message.body
         if not isinstance(body, dict):
             return
         if message.schema.startswith("Schedule/"):
             self._owners = {request["arc"]: request["owner"] for request in body.get("requests", [])}
+        elif message.schema.startswith("Connect/"):
+            self._arcs[message.key.split("/")[-2], body["epoch"]] = body["arc"]
         elif message.schema.startswith("ComponentState/") and body.get("user"):
             self._users[body["address"]] = body["user"]
 
     def of(self, message: Recorded) -> str:
         """Return who commanded the robot of this message; empty: nobody, or it is of no ARC."""
-        arc = message.body.get("arc", "") if isinstance(message.body, dict) else ""
+        body = message.body if isinstance(message.body, dict) else {}
+        arc = body.get("arc") or self._arcs.get((body.get("rc", ""), body.get("epoch", 0)), "")
+        return self.owner_of(arc)
+
+    def owner_of(self, arc: str) -> str:
+        """Return whose an ARC is: the name of a person or behavior; empty: it is not known."""
         owner = self._owners.get(arc, "")
         return self._users.get(owner, owner.rpartition("/")[2])

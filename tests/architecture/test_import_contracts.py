@@ -43,6 +43,7 @@ PLANTED = [
     ("foxglove", "backbone/recording/planted.py", "import foxglove"),
     ("foxglove", "resource_pool/planted.py", "from foxglove.messages import Log"),
     ("prometheus", "backbone/metrics/planted.py", "import prometheus_client"),
+    ("pyarrow", "backbone/command_line/planted.py", "import pyarrow"),
     ("pydantic", "backbone/placer/planted.py", "import pydantic"),
     ("pydantic", "resource_pool/planted.py", "from lxml import etree"),
     ("textual", "mission_control/planted.py", "import textual.app"),

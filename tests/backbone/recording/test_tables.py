@@ -56,3 +56,12 @@ def test_a_person_is_named_by_name_a_behavior_by_its_own_and_nobody_is_empty():
     assert [commanders.of(one) for one in (of_anna, of_watch, of_none)] == ["anna", "watch", ""]
     commanders.take(said("Schedule/1", {"requests": []}))
     assert commanders.of(of_anna) == ""
+
+
+def test_a_message_without_an_arc_is_of_the_arc_of_its_epoch():
+    commanders = Commanders()
+    asked, motions = "scout/night/resource_pool/scout1/ask", "scout/night/resource_pool/scout1/motions"
+    commanders.take(said("Schedule/1", {"requests": [{"arc": "watch-capture", "owner": "mission_control/watch"}]}))
+    commanders.take(said("Connect/1", {"arc": "watch-capture", "epoch": 7}, asked))
+    applied = [said("Applied/1", {"rc": rc, "epoch": epoch}, motions) for rc, epoch in (("scout1", 7), ("scout1", 6))]
+    assert [commanders.of(one) for one in applied] == ["watch", ""]

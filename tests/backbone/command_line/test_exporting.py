@@ -1,0 +1,98 @@
+"""A recording is exported to tables that hold its messages, and who commanded."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from pyarrow import parquet
+from small_recordings import SCOUT, Said, recorded
+
+from backbone.command_line.exporting import ROWS_AT_ONCE, CsvTables, export
+from backbone.keys import Conversation
+from backbone.launcher.endings import ExitCode
+from backbone.rc_manager.messages import Connect
+from backbone.recording.parquet_tables import ParquetTables
+from backbone.recording.reader import Recording
+from backbone.scheduling.requests import RcUse, RequestState
+from backbone.scheduling.views import RequestView, Schedule
+from resource_pool.messages import Applied, Readings
+
+RC_MANAGER, ARC = "backbone/rc_manager", "watch-drive"
+WAITS = RequestView(ARC, "mission_control/watch", RequestState.WAITING, [], 0.0, -1.0, 2.0, "", [], 5.0, "night:1", 0)
+APPLIED, READINGS = "resource_pool_scout1_motions_Applied", "resource_pool_scout1_readings_Readings"
+
+
+def a_night() -> list[Said]:
+    """Return what was said: a behavior gets the robot and moves it, which reports more often than a row group holds."""
+    moved = Applied("scout1", 7, 3.0, "move", {"forward_m_s": 0.25})
+    return [
+        Said(1.0, RC_MANAGER, Conversation.SCHEDULE, Schedule(1.0, [], [WAITS], []), RC_MANAGER),
+        Said(2.0, SCOUT, Conversation.ASK, Connect(ARC, 7, 2.0, RcUse([]), {"scout1": 7}), RC_MANAGER),
+        Said(3.0, SCOUT, Conversation.MOTIONS, moved),
+        *(
+            Said(4.0 + number / 100, SCOUT, Conversation.READINGS, Readings("scout1", 4.0, {"way_m": float(number)}))
+            for number in range(ROWS_AT_ONCE + 5)
+        ),
+    ]
+
+
+@pytest.fixture(scope="module")
+def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("night") / "night.mcap"
+    path.write_bytes(recorded(a_night()).getvalue())
+    return path
+
+
+async def test_parquet_files_hold_the_recording_with_its_types(night: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert await export(night, folder, (), ParquetTables, with_videos=False) is ExitCode.DONE
+    read = parquet.ParquetFile(folder / f"{READINGS}.parquet")
+    with night.open("rb") as file:
+        messages = list(Recording(file).messages(("*/readings",)))
+    rows = read.read().to_pylist()
+    assert [(row["at_s"], row["source"], row["sequence"]) for row in rows] == [
+        (message.at_s, message.source, message.sequence) for message in messages
+    ]
+    assert [row["values.way_m"] for row in rows] == [message.body["values"]["way_m"] for message in messages]
+    assert read.num_row_groups == 2
+    [applied] = parquet.read_table(folder / f"{APPLIED}.parquet").to_pylist()
+    assert (applied["commanded_by"], applied["epoch"], applied["values.forward_m_s"]) == ("watch", 7, 0.25)
+    [schedule] = parquet.read_table(folder / "backbone_rc_manager_schedule_Schedule.parquet").to_pylist()
+    assert schedule["requests"][0]["arc"] == ARC
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+async def test_csv_files_hold_the_same_as_text(night: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    await export(night, folder, ("*/motions", "*/schedule"), CsvTables, with_videos=False)
+    assert sorted(file.name for file in folder.iterdir()) == [
+        "backbone_rc_manager_schedule_Schedule.csv",
+        f"{APPLIED}.csv",
+    ]
+    [applied] = rows_of(folder / f"{APPLIED}.csv")
+    assert (applied["at_s"], applied["commanded_by"], applied["values.forward_m_s"]) == ("3.000000", "watch", "0.25")
+    [schedule] = rows_of(folder / "backbone_rc_manager_schedule_Schedule.csv")
+    assert schedule["requests.0.arc"] == ARC
+
+
+def scout_backbone(*words: str, begin: str = "") -> subprocess.CompletedProcess[str]:
+    code = f"import sys\n{begin}\nfrom backbone.command_line.cli import app; app({list(words)!r})"
+    return subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.processes
+def test_the_command_tells_what_it_lacks(night: Path, tmp_path: Path) -> None:
+    words = ("recording", "export", str(night), str(tmp_path / "out"), "--format", "parquet")
+    lacking = scout_backbone(*words, begin="sys.modules['pyarrow'] = None")
+    assert (lacking.returncode, "scout-backbone[parquet]" in lacking.stderr) == (2, True), lacking.stderr
+    assert not (tmp_path / "out").exists()
+    done = scout_backbone(*words)
+    assert (done.returncode, f"4 tables with {len(a_night())} rows" in done.stderr) == (0, True), done.stderr
