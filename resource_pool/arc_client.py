@@ -82,6 +82,7 @@ __all__ = [
     "FloorShape",
     "Frame",
     "GivenBeforeStop",
+    "Halt",
     "LandmarkSighting",
     "NoSuchAction",
     "NotMyArc",

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 from backbone.command_line.recording_work import opened
 from backbone.command_line.unusable_file import FileUnusable
@@ -19,6 +19,7 @@ from backbone.recording.tables import FIRST_COLUMNS, Commanders, row_of, table_o
 from backbone.spoken import counted
 
 VIDEOS = "mission_control.vision.recorded_video"  # named, because imports run downwards only
+DATA_SETS = "mission_control.training_data.lerobot_dataset"  # the same
 ROWS_AT_ONCE = 1000  # chosen: so many rows of each table are in memory, and in a row group of Parquet
 
 
@@ -28,10 +29,10 @@ class Tables(Protocol):
     splits_lists: ClassVar[bool]
     """True: each item of a list is a column."""
 
-    def learn(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    def learn(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
         """Note which columns the table has."""
 
-    def write(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    def write(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
         """Append rows to the table's file."""
 
     def close(self) -> None:
@@ -48,12 +49,12 @@ class CsvTables:
         self._columns: dict[str, dict[str, None]] = defaultdict(lambda: dict.fromkeys(FIRST_COLUMNS))
         self._begun: set[str] = set()
 
-    def learn(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    def learn(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
         """Note the names of the columns."""
         for row in rows:
             self._columns[table].update(dict.fromkeys(row))
 
-    def write(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    def write(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
         """Append rows, the first below a line with the names."""
         with (self._folder / f"{table}.csv").open("a", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(self._columns[table]))
@@ -79,6 +80,18 @@ async def export(
     return ExitCode.DONE
 
 
+async def export_for_lerobot(
+    path: Path, folder: Path, robot: str, rate_hz: int, task: str, *, with_pictures: bool
+) -> ExitCode:
+    """Write the grants of a robot into a new folder, as episodes that LeRobot reads."""
+    with opened(path) as recording:
+        data_set = import_module(DATA_SETS).data_set(recording, robot, rate_hz, task, with_pictures=with_pictures)
+        with new_folder(folder):
+            said = data_set.write(folder)
+    say(f"{folder}: {said}")
+    return ExitCode.DONE
+
+
 def _write_tables(recording: Recording, tables: Tables, keys: tuple[str, ...]) -> tuple[int, int]:
     split, names, count = tables.splits_lists, set(), 0
     for table, rows in _batches((one, row_of(one, splits_lists=split)) for one in recording.messages(keys)):
@@ -92,7 +105,7 @@ def _write_tables(recording: Recording, tables: Tables, keys: tuple[str, ...]) -
 
 def _commanded_rows(
     recording: Recording, keys: tuple[str, ...], *, splits_lists: bool
-) -> Iterator[tuple[Recorded, dict[str, Any]]]:
+) -> Iterator[tuple[Recorded, dict[str, object]]]:
     commanders = Commanders()
     for message in recording.messages():
         commanders.take(message)
@@ -100,9 +113,9 @@ def _commanded_rows(
             yield message, row_of(message, commanders.of(message), splits_lists=splits_lists)
 
 
-def _batches(rows: Iterable[tuple[Recorded, dict[str, Any]]]) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+def _batches(rows: Iterable[tuple[Recorded, dict[str, object]]]) -> Iterator[tuple[str, list[dict[str, object]]]]:
     """Yield table and rows, up to ``ROWS_AT_ONCE`` of them."""
-    waiting: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    waiting: dict[str, list[dict[str, object]]] = defaultdict(list)
     for message, row in rows:
         table = table_of(message)
         waiting[table].append(row)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import StrEnum
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -196,6 +197,26 @@ def export(
             from backbone.recording.parquet_tables import ParquetTables
         make_tables = ParquetTables
     run(lambda: export_to(file, folder, tuple(keys or ()), make_tables, with_videos=video))
+
+
+@recording.command()
+def lerobot(
+    file: File,
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A new folder.")],
+    robot: Annotated[str, typer.Option("--robot", metavar="NAME", help="The robot.")],
+    rate_hz: Annotated[int, typer.Option("--rate", min=1, max=100, help="Steps in a second.")] = 10,
+    task: Annotated[str, typer.Option("--task", help="What was done, in words; default: by a behavior's name.")] = "",
+    without_pictures: Annotated[
+        bool, typer.Option("--without-pictures", help="No pictures, and also grants that had none.")
+    ] = False,
+) -> None:
+    """Write what a robot saw and did in each grant as a data set that LeRobot reads, with who commanded it."""
+    from backbone.command_line.exporting import DATA_SETS, export_for_lerobot
+    from backbone.command_line.extras import needing_extras
+
+    with needing_extras():
+        import_module(DATA_SETS)
+    run(lambda: export_for_lerobot(file, folder, robot, rate_hz, task, with_pictures=not without_pictures))
 
 
 @recording.command()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import pyarrow as pa
 from pyarrow import parquet
@@ -27,13 +27,13 @@ class ParquetTables:
         self._kinds: dict[str, dict[str, pa.DataType | None]] = {}
         self._writers: dict[str, parquet.ParquetWriter] = {}
 
-    def learn(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    def learn(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
         """Find the types of the columns; all rows come here before the first is written."""
         kinds = self._kinds.setdefault(table, {})
         for column in dict.fromkeys(column for row in rows for column in row):
             kinds[column] = _common_kind(kinds.get(column, pa.null()), [row.get(column) for row in rows])
 
-    def write(self, table: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    def write(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
         """Append the rows as a row group."""
         kinds = self._kinds[table]
         arrays = [_array([row.get(column) for row in rows], kind) for column, kind in kinds.items()]
@@ -48,7 +48,7 @@ class ParquetTables:
             writer.close()
 
 
-def _common_kind(known: pa.DataType | None, values: list[Any]) -> pa.DataType | None:
+def _common_kind(known: pa.DataType | None, values: list[object]) -> pa.DataType | None:
     """Return the type that these values and those before have in common; None: there is none."""
     if known is None:
         return None
@@ -70,7 +70,7 @@ def _has_empty_struct(kind: pa.DataType) -> bool:
     return kind.num_fields == 0 or any(_has_empty_struct(field.type) for field in kind)
 
 
-def _array(values: list[Any], kind: pa.DataType | None) -> pa.Array:
+def _array(values: list[object], kind: pa.DataType | None) -> pa.Array:
     if kind is None:
         return pa.array([None if value is None else json.dumps(value) for value in values], pa.string())
     try:

@@ -1,0 +1,1 @@
+"""Recordings as data for those who train models."""

@@ -1,0 +1,225 @@
+"""Episodes: what a robot saw, reported and did in each of its grants, at a fixed rate. Pure.
+
+An episode is the time in which one ARC held the robot under one epoch, as the robot's RC said it. Its first step is as
+soon as each camera has sent a picture and the robot has reported all its readings. A step has the newest of each that
+was sent until then, so it knows nothing that its commander could not know.
+
+Source: the form of a step, an observation and the action in force, is that of LeRobot, see ``lerobot_dataset``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from backbone.component.messages import ComponentState
+from backbone.naming import Subsystem, address
+from backbone.rc_manager.messages import Connect, Connected, Disconnected, RcState
+from backbone.recording.presence import Presence
+from backbone.recording.reader import Recorded
+from backbone.recording.revival import revived
+from backbone.scheduling.views import Schedule
+from backbone.wire import schema_of
+from resource_pool.arc_client import Applied, Frame, Halt, Readings
+
+ACTION = ("forward_m_s", "turn_rad_s")
+OWN_CAMERA = "camera"
+"""Name of the camera whose pictures have the address of the ARC; further ones are named by their role."""
+STILL = (0.0, 0.0)
+
+
+@dataclass
+class Survey:
+    """What a recording has of a robot.
+
+    Attributes:
+        kind: Type of the robot; empty: not known.
+        robots: Names of all robots.
+        arcs: ARCs that held it.
+        reports: Fields of its readings, in the order in which they first came.
+        sizes_px: Camera → width and height of its first picture.
+        owners: ARC → address of its decision process.
+        users: Address of a console → who sat there.
+    """
+
+    kind: str = ""
+    robots: set[str] = field(default_factory=set)
+    arcs: set[str] = field(default_factory=set)
+    reports: dict[str, None] = field(default_factory=dict)
+    sizes_px: dict[str, tuple[int, int]] = field(default_factory=dict)
+    owners: dict[str, str] = field(default_factory=dict)
+    users: dict[str, str] = field(default_factory=dict)
+
+    def commander(self, arc: str) -> str:
+        """Return the name of the person or behavior whose ARC it is; empty: not known."""
+        owner = self.owners.get(arc, "")
+        return self.users.get(owner, owner.rpartition("/")[2])
+
+    def is_of_a_person(self, arc: str) -> bool:
+        """Return whether it is the ARC of a console."""
+        return self.owners.get(arc, "").startswith(f"{Subsystem.UI_CONSOLE}/")
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One instant of an episode.
+
+    Attributes:
+        episode: Number of the episode, from 0.
+        number: Of the step in it, from 0.
+        at_s: Mission time.
+        state: The newest of each of ``Survey.reports``; a flag is 0 or 1.
+        action: Velocities in force by the last command that the robot applied, in the order of ``ACTION``.
+        pictures: Camera → its newest picture.
+        arc: The ARC that holds the robot.
+    """
+
+    episode: int
+    number: int
+    at_s: float
+    state: tuple[float, ...]
+    action: tuple[float, float]
+    pictures: dict[str, Frame]
+    arc: str
+
+
+def keys_of(robot: str) -> tuple[str, ...]:
+    """Return the patterns of the keys that matter for a robot."""
+    return (f"{Subsystem.RESOURCE_POOL}/{robot}/*", "*/frames", "*/schedule", "*/status")
+
+
+def survey(messages: Iterable[Recorded], robot: str) -> Survey:
+    """Return what these messages have of a robot."""
+    found, its = Survey(), address(Subsystem.RESOURCE_POOL, robot)
+    for message in messages:
+        match message.schema:
+            case _Schema.SCHEDULE:
+                schedule = revived(Schedule, message.body)
+                found.owners.update((request.arc, request.owner) for request in schedule.requests)
+                found.robots.update(rc.rc for rc in schedule.rcs if rc.is_robot)
+                found.kind = next((rc.kind for rc in schedule.rcs if rc.rc == robot), found.kind)
+            case _Schema.STATE if (state := revived(ComponentState, message.body)).user:
+                found.users[state.address] = state.user
+            case _Schema.RC_STATE if message.source == its:
+                found.arcs.update(holder.arc for holder in revived(RcState, message.body).holders)
+            case _Schema.CONNECT if _address_in(message.key) == its:
+                found.arcs.add(revived(Connect, message.body).arc)
+            case _Schema.READINGS if message.source == its:
+                found.reports.update(dict.fromkeys(revived(Readings, message.body).values))
+            case _Schema.FRAME if (body := _fields(message)).get("arc") in found.arcs:
+                found.sizes_px.setdefault(_camera(message.key), (body["width_px"], body["height_px"]))
+    return found
+
+
+class Follower:
+    """Follows a robot through the messages of a recording, and yields the steps of its episodes.
+
+    Attributes:
+        grants: Number of grants so far.
+        episodes: Number of those that had a step.
+    """
+
+    def __init__(self, robot: str, reports: Iterable[str], cameras: Iterable[str], rate_hz: int) -> None:
+        self.grants = self.episodes = 0
+        self._its = address(Subsystem.RESOURCE_POOL, robot)
+        self._reports, self._cameras, self._rate_hz = tuple(reports), frozenset(cameras), rate_hz
+        self._asked: Connect | None = None
+        self._arc, self._epoch = "", 0
+        self._values: dict[str, float] = {}
+        self._begin_s: float | None = None
+        self._number = 0
+        self._action = STILL
+        self._pictures: dict[str, Frame] = {}
+
+    def follow(self, messages: Iterable[Recorded]) -> Iterator[Step]:
+        """Yield the steps before each message, and those until the last."""
+        for message in messages:
+            yield from self._steps_before(message.at_s)
+            self._take(message)
+            if self._begin_s is None and self._arc and self._is_complete():
+                self._begin_s = message.at_s
+
+    def _is_complete(self) -> bool:
+        return self._cameras <= self._pictures.keys() and all(name in self._values for name in self._reports)
+
+    def _steps_before(self, at_s: float) -> Iterator[Step]:
+        while self._begin_s is not None and (step_s := self._begin_s + self._number / self._rate_hz) < at_s:
+            if self._number == 0:
+                self.episodes += 1
+            state = tuple(self._values[name] for name in self._reports)
+            pictures = {name: self._pictures[name] for name in sorted(self._cameras)}
+            yield Step(self.episodes - 1, self._number, step_s, state, self._action, pictures, self._arc)
+            self._number += 1
+
+    def _take(self, message: Recorded) -> None:
+        match message.schema:
+            case _Schema.CONNECT if _address_in(message.key) == self._its:
+                self._asked = revived(Connect, message.body)
+            case _Schema.FRAME if self._arc and _fields(message).get("arc") == self._arc:
+                self._pictures[_camera(message.key)] = revived(Frame, message.body)
+            case _ if message.source == self._its:
+                self._heard_itself(message)
+            case _Schema.PRESENCE if _address_in(message.key) == self._its and not _fields(message).get("alive"):
+                self._end()
+
+    def _heard_itself(self, message: Recorded) -> None:
+        """Take what the robot's RC said: only it knows who holds it."""
+        match message.schema:
+            case _Schema.CONNECTED:
+                epoch = revived(Connected, message.body).epoch
+                if self._asked is not None and self._asked.epoch == epoch:
+                    self._begin(self._asked.arc, epoch)
+            case _Schema.DISCONNECTED:
+                self._end()
+            case _Schema.RC_STATE:
+                holders = {one.epoch: one.arc for one in revived(RcState, message.body).holders}
+                if self._epoch not in holders:
+                    self._end()
+                for epoch, arc in holders.items():
+                    self._begin(arc, epoch)
+            case _Schema.READINGS:
+                self._values.update((name, float(v)) for name, v in revived(Readings, message.body).values.items())
+            case _Schema.APPLIED:
+                self._applied(revived(Applied, message.body))
+
+    def _applied(self, told: Applied) -> None:
+        if told.epoch != self._epoch:
+            return
+        if told.command == Halt.word():
+            self._action = STILL
+        elif all(name in told.values for name in ACTION):
+            self._action = (told.values[ACTION[0]], told.values[ACTION[1]])
+
+    def _begin(self, arc: str, epoch: int) -> None:
+        if epoch != self._epoch:
+            self._end()
+            self._arc, self._epoch = arc, epoch
+            self.grants += 1
+
+    def _end(self) -> None:
+        self._arc, self._epoch, self._begin_s, self._number = "", 0, None, 0
+        self._action, self._pictures = STILL, {}
+
+
+class _Schema:
+    """Names of schemas, for patterns."""
+
+    APPLIED, FRAME, READINGS = schema_of(Applied), schema_of(Frame), schema_of(Readings)
+    CONNECT, CONNECTED, DISCONNECTED = schema_of(Connect), schema_of(Connected), schema_of(Disconnected)
+    RC_STATE, STATE, SCHEDULE = schema_of(RcState), schema_of(ComponentState), schema_of(Schedule)
+    PRESENCE = schema_of(Presence)
+
+
+def _fields(message: Recorded) -> dict[str, Any]:
+    """Return the fields of a message, without decoding a picture that may not be wanted."""
+    return message.body if isinstance(message.body, dict) else {}
+
+
+def _address_in(key: str) -> str:
+    return "/".join(key.split("/")[2:-1])
+
+
+def _camera(key: str) -> str:
+    further = key.split("/")[4:-1]  # after scout, mission, resource_pool and the ARC
+    return further[0] if further else OWN_CAMERA
