@@ -10,26 +10,27 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import gc
 import os
 import subprocess
 import tempfile
 from collections import defaultdict
 from pathlib import Path
 
+import zenoh
 from measuring import BIN, MISSION_XML, percentile, report
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
-from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.keys import Conversation
+from backbone.bus.zenoh_bus import client_config, open_session
+from backbone.keys import ROOT, Conversation
 from backbone.recording.hearing import Hearing
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recording
 
-BEFORE_S = 3.0  # chosen: the listener is there before the first message, if that is late enough; seconds of the machine
+BEFORE_S = 3.0  # chosen: the listener is there before the first message; seconds of the machine
 KNOWN_S = 0.1  # measured: a publisher knows of its first subscriber after 7 ms; seconds of the machine
 AFTER_S = 2.0  # chosen: the last message is long over; seconds of the machine
-WAITING_BYTES = 1 << 28  # nothing is dropped here
 HEARD = tuple(one for one in Conversation if one not in {Conversation.ASK, Conversation.TOLD, Conversation.ALIVE})
 MISSION = "replay-bench"
 Sent = tuple[str, str, int]
@@ -56,34 +57,35 @@ def sent_in(path: Path) -> dict[Sent, float]:
 
 def play(path: Path, sent: dict[Sent, float], speed: float) -> tuple[float, list[tuple[Sent, float]]]:
     """Play the recording; return when the listener was there, and what it heard in order, with mission times."""
-    since_s = max(0.0, min(sent.values()) - BEFORE_S * speed)
-    words = ["replay", str(path), "--from", str(since_s), "--speed", str(speed), "--mission", MISSION]
+    since_s = min(sent.values()) - BEFORE_S * speed
+    words = ["replay", str(path), f"--from={since_s}", "--speed", str(speed), "--mission", MISSION]
     with subprocess.Popen([str(BIN / "scout-backbone"), *words], stderr=subprocess.PIPE) as player:
         assert player.stderr is not None
         player.stderr.readline()
         try:
-            return asyncio.run(listen(max(sent.values()) + AFTER_S * speed))
+            return listen(max(sent.values()) + AFTER_S * speed)
         finally:
             player.terminate()
 
 
-async def listen(until_s: float) -> tuple[float, list[tuple[Sent, float]]]:
-    """Listen until this mission time; see ``play``."""
+def listen(until_s: float) -> tuple[float, list[tuple[Sent, float]]]:
+    """Listen until this mission time; see ``play``. Not by a ``Bus``, which gathers what is overheard."""
     run = run_files.find(MISSION)
     clock = MissionClock(run.clock_origin_monotonic_s, run.clock_rate)
-    hearing, found = Hearing(message_classes()), list[tuple[Sent, float]]()
-
-    def heard(key: str, raw: bytes) -> None:
-        now_s = clock.now_s()
-        found.extend(((short(at), one.source, one.sequence), now_s) for at, one in hearing.heard(key, raw, now_s))
-
-    bus = await ZenohBus.open_when_up(MISSION, "ui_console/bench", clock, client_config(run.endpoint))
-    for conversation in HEARD:
-        bus.overhear(conversation, heard, WAITING_BYTES)
+    came = list[tuple[zenoh.Sample, float]]()
+    session = open_session(client_config(run.endpoint))
+    session.declare_subscriber(f"{ROOT}/{MISSION}/**", lambda sample: came.append((sample, clock.now_s())))
     there_s = clock.now_s() + KNOWN_S * clock.rate
-    await clock.sleep_until_s(until_s)
-    await bus.close()
-    return there_s, found
+    gc.collect()
+    gc.freeze()
+    asyncio.run(clock.sleep_until_s(until_s))
+    session.close()  # type: ignore[no-untyped-call]
+    hearing = Hearing(message_classes())
+    return there_s, [
+        ((short(at), one.source, one.sequence), now_s)
+        for sample, now_s in came
+        for at, one in hearing.heard(str(sample.key_expr), sample.payload.to_bytes(), now_s)
+    ]
 
 
 def compare(sent: dict[Sent, float], heard: list[tuple[Sent, float]], speed: float) -> None:

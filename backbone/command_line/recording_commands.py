@@ -250,7 +250,7 @@ def replay(
         bool, typer.Option("--step", help="Message by message: a line of input plays the one that is shown.")
     ] = False,
     since_s: Annotated[
-        float | None, typer.Option("--from", min=0.0, help="Begin at this mission time; default: at the begin.")
+        float | None, typer.Option("--from", min=-86400.0, help="Begin at this mission time; default: at the begin.")
     ] = None,
     keys: Keys = None,
     without: Annotated[

@@ -16,6 +16,7 @@ from backbone.keys import Conversation, address_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.hearing import is_meant
+from backbone.recording.read_ahead import ReadAhead, Ready
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.recorded_mission import RecordedMission
 from backbone.recording.revival import message_as_sent
@@ -54,6 +55,7 @@ class Player:
         self._since_s, self._keys, self._next_step = since_s, keys, next_step
         self._classes, self._checkpoints = classes, checkpoints or Checkpoints(classes)
         self._mission = RecordedMission(classes)
+        self._ahead = ReadAhead(recording, classes, since_s)
         self._accepts = reduce(or_, classes.values())
         self._tokens: dict[str, Subscription] = {}
         self._served: dict[str, Subscription] = {}
@@ -63,13 +65,14 @@ class Player:
         """Publications so far."""
 
     def catch_up(self) -> None:
-        """Take in what was said before. It uses no bus, so it may run in a thread.
+        """Take in what was said before, and decode what is said next. It uses no bus, so it may run in a thread.
 
         Raises:
             NoRecording: The recording is damaged.
         """
         self._mission = self._checkpoints.mission_at(self._recording, self._since_s)
         self._mission.rate = self._clock.rate
+        self._ahead.fill()
 
     def begin(self) -> None:
         """Answer questions, and say what a newcomer must know. When: after ``catch_up``."""
@@ -93,22 +96,30 @@ class Player:
         Raises:
             NoRecording: The recording is damaged from here on.
         """
-        for message in self._recording.messages(since_s=self._since_s):
-            await self._play(message)
+        while (following := self._ahead.first()) is not None:
+            await self._wait_until_due(following.message)
+            self._ahead.pop()
+            self._play(following)
 
-    async def _play(self, message: Recorded) -> None:
+    async def _wait_until_due(self, message: Recorded) -> None:
+        while self._ahead.has_time((message.at_s - self._clock.now_s()) / self._clock.rate):
+            self._ahead.decode_one()
+            await self._clock.sleep_s(0.0)
         if self._next_step is None:
             await self._clock.sleep_until_s(message.at_s)
         elif self._is_published(message):
             await self._next_step(message)
-        said = self._mission.take(message)
+
+    def _play(self, following: Ready) -> None:
+        message, said = following.message, following.said
         address = address_of(message.key)
+        if said is not None and self._is_published(message):
+            self._publish(message, said)
+            self.played += 1
+        self._mission.take_said(message, said)
         self._serve(address)
         if message.key.endswith(f"/{Conversation.ALIVE}"):
             self._token_changed(address)
-        elif said is not None and self._is_published(message):
-            self._publish(message, said)
-            self.played += 1
 
     def _is_published(self, message: Recorded) -> bool:
         is_wanted = not self._keys or is_meant(message.key, self._keys)

@@ -171,11 +171,11 @@ class Recording:
         if until_s is not None and until_s < since_s:
             return
         named = [(channel.topic, *_named(channel)[:2]) for channel in self._summary.channels.values()]
-        topics = [
+        topics = {
             topic
             for topic, key, sender in named
             if not key or ((not patterns or is_meant(key, patterns)) and source in ("", sender))
-        ]
+        }
         end_ns = None if until_s is None else round(until_s * NS)
         found = self._reader.iter_messages(topics, starting_at=max(0, round(since_s * NS)), ending_at=end_ns)
         try:

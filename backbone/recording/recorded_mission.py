@@ -87,12 +87,19 @@ class RecordedMission:
         self._log = MissionLog()
         self._schedule = RecordedSchedule()
 
-    def take(self, message: Recorded) -> Message | None:
-        """Let it have been said; return it as it was sent, see ``message_as_sent``."""
+    def take(self, message: Recorded) -> None:
+        """Let it have been said."""
+        self.take_said(message, message_as_sent(self._classes, message))
+
+    def take_said(self, message: Recorded, said: Message | None) -> None:
+        """Let it have been said.
+
+        Args:
+            said: The message as it was sent, see ``message_as_sent``.
+        """
         self.now_s = max(self.now_s, message.at_s)
         address, conversation = address_of(message.key), message.key.rpartition("/")[2]
         self.speakers[address] = None
-        said = message_as_sent(self._classes, message)
         if conversation in STATES:
             self._newest[message.key, message.schema] = message
         match said:
@@ -108,7 +115,6 @@ class RecordedMission:
                 self._schedule.take(said)
         if conversation == Conversation.ASK and said is not None:
             self._asked_or_answered(address, message, said)
-        return said
 
     def copied(self) -> RecordedMission:
         """Return a mission that goes on from here by itself; the messages, which never change, are in both."""

@@ -13,6 +13,7 @@ from small_recordings import CLASSES, SCOUT, Said, recorded
 
 from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.interface import Clock
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.messages import (
     AskParameters,
@@ -31,6 +32,7 @@ from backbone.keys import Conversation
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.mission_log.log import AskLog, Log
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.recording.playback import Playback
 from backbone.recording.player import Player
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recorded, Recording
@@ -69,14 +71,22 @@ def played(
     *,
     since_s: float = 0.0,
     classes: Mapping[str, type[Message]] = CLASSES,
+    speed: float = 0.0,
     **options: Any,
 ) -> list[tuple[float, str, Envelope[Message]]]:
-    """Return what was heard, with times, while the recording was played beside the scene."""
+    """Return what was heard, with times, while the recording was played beside the scene.
+
+    Args:
+        speed: Mission seconds in one of the loop; 0: by a clock of the loop.
+    """
     heard: list[tuple[float, str, Envelope[Message]]] = []
 
     async def play() -> None:
-        clock = VirtualClock()
+        clock: Clock = VirtualClock()
         await clock.sleep_s(since_s)
+        if speed:
+            clock = Playback(clock, since_s, recording.contents().end_s + 1.0)
+            clock.play(speed)
         network = LocalNetwork("night")
         bus, ear = network.join("backbone/replay", clock), network.join("ui_console/ear", clock)
         for conversation in (Conversation.LOG, Conversation.STATUS):
@@ -147,6 +157,25 @@ def test_step_by_step_the_order_is_the_same():
     heard = played(recording_of(*MORNING), next_step=step)
     assert shown == ["ComponentState/2", "StoryEvent/1", "ComponentState/2", "StoryEvent/1"]
     assert [envelope.sequence for _at_s, _said, envelope in heard] == [1, 3, 4, 5]
+
+
+@settings(max_examples=40, deadline=None)
+@given(times=st.lists(st.sampled_from([0.0, 0.1, 0.101, 0.2, 7.0]), min_size=1, max_size=30), data=st.data())
+def test_at_any_speed_and_step_by_step_the_order_is_the_same(times: list[float], data: st.DataObject):
+    """Also of messages of one instant, from several senders."""
+    senders = data.draw(st.lists(st.sampled_from([SCOUT, "resource_pool/scout2"]), min_size=30, max_size=30))
+    file = recorded(
+        Said(at_s, source, Conversation.LOG, event(n), source)
+        for n, (at_s, source) in enumerate(zip(sorted(times), senders, strict=False))
+    )
+
+    async def step(_message: Recorded) -> None:
+        await asyncio.sleep(0.0)
+
+    ways: list[dict[str, Any]] = [{}, {"speed": 0.5}, {"speed": 10.0}, {"speed": 100.0}, {"next_step": step}]
+    orders = [[one.id for _at_s, _said, one in played(Recording(file), **way)] for way in ways]
+    assert len(orders[0]) == len(times)
+    assert all(order == orders[0] for order in orders)
 
 
 def test_questions_get_the_answers_of_that_time():
