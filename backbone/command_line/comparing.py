@@ -86,8 +86,16 @@ def print_comparison(found: Mapping[Named, KeyComparison], *, as_json: bool) -> 
     if not found:
         say("there is no message to compare")
     else:
-        say(f"{differing} of {counted(len(found), 'key')} differ")
+        say(f"{differing} of {counted(len(found), 'key')} differ{_first_of_all(found)}")
     return ExitCode.REFUSED if differing else ExitCode.DONE
+
+
+def _first_of_all(found: Mapping[Named, KeyComparison]) -> str:
+    differences = [(named, one.difference) for named, one in found.items() if one.difference is not None]
+    if not differences:
+        return ""
+    (key, _source, schema), first = min(differences, key=lambda one: one[1].first_s)
+    return f"; the first is message {first.number} of {key}  {schema} at {first.first_s:.3f} s"
 
 
 def _lines(named: Named, found: KeyComparison) -> Iterator[str]:

@@ -28,6 +28,8 @@ from backbone.command_line.options import (
 if TYPE_CHECKING:
     from backbone.command_line.exporting import Tables
 
+EARLIEST_S = -86_400.0  # the range of ``ranges.Instant``, which would load msgspec
+
 record = typer.Typer(cls=CommandTable, rich_markup_mode=None, help="Record a mission that is up, until Ctrl-C.")
 recording = typer.Typer(
     cls=CommandTable,
@@ -250,7 +252,7 @@ def replay(
         bool, typer.Option("--step", help="Message by message: a line of input plays the one that is shown.")
     ] = False,
     since_s: Annotated[
-        float | None, typer.Option("--from", min=-86400.0, help="Begin at this mission time; default: at the begin.")
+        float | None, typer.Option("--from", min=EARLIEST_S, help="Begin at this mission time; default: at the begin.")
     ] = None,
     keys: Keys = None,
     without: Annotated[

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.bus.interface import Bus, Clock, Subscription, current_cause
 from backbone.bus.local_bus import Answered, LocalNetwork
 from backbone.component.component import AnyComponent
 from backbone.component.launch import Launch
@@ -127,6 +127,7 @@ async def _run(recording: Recording, classes: Known, launch: Launch, make: Compo
     ear, bus = network.join("backbone/recorder", clock), network.join(launch.address, clock)
     for conversation in to_overhear(()):
         ear.overhear(conversation, partial(network.heard, clock), MOST_WAITING_BYTES)
+    current_cause.set(network.begin_cause)
     component = make(launch, bus, clock)
     component.pid = network.pid
     living = asyncio.create_task(component.run(), name=f"rerun of {launch.name}")
@@ -154,6 +155,7 @@ class _RecordedNetwork(LocalNetwork):
         self._tokens: dict[str, Subscription] = {}
         self._answers: dict[tuple[str, str, bytes], deque[tuple[float, Message]]] = defaultdict(deque)
         self.begin_s, self.end_s, self.pid = -1.0, 0.0, 0
+        self.begin_cause = ""
         self._learn()
 
     def _learn(self) -> None:
@@ -162,7 +164,9 @@ class _RecordedNetwork(LocalNetwork):
         for message in self._recording.messages():
             address, is_asked = address_of(message.key), message.key.endswith(f"/{Conversation.ASK}")
             if message.source == self._own:
-                self.begin_s = _sent_s(message) if self.begin_s < 0 else self.begin_s
+                if self.begin_s < 0:
+                    self.begin_s = _sent_s(message)
+                    self.begin_cause = message.cause if message.schema == schema_of(Register) else ""
                 self.end_s = _sent_s(message)
                 if is_asked and address != self._own and (said := message_as_sent(self._classes, message)) is not None:
                     asked[message.id] = address, said

@@ -1,0 +1,37 @@
+"""What ``compare`` and ``replay --without`` print about two recordings."""
+
+from __future__ import annotations
+
+import pytest
+from small_recordings import SCOUT, Said, recorded
+
+from backbone.command_line.comparing import print_comparison
+from backbone.component.messages import LogLevel, StoryEvent
+from backbone.keys import Conversation
+from backbone.launcher.endings import ExitCode
+from backbone.recording.comparison import compared
+from backbone.recording.reader import Recording
+
+OTHER = "resource_pool/scout2"
+
+
+def events(*texts: str) -> Recording:
+    """Return a recording with an event a second, in turn at two robots."""
+    said = [
+        Said(float(n), where, Conversation.LOG, StoryEvent(0.0, where, text, "", "", LogLevel.INFO), where)
+        for n, (text, where) in enumerate(zip(texts, [OTHER, SCOUT] * len(texts), strict=False))
+    ]
+    return Recording(recorded(said))
+
+
+def test_the_first_difference_of_all_keys_is_named(capsys: pytest.CaptureFixture[str]):
+    found = compared(events("a", "b", "c", "d").messages(), events("a", "B", "C", "d").messages())
+    assert print_comparison(found, as_json=False) is ExitCode.REFUSED
+    told = f"2 of 2 keys differ; the first is message 0 of {SCOUT}/log  StoryEvent/1 at 1.000 s"
+    assert told in capsys.readouterr().err
+
+
+def test_of_equal_recordings_no_difference_is_named(capsys: pytest.CaptureFixture[str]):
+    found = compared(events("a", "b").messages(), events("a", "b").messages())
+    assert print_comparison(found, as_json=False) is ExitCode.DONE
+    assert "0 of 2 keys differ\n" in capsys.readouterr().err
