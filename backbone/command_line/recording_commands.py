@@ -110,6 +110,21 @@ def recover(
     run(lambda: recover_to(file, to))
 
 
+@record.command()
+def join(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="A.mcap… OUT.mcap", help="Recordings of one mission, and the new file.")
+    ],
+) -> None:
+    """Write recordings of one mission to one new file: each message once, in mission time, with clocks corrected."""
+    from backbone.command_line.joining import join_to
+
+    if len(files) < 2:
+        raise typer.BadParameter("name at least one recording, and the new file")
+    *recordings, to = files
+    run(lambda: join_to(recordings, to))
+
+
 @recording.command()
 def info(file: File, as_json: AsJson = False) -> None:
     """Print what a recording is of: mission, times, versions, numbers of messages."""

@@ -18,6 +18,7 @@ from pathlib import Path
 from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
+from backbone.command_line.joining import clock_lines, clocks_json
 from backbone.command_line.message_lines import message_json, message_line
 from backbone.command_line.options import DISTRIBUTION
 from backbone.command_line.unusable_file import FileUnusable
@@ -35,6 +36,7 @@ from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.naming import Subsystem, address
+from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recording, missing_numbers, recover_file
@@ -189,14 +191,17 @@ async def print_info(path: Path, *, as_json: bool) -> ExitCode:
 
 
 async def check_whole(path: Path, *, as_json: bool) -> ExitCode:
-    """Print whose messages are missing, and how many."""
+    """Print whose messages are missing, and how many, and whose clock was off."""
+    observer = ClockObserver()
     with opened(path) as recording:
-        found, missing = recording.contents(), missing_numbers(recording.messages())
+        found, missing = recording.contents(), missing_numbers(observer.watched(recording.messages()))
+    clocks = observer.offsets()
     if as_json:
-        show([json.dumps({"messages": found.messages, "missing": missing})])
+        show([json.dumps({"messages": found.messages, "missing": missing, "clocks": clocks_json(clocks)})])
     else:
         show([f"{counted(found.messages, 'message')}, as they were written"])
         show(f"{count:8d} missing from {source}" for source, count in missing.items())
+        show(f"{line}; 'record join' corrects it" for line in clock_lines(clocks))
     return ExitCode.DONE
 
 

@@ -1,0 +1,97 @@
+"""The work of ``scout-backbone record join``, and how clocks that were off are told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from backbone.command_line.unusable_file import FileUnusable
+from backbone.launcher.endings import ExitCode, say
+from backbone.recording.clock_offsets import ClockOffsets, Offset
+from backbone.recording.joining import Joined, join
+from backbone.recording.reader import NoRecording, Recording
+from backbone.spoken import counted
+
+
+async def join_to(paths: Sequence[Path], to: Path) -> ExitCode:
+    """Write the messages of several recordings of one mission to a new file, and tell whose clock was off.
+
+    Raises:
+        FileUnusable: One cannot be read, or the new file exists or cannot be written.
+        NoRecording: One is damaged, or its recorder was killed.
+        OtherMission: They are of different missions or starts.
+    """
+    with ExitStack() as stack:
+        recordings = {str(path): _opened(path, stack) for path in paths}
+        joined = _join(recordings, to)
+    copies = f"; {joined.left_out} that several recorders heard stand once" if joined.left_out else ""
+    say(f"{to}: {counted(joined.messages, 'message')}{copies}")
+    for line in clock_lines(joined.clocks):
+        say(f"{line}; corrected in {to.name}")
+    return ExitCode.DONE
+
+
+def _join(recordings: Mapping[str, Recording], to: Path) -> Joined:
+    try:
+        with to.open("xb") as file:
+            try:
+                return join(recordings, file)
+            except BaseException:
+                to.unlink()
+                raise
+    except FileExistsError as error:
+        raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
+    except OSError as error:
+        raise FileUnusable(f"{to}: {error.strerror or error}") from error
+
+
+def _opened(path: Path, stack: ExitStack) -> Recording:
+    try:
+        return Recording(stack.enter_context(path.open("rb")))
+    except OSError as error:
+        raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
+    except NoRecording as error:
+        raise type(error)(f"{path}: {error.detail}") from error
+
+
+def clock_lines(clocks: ClockOffsets) -> Iterator[str]:
+    """Yield a line for each clock that cannot have been right, by the causes of messages."""
+    for host, offset in clocks.wrong.items():
+        told = f"the clock of {host} was {_how_far(offset)} that of {clocks.reference}"
+        yield f"{told}, and changed by at least {offset.moved_s:.4f} s" if offset.moved_s else told
+
+
+def _how_far(offset: Offset) -> str:
+    """Return how far a clock was off.
+
+    Example:
+        >>> _how_far(Offset(1.5, 2.5, 2.0)), _how_far(Offset(-2.5, -1.5, -2.0)), _how_far(Offset(-math.inf, -1.0, -1.0))
+        ('1.5000 to 2.5000 s ahead of', '1.5000 to 2.5000 s behind', 'at least 1.0000 s behind')
+    """
+    least_s, most_s = offset.at_least_s, offset.at_most_s
+    if least_s <= 0 <= most_s:
+        return "right on average with"
+    side = "ahead of" if offset.taken_s > 0 else "behind"
+    nearest_s, farthest_s = sorted((abs(least_s), abs(most_s)))
+    if math.isinf(farthest_s):
+        return f"at least {nearest_s:.4f} s {side}"
+    return f"{nearest_s:.4f} to {farthest_s:.4f} s {side}"
+
+
+def clocks_json(clocks: ClockOffsets) -> dict[str, dict[str, float | None]]:
+    """Return what is known of each clock but the reference's; None: no cause bounds it on that side."""
+    return {
+        host: {
+            "at_least_s": _finite(offset.at_least_s),
+            "at_most_s": _finite(offset.at_most_s),
+            "taken_s": offset.taken_s,
+            "moved_s": offset.moved_s,
+        }
+        for host, offset in clocks.offsets.items()
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,198 @@
+"""Joins the files of several recorders of one mission into one recording.
+
+Rules of this file:
+
+* Each message stands once, although several recorders heard it: sender, number and stamp are the same in all copies.
+* Messages stand in the order of mission time. Where causes show that the clock of a host was off, ``log_time`` is
+  corrected by that offset, so that no message stands before its cause; ``publish_time`` and ``stamp_s`` stay as sent.
+* Files are read twice, chunk by chunk: once for the clocks, once to be written.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from operator import itemgetter
+from typing import IO, TypeVar
+
+from mcap.records import Channel, Message, Schema
+from mcap.writer import CompressionType, Writer
+
+from backbone.errors import Refusal
+from backbone.recording.clock_offsets import ClockObserver, ClockOffsets
+from backbone.recording.reader import NoRecording, Recorded, Recording
+from backbone.recording.writer import ABOUT, CHUNK_BYTES, MIME_XML, MOST_CHANNELS, NS, PROFILE
+
+SAME_BEGIN_S = 2.0  # chosen: time services move a clock by less; no mission ends and begins again so soon
+PRESENCE = "Presence/1"
+
+Placed = tuple[int, Schema | None, Channel, Message, Recorded]
+"""Corrected ``log_time`` of a message, and its records."""
+Read = TypeVar("Read")
+
+
+class OtherMission(Refusal):
+    """The recordings are of different missions, or of different starts of one."""
+
+    code = "recording.other_mission"
+    remedy = "Join only recordings of one mission that were made between one 'up' and its 'down'."
+
+
+class TooManyKeys(Refusal):
+    """The recordings have more keys, senders and schemas together than one file can hold."""
+
+    code = "recording.keys"
+    remedy = "Join fewer recordings, or record fewer keys."
+
+
+@dataclass(frozen=True, slots=True)
+class Joined:
+    """What a join made.
+
+    Attributes:
+        messages: Number of messages in the new recording.
+        left_out: Number of copies that were in another of the files too.
+        clocks: Clocks that causes bound; ``log_time`` is corrected by them.
+    """
+
+    messages: int
+    left_out: int
+    clocks: ClockOffsets
+
+
+def join(recordings: Mapping[str, Recording], to: IO[bytes]) -> Joined:
+    """Write all messages of these recordings, at least one, to a new one.
+
+    Args:
+        recordings: By their names, which refusals tell.
+
+    Raises:
+        OtherMission: They are not of one start of one mission.
+        NoRecording: One of them is damaged; what was written is no recording.
+        TooManyKeys: One file cannot hold them.
+    """
+    facts = _common_facts([recording.contents().about for recording in recordings.values()])
+    clocks = _clocks(recordings)
+    if clocks.wrong:
+        facts["clock_offsets_s"] = json.dumps({host: offset.taken_s for host, offset in clocks.wrong.items()})
+    writer = _JoinedWriter(to, facts, next(filter(None, (one.mission_xml() for one in recordings.values())), ""))
+    heard = 0
+    for placed in _each_once(heapq.merge(*_by_clock(recordings, clocks), key=itemgetter(0))):
+        heard += 1
+        if placed is not None:
+            writer.write(placed)
+    writer.finish()
+    return Joined(writer.written, heard - writer.written, clocks)
+
+
+def _clocks(recordings: Mapping[str, Recording]) -> ClockOffsets:
+    observer = ClockObserver()
+    read = (_named(name, recording.messages()) for name, recording in recordings.items())
+    for message in heapq.merge(*read, key=lambda one: one.at_s):
+        observer.take(message)
+    return observer.offsets()
+
+
+def _named(name: str, messages: Iterable[Read]) -> Iterator[Read]:
+    """Yield what is read; a refusal tells the name of the recording."""
+    try:
+        yield from messages
+    except NoRecording as error:
+        raise NoRecording(f"{name}: {error.detail}") from error
+
+
+def _common_facts(facts: Sequence[dict[str, str]]) -> dict[str, str]:
+    """Return the facts about the mission; of those that differ from recorder to recorder all values.
+
+    Raises:
+        OtherMission: They are not of one start of one mission.
+    """
+    missions = sorted({one.get("mission", "") for one in facts})
+    if len(missions) > 1:
+        raise OtherMission(f"the recordings are of the missions {', '.join(map(repr, missions))}")
+    begins = sorted(datetime.fromisoformat(one["begun"]) for one in facts if "begun" in one)
+    if begins and (begins[-1] - begins[0]).total_seconds() > SAME_BEGIN_S:
+        raise OtherMission(f"one recording's mission began at {begins[0]}, another's at {begins[-1]}")
+    names = dict.fromkeys(name for one in facts for name in one)
+    common = {name: ", ".join(dict.fromkeys(one[name] for one in facts if name in one)) for name in names}
+    if begins:
+        common["begun"] = begins[0].isoformat(timespec="milliseconds")
+    return common
+
+
+def _by_clock(recordings: Mapping[str, Recording], clocks: ClockOffsets) -> Iterator[Iterator[Placed]]:
+    """Yield, for each recording and each different offset, the messages of that offset in corrected order."""
+    offsets = {offset.taken_s for offset in clocks.offsets.values()} | {0.0}
+    for (name, recording), offset_s in itertools.product(recordings.items(), sorted(offsets)):
+        yield _named(name, _of_clock(recording, clocks, offset_s))
+
+
+def _of_clock(recording: Recording, clocks: ClockOffsets, offset_s: float) -> Iterator[Placed]:
+    for schema, channel, message, recorded in recording.records():
+        is_stamped = recorded.schema and abs(recorded.stamp_s - recorded.at_s) < 1 / NS
+        if (clocks.of(recorded.source) if is_stamped else 0.0) == offset_s:
+            yield max(0, message.log_time - round(offset_s * NS)), schema, channel, message, recorded
+
+
+def _each_once(messages: Iterable[Placed]) -> Iterator[Placed | None]:
+    """Yield each message, and None for each further copy; copies stand at the same time.
+
+    Presence is no message: each recorder writes what it sees. Only changes of it are yielded.
+    """
+    alive: dict[str, bool] = {}
+    for _at, together in itertools.groupby(messages, itemgetter(0)):
+        seen = set[object]()
+        for placed in together:
+            _ns, _schema, _channel, message, said = placed
+            if said.schema == PRESENCE:
+                is_new = alive.get(said.key) is not said.body["alive"]
+                alive[said.key] = said.body["alive"]
+            else:
+                name = (said.key, said.source, said.sequence, said.schema) if said.source else (said.key, message.data)
+                is_new = name not in seen
+                seen.add(name)
+            yield placed if is_new else None
+
+
+class _JoinedWriter:
+    """Writes records of several files into one, with numbers of its own for schemas and channels."""
+
+    def __init__(self, to: IO[bytes], facts: dict[str, str], mission_xml: str) -> None:
+        self._writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._channels: dict[tuple[str, str, int, tuple[tuple[str, str], ...]], int] = {}
+        self.written = 0
+        self._writer.start(profile=PROFILE, library=PROFILE)
+        self._writer.add_metadata(ABOUT, facts)
+        if mission_xml:
+            self._writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
+
+    def write(self, placed: Placed) -> None:
+        log_time, schema, channel, message, _said = placed
+        number = self._channel(channel, self._schema(schema) if schema is not None else 0)
+        self._writer.add_message(number, log_time, message.data, message.publish_time, message.sequence)
+        self.written += 1
+
+    def finish(self) -> None:
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+    def _schema(self, schema: Schema) -> int:
+        same = schema.name, schema.encoding, schema.data
+        known = self._schemas.get(same)
+        if known is None:
+            known = self._schemas[same] = self._writer.register_schema(*same)
+        return known
+
+    def _channel(self, channel: Channel, schema: int) -> int:
+        same = channel.topic, channel.message_encoding, schema, tuple(sorted(channel.metadata.items()))
+        known = self._channels.get(same)
+        if known is None:
+            if len(self._channels) >= MOST_CHANNELS:
+                raise TooManyKeys(f"they have more than {MOST_CHANNELS} keys, senders and schemas")
+            made = self._writer.register_channel(channel.topic, channel.message_encoding, schema, channel.metadata)
+            known = self._channels[same] = made
+        return known
