@@ -117,13 +117,13 @@ class BusBase(ABC):
         untold, self._untold = self._untold, []
         copies, length = list[Copies](), 0
         for address, conversation, messages in untold:
-            quoted = _quoted(messages)
-            size = sum(map(len, quoted))
+            written = quoted(messages)
+            size = sum(map(len, written))
             if copies and (length + size > 2 * MOST_QUOTED_BYTES or len(copies) == MOST_FEW):
                 self._publish_told(copies)
                 copies, length = [], 0
-            if quoted:
-                copies.append(Copies(address, conversation, quoted))
+            if written:
+                copies.append(Copies(address, conversation, written))
                 length += size
         if copies:
             self._publish_told(copies)
@@ -204,11 +204,11 @@ def _report_to_loop(bug: BaseException) -> None:
     asyncio.get_running_loop().call_exception_handler({"message": "bug in a bus handler", "exception": bug})
 
 
-def _quoted(messages: Sequence[Envelope[Message]]) -> list[bytes]:
+def quoted(messages: Sequence[Envelope[Message]]) -> list[bytes]:
     """Return the bytes of these messages; none if one is too long to be quoted."""
     try:
-        quoted = [write(message) for message in messages]
+        written = [write(message) for message in messages]
     except (OversizedMessage, UnwritableMessage) as refusal:
         log.info("not told: %s", refusal)
         return []
-    return quoted if max(map(len, quoted)) <= MOST_QUOTED_BYTES else []
+    return written if max(map(len, written)) <= MOST_QUOTED_BYTES else []

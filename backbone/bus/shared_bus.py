@@ -15,6 +15,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import (
     Answer,
     Clock,
@@ -38,22 +39,28 @@ class SharedSession:
 
     Args:
         secret: Secret of the mission; empty: the hub asks for none.
+        directory: Folder of the mission's files on this host; empty: none, and no recorder of this host.
 
     Raises:
         HubUnreachable: No hub listens at the endpoint.
     """
 
-    def __init__(self, mission: str, endpoint: str, secret: str = "") -> None:
+    def __init__(self, mission: str, endpoint: str, secret: str = "", directory: str = "") -> None:
         self._session = open_session(client_config(endpoint, secret))
         self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
+        self._copies = copies_for(directory)
 
     def join(self, source: str, clock: Clock) -> SharedBus:
         """Return a new member's bus. Close it before the session."""
-        return SharedBus(self._neighbors, source, clock, self._session)
+        bus = SharedBus(self._neighbors, source, clock, self._session)
+        bus.copies = self._copies
+        return bus
 
     async def close(self) -> None:
         """Close the session; return when its threads have ended."""
+        if self._copies is not None:
+            self._copies.close()
         await close_session(self._session)
 
 

@@ -20,6 +20,8 @@ from typing import Any, cast
 
 import zenoh
 
+from backbone.bus.bus_base import quoted
+from backbone.bus.host_copies import HostCopies
 from backbone.bus.inbox import (
     EachSample,
     InboxBus,
@@ -156,6 +158,8 @@ class ZenohBus(InboxBus):
         shared: bool = False,
     ) -> None:
         super().__init__(mission, source, clock)
+        self.copies: HostCopies | None = None
+        """For the recorder of this host; settable. A bus with a session of its own closes them."""
         self._session, self._is_hub, self._shared = session, is_hub, shared
         self._links = None if shared else watch_links(session)
         self._declared: set[_Declared] = set()
@@ -286,8 +290,18 @@ class ZenohBus(InboxBus):
         publisher = self._publisher(address, conversation)
         self.published += 1
         envelope = self.envelope(message)
-        publisher.put(write(envelope))
+        raw = write(envelope)
+        publisher.put(raw)
+        if self.copies is not None and self.copies.wants(conversation) and conversation is not Conversation.TOLD:
+            self.copies.send(key(self._mission, address, conversation), raw)
         return envelope
+
+    def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
+        """Publish copies if a component overhears; questions with answers go to the recorder of this host, too."""
+        super().tell(address, conversation, *messages)
+        if conversation is Conversation.ASK and self.copies is not None and self.copies.wants(conversation):
+            for raw in quoted(messages):
+                self.copies.send(key(self._mission, address, conversation), raw)
 
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender; see ``Bus.pass_on``."""
@@ -417,6 +431,8 @@ class ZenohBus(InboxBus):
         """Close the session unless other buses use it; return when its threads have ended."""
         self.empty_inbox()  # pending questions: their requesters get ``NoResponder``
         if not self._shared:
+            if self.copies is not None:
+                self.copies.close()
             await close_session(self._session)
             return
         for publisher in self._publishers.values():

@@ -372,11 +372,14 @@ def creator(
     mission: Annotated[str, typer.Option("--mission", help="Name of the mission.")],
     secret_file: SecretFile = None,
     tag: Annotated[list[str] | None, typer.Option("--tag", help="A tag of this machine; repeatable.")] = None,
+    record_to: Annotated[
+        Path | None, typer.Option("--record", metavar="FILE.mcap", help="Record all that components here say.")
+    ] = None,
 ) -> None:
     """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""
     from backbone.command_line.offering import offer_this_machine
 
-    run(lambda: offer_this_machine(mission, connect, secret_file, host, tuple(tag or [])))
+    run(lambda: offer_this_machine(mission, connect, secret_file, host, tuple(tag or []), record_to))
 
 
 @app.command()

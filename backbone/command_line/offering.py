@@ -11,10 +11,10 @@ from backbone.launcher.offer import Offering
 
 
 async def offer_this_machine(
-    mission: str, connect: str, secret_file: Path | None, host: str, tags: tuple[str, ...]
+    mission: str, connect: str, secret_file: Path | None, host: str, tags: tuple[str, ...], record: Path | None
 ) -> ExitCode:
     """Run a creator on this machine for the mission until it or a signal ends the offer."""
-    offered = Offered(mission, connect, host, tags, read_secret_option(secret_file))
+    offered = Offered(mission, connect, host, tags, read_secret_option(secret_file), record)
     is_file = secret_file is not None and str(secret_file) != "-"
     say(f"{host} is offered to mission {mission}; end with Ctrl-C")
     await Offering(offered, say, secret_file if is_file else None).run()

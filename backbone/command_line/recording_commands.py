@@ -86,6 +86,8 @@ def record_mission(
         int, typer.Option("--keep", min=0, max=1_000_000, help="Keep so many files, delete older ones; 0: all.")
     ] = 0,
     is_described: Annotated[bool, typer.Option("--described", hidden=True)] = False,
+    host_folder: Annotated[Path | None, typer.Option("--host-folder", hidden=True)] = None,
+    host_only: Annotated[bool, typer.Option("--host-only", hidden=True)] = False,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
@@ -93,10 +95,11 @@ def record_mission(
     """Record all that is said on a mission that is up, until Ctrl-C; a file that exists is refused."""
     if context.invoked_subcommand is not None:
         return
-    from backbone.command_line.recording_work import Splitting, record_to
+    from backbone.command_line.recording_work import OfLauncher, Splitting, record_to
 
     where, splitting = chosen(mission, connect, secret_file), Splitting(split_s, split_mb, keep)
-    run(lambda: record_to(where, to, keys or [], for_s, splitting, is_described=is_described))
+    told = OfLauncher(is_described, host_folder, host_only)
+    run(lambda: record_to(where, to, keys or [], for_s, splitting, told))
 
 
 @record.command()

@@ -15,7 +15,7 @@ from datetime import datetime, timedelta
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from backbone.addresses import LAUNCHER
+from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.command_line.joining import clock_lines, clocks_json
@@ -24,7 +24,7 @@ from backbone.command_line.options import DISTRIBUTION
 from backbone.command_line.unusable_file import FileUnusable
 from backbone.command_line.watching import mission_classes
 from backbone.command_line.where import Where
-from backbone.component.messages import StoryEvent
+from backbone.component.messages import AskTime, MissionTime, StoryEvent
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.launcher import mission_connection
@@ -38,6 +38,7 @@ from backbone.moments import Now
 from backbone.naming import Subsystem, address
 from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
+from backbone.recording.host_ear import HostEar
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recording, missing_numbers, recover_file
 from backbone.recording.recorder import Recorder
@@ -64,18 +65,29 @@ class Splitting:
     keep: int
 
 
-async def record_to(
-    where: Where, to: Path | None, keys: list[str], for_s: float | None, splitting: Splitting, *, is_described: bool
-) -> ExitCode:
-    """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended.
+@dataclass(frozen=True)
+class OfLauncher:
+    """What a launcher or an offer tells the recorder that it starts.
 
-    Args:
+    Attributes:
         is_described: True: the mission is described on standard input, because it cannot be asked yet.
+        host_folder: Folder of the mission's files on this host, where its processes leave copies; None: they do not.
+        host_only: True: record those alone, until standard input ends; False: their pictures, and the rest of all.
     """
+
+    is_described: bool = False
+    host_folder: Path | None = None
+    host_only: bool = False
+
+
+async def record_to(
+    where: Where, to: Path | None, keys: list[str], for_s: float | None, splitting: Splitting, told: OfLauncher
+) -> ExitCode:
+    """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended."""
     source = address(Subsystem.BACKBONE, f"recorder-{os.getpid()}")
     async with mission_connection.connected(where.mission, where.connect, source, where.secret()) as (bus, clock):
         path = to or Path(f"{bus.mission}-{datetime.now():%Y%m%d-%H%M%S}.mcap")
-        if is_described:
+        if told.is_described:
             said = json.load(sys.stdin)
             mission_xml, classes = said["mission_xml"], message_classes(said["modules"])
         else:
@@ -88,14 +100,16 @@ async def record_to(
                 split_s=splitting.after_s,
                 split_bytes=splitting.megabytes * 1_000_000,
                 classes=classes,
-                about=_about(bus, clock, keys),
+                about=await _about(bus, clock, keys),
                 keys=tuple(keys),
                 mission_xml=mission_xml,
                 user=login_name(),
+                ear=HostEar(told.host_folder, pictures_only=not told.host_only) if told.host_folder else None,
+                host_only=told.host_only,
             )
             with suppress(OSError):
                 os.nice(10)  # who decides goes before who records
-            await _run(recorder, path, for_s)
+            await _run(recorder, path, for_s, ends_with_input=told.host_only)
     say(f"{path}: {counted(recorder.written, 'message')}")
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
@@ -104,15 +118,17 @@ async def record_to(
     return ExitCode.REFUSED if recorder.full else ExitCode.DONE
 
 
-async def _run(recorder: Recorder, path: Path, for_s: float | None) -> None:
+async def _run(recorder: Recorder, path: Path, for_s: float | None, *, ends_with_input: bool) -> None:
     loop = asyncio.get_running_loop()
+    if ends_with_input:
+        loop.add_reader(sys.stdin, recorder.end)  # nothing comes but the end, when the offer is gone
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, recorder.end)
     timer = loop.call_later(for_s, recorder.end) if for_s is not None else None
-    say(f"records to {path}; Ctrl-C ends it")
     try:
-        await recorder.run()
+        await recorder.run(lambda: say(f"records to {path}; Ctrl-C ends it"))
     finally:
+        loop.remove_reader(sys.stdin)
         if timer is not None:
             timer.cancel()
 
@@ -125,11 +141,21 @@ async def _mission_file(bus: Bus) -> str:
         return ""
 
 
-def _about(bus: Bus, clock: MissionClock, keys: list[str]) -> dict[str, str]:
-    begun = datetime.now().astimezone() - timedelta(seconds=clock.now_s() / clock.rate)
+async def _begun(bus: Bus, clock: MissionClock) -> datetime:
+    """Return the time of day of mission time 0, by the nameserver's machine if possible: one for all recorders."""
+    try:
+        told = await bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)
+    except (LinkError, Refusal):
+        told = MissionTime(0.0, 1.0)
+    if told.unix_s:
+        return datetime.fromtimestamp(told.unix_s - told.at_s / told.rate).astimezone()
+    return datetime.now().astimezone() - timedelta(seconds=clock.now_s() / clock.rate)
+
+
+async def _about(bus: Bus, clock: MissionClock, keys: list[str]) -> dict[str, str]:
     facts = {
         "mission": bus.mission,
-        "begun": begun.isoformat(timespec="milliseconds"),
+        "begun": (await _begun(bus, clock)).isoformat(timespec="milliseconds"),
         "clock_rate": f"{clock.rate:g}",
         "recorded_on": socket.gethostname(),
         "recorded_keys": " ".join(keys) or "all",

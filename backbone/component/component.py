@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import time
 from collections.abc import Coroutine, Mapping
 from pathlib import Path
 from typing import ClassVar, Generic, TypeVar, cast
@@ -20,6 +21,7 @@ import msgspec
 
 from backbone.addresses import NAMESERVER
 from backbone.authentication import secret_of
+from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.abilities import NO_ABILITIES, Abilities
@@ -128,7 +130,9 @@ class Component(Generic[P_co]):
     def open_bus(cls, launch: Launch, clock: Clock) -> Bus:
         """Open the component's bus: a client of the hub, unless the class is the hub."""
         config = client_config(launch.endpoint, secret_of(launch.run_directory))
-        return ZenohBus.open(launch.mission, launch.address, clock, config)
+        bus = ZenohBus.open(launch.mission, launch.address, clock, config)
+        bus.copies = copies_for(launch.run_directory)
+        return bus
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         self.launch, self.bus, self.clock = launch, bus, clock
@@ -424,7 +428,7 @@ class Component(Generic[P_co]):
             case AskState():
                 return self.component_state()
             case AskTime():
-                return MissionTime(self.clock.now_s(), self.clock.rate)
+                return MissionTime(self.clock.now_s(), self.clock.rate, time.time())
             case AskStatistics():
                 bus = {
                     f"bus_{name}": float(value) for name, value in msgspec.structs.asdict(self.bus.statistics()).items()

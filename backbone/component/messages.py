@@ -121,10 +121,12 @@ class MissionTime(Message, frozen=True):
 
     Attributes:
         at_s: Mission time of the answer.
+        unix_s: Time of day then on the answerer's machine, seconds since 1970; 0: not known.
     """
 
     at_s: Instant
     rate: Rate
+    unix_s: Instant = 0.0
 
 
 class AskStatistics(Message, frozen=True):

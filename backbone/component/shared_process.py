@@ -195,7 +195,7 @@ def run_shared_process(launch: Launch) -> int:
 
 
 async def _live(launch: Launch) -> None:
-    session = SharedSession(launch.mission, launch.endpoint, secret_of(launch.run_directory))
+    session = SharedSession(launch.mission, launch.endpoint, secret_of(launch.run_directory), launch.run_directory)
     try:
         clock = MissionClock(launch.clock_origin_monotonic_s, launch.clock_rate)
         shared = SharedProcess(launch, session.join, clock, os.getpid())

@@ -29,7 +29,7 @@ from backbone.heaps import share_heaps
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, launcher_launch, service_launch
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.launcher.launcher import LISTING_TIME_S, Launcher
-from backbone.launcher.mission_recorder import MissionRecorder, require_new
+from backbone.launcher.mission_recorder import recorder_of_mission, require_new
 from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up
@@ -100,7 +100,11 @@ async def _with_hub(
             source=description.source,
         )
     )
-    recorder = MissionRecorder(description, options.text, options.record, clock) if options.record else None
+    recorder = (
+        recorder_of_mission(description, options.text, options.record, clock, own.run_directory)
+        if options.record
+        else None
+    )
     launcher = Launcher(
         own,
         bus,

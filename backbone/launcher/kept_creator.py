@@ -10,7 +10,7 @@ import msgspec
 
 from backbone import run_files
 from backbone.addresses import COMPONENT_DATABASE
-from backbone.authentication import keep_secret
+from backbone.authentication import SECRET_NAME, keep_secret
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
@@ -19,6 +19,7 @@ from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPo
 from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
+from backbone.launcher.mission_recorder import MissionRecorder
 
 READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
@@ -33,6 +34,7 @@ class Offered:
         endpoint: Endpoint of the mission's hub.
         host: Name of this machine in the mission.
         secret: Secret of the mission; empty: the hub asks for none.
+        record: File for what this machine says; None: its processes leave no copies.
     """
 
     mission: str
@@ -40,6 +42,25 @@ class Offered:
     host: str
     tags: tuple[str, ...] = ()
     secret: str = ""
+    record: Path | None = None
+
+
+def prepared_folder(offered: Offered) -> Path:
+    """Return the folder of the mission's files on this machine, with the secret in it."""
+    directory = run_files.prepare(f"{offered.mission}-{offered.host}")
+    if offered.secret:
+        keep_secret(directory, offered.secret)
+    return directory
+
+
+def recorder_of_host(offered: Offered, clock: Clock) -> MissionRecorder | None:
+    """Return the recorder of this machine; None: nothing is to be recorded here."""
+    if offered.record is None:
+        return None
+    directory = prepared_folder(offered)
+    options = ["--connect", offered.endpoint, "--host-folder", str(directory), "--host-only"]
+    secret = ["--secret-file", str(directory / SECRET_NAME)] if offered.secret else []
+    return MissionRecorder(offered.mission, offered.record, clock, [*options, *secret])
 
 
 class KeptCreator:
@@ -65,9 +86,7 @@ class KeptCreator:
         """
         answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
         types = [counted.component_type for counted in answered.types]
-        directory = run_files.prepare(f"{self._launch.mission}-{self._launch.host}")
-        if self._offered.secret:
-            keep_secret(directory, self._offered.secret)
+        directory = prepared_folder(self._offered)
         self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))
         self._keeper = ProcessKeeper(self._zygote, clock)
         self._keeper.on_fell = self.on_fell

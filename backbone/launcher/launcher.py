@@ -93,7 +93,7 @@ class Launcher(Component[NoParameters]):
         self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
         self._log = LogKeeper(bus)
         self.outcome = Outcome()
-        self._others = OtherHosts(description, clock.now_s())
+        self._others = OtherHosts(description, clock.now_s(), options.record)
         self._others_changed = asyncio.Event()
         self._last = LastBranch(description.last)
         self._last_begins, self._last_is_over = asyncio.Event(), asyncio.Event()

@@ -1,4 +1,4 @@
-"""The recorder of a mission that was brought up with ``--record``: a process of its own, which the launcher wants.
+"""The recorder of a mission, or of one of its hosts, that was told to ``--record``: a process of its own.
 
 It begins before the first component and ends after the last. If it ends early, the recording goes on in a further file;
 if its file can grow no more, it is absent with the reason.
@@ -7,12 +7,13 @@ if its file can grow no more, it is absent with the reason.
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import logging
 import os
 import sys
 from asyncio.subprocess import DEVNULL, PIPE, Process
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -49,27 +50,46 @@ def require_new(path: Path) -> None:
         raise RecorderFailed(f"{path.absolute().parent} cannot be written")
 
 
+def first_free(path: Path) -> Path:
+    """Return the first name of a series of recordings that no file has: ``night.mcap``, ``night-2.mcap`` and so on."""
+    numbered = (path.with_stem(f"{path.stem}-{number}") for number in itertools.count(2))
+    return next(each for each in itertools.chain((path,), numbered) if not each.exists())
+
+
+def recorder_of_mission(
+    description: MissionDescription, text: bytes, path: Path, clock: Clock, run_directory: str
+) -> MissionRecorder:
+    """Return the recorder beside the launcher; on several hosts each host records its own pictures.
+
+    Args:
+        text: The mission file.
+    """
+    modules = sorted({kind.class_path.partition(":")[0] for kind in description.types})
+    facts = json.dumps({"mission_xml": text.decode(), "modules": modules}).encode()
+    own_pictures = ["--host-folder", run_directory] if description.other_hosts else []
+    return MissionRecorder(description.name, path, clock, ["--described", *own_pictures], facts)
+
+
 class MissionRecorder:
     """Keeps one recorder running.
 
     Args:
-        description: The mission.
-        text: Its file.
-        path: Of the recording.
+        mission: Its name.
+        path: Of the recording; the first free name of its series is used.
+        options: Further options of the command ``record``.
+        facts: What it reads from standard input.
 
     Attributes:
         on_changed: Called with one line for people when the recorder was lost, or goes on.
     """
 
-    def __init__(self, description: MissionDescription, text: bytes, path: Path, clock: Clock) -> None:
+    def __init__(self, mission: str, path: Path, clock: Clock, options: Sequence[str], facts: bytes = b"") -> None:
         self.on_changed: Callable[[str], None] = lambda _line: None
-        self._mission, self._path, self._clock = description.name, path.absolute(), clock
-        modules = sorted({kind.class_path.partition(":")[0] for kind in description.types})
-        self._facts = json.dumps({"mission_xml": text.decode(), "modules": modules}).encode()
+        self._mission, self._path, self._clock = mission, path.absolute(), clock
+        self._options, self._facts = options, facts
         self._process: Process | None = None
         self._reading: asyncio.Task[str] | None = None
         self._absence: Absence | None = None
-        self._files = 0
 
     def absence(self) -> Absence | None:
         """Return the recorder as absent while it does not run."""
@@ -81,12 +101,10 @@ class MissionRecorder:
         Raises:
             RecorderFailed: It did not begin; the detail says why.
         """
-        self._files += 1
-        number = f"-{self._files}" if self._files > 1 else ""
-        path = self._path.with_stem(f"{self._path.stem}{number}")
+        path = first_free(self._path)
         command = ["-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
         self._process = process = await asyncio.create_subprocess_exec(
-            *(sys.executable, *command, "--described"),
+            *(sys.executable, *command, *self._options),
             stdin=PIPE,
             stdout=DEVNULL,
             stderr=PIPE,
@@ -136,12 +154,16 @@ class MissionRecorder:
         self._process = None
 
     async def _tell_facts(self, process: Process) -> str:
-        """Tell it what it cannot ask for yet; return the first line that it says."""
+        """Tell it what it cannot ask for yet; return the first line that it says.
+
+        Without facts its input stays open: its end tells the recorder that the process that started it is gone.
+        """
         assert process.stdin is not None and process.stderr is not None  # noqa: S101, PT018  both are pipes
-        with suppress(ConnectionError):
-            process.stdin.write(self._facts)
-            await process.stdin.drain()
-        process.stdin.close()
+        if self._facts:
+            with suppress(ConnectionError):
+                process.stdin.write(self._facts)
+                await process.stdin.drain()
+            process.stdin.close()
         return (await process.stderr.readline()).decode(errors="replace")
 
     async def _ended(self) -> str:

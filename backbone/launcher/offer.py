@@ -31,8 +31,9 @@ from backbone.creator.messages import (
     offer_name,
 )
 from backbone.errors import HubUnreachable, LinkError, Refusal
-from backbone.launcher.kept_creator import KeptCreator, Offered
+from backbone.launcher.kept_creator import KeptCreator, Offered, recorder_of_host
 from backbone.launcher.mission_connection import clock_elsewhere, mission_clock
+from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.naming import Subsystem, legal
 from backbone.waiting import set_within
 from backbone.wire import Accepts, Envelope, Message
@@ -63,17 +64,27 @@ class MachineOffer(Component[NoParameters]):
     accepts: ClassVar[Accepts | None] = ListProcesses
 
     def __init__(
-        self, launch: Launch, bus: Bus, clock: Clock, creator: KeptCreator, on_ready: Callable[[], None]
+        self,
+        launch: Launch,
+        bus: Bus,
+        clock: Clock,
+        creator: KeptCreator,
+        on_ready: Callable[[], None],
+        recorder: MissionRecorder | None = None,
     ) -> None:
         super().__init__(launch, bus, clock)
-        self._creator, self._on_ready = creator, on_ready
+        self._creator, self._on_ready, self._recorder = creator, on_ready, recorder
         creator.on_fell, creator.on_changed = self._creator_fell, self.changed
         self._link_up, self._link_fell = asyncio.Event(), asyncio.Event()
         self.ending = Ending.ORDERED
 
     async def connect(self) -> None:
-        """Start the creator; if the link is lost meanwhile, end."""
+        """Start the recorder, then the creator; if the link is lost meanwhile, end."""
         self.start_task(self._watch_link(), "link")
+        if self._recorder is not None:
+            await self._recorder.begin()
+            self._recorder.on_changed = self._recorder_changed
+            self.start_task(self._recorder.keep(), "recorder")
         await self._creator.start(self.bus, self.clock)
 
     async def serve(self) -> None:
@@ -87,12 +98,17 @@ class MachineOffer(Component[NoParameters]):
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
-        """Return the creator as absent while it does not run or respond."""
-        return self._creator.absences()
+        """Return creator and recorder as absent while they do not run or respond."""
+        lost = self._recorder.absence() if self._recorder is not None else None
+        return [*self._creator.absences(), *([lost] if lost is not None else [])]
 
     async def drain(self) -> None:
         """End the creator and all its components."""
         await self._creator.close()
+
+    def _recorder_changed(self, line: str) -> None:
+        self.publish_event(self.name, line, LogLevel.WARNING)
+        self.changed()
 
     def _creator_fell(self, fell: ProcessFell) -> None:
         self.publish_event(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
@@ -212,12 +228,14 @@ class Offering:
                 "the mission's (--secret-file), or the hub is just starting"
             ) from error
         launch = _launch(offered, name, clock)
-        creator = KeptCreator(launch, offered)
-        offer = self._current = MachineOffer(launch, bus, clock, creator, self._is_in_the_mission)
+        creator, recorder = KeptCreator(launch, offered), recorder_of_host(offered, clock)
+        offer = self._current = MachineOffer(launch, bus, clock, creator, self._is_in_the_mission, recorder)
         try:
             await offer.run()
         finally:
             await creator.close()
+            if recorder is not None:
+                await recorder.end()
             self._current = None
         return offer
 

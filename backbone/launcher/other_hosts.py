@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
+from pathlib import Path
 
 from backbone.authentication import SECRET_NAME, tcp_endpoint
 from backbone.component.messages import Absence
@@ -22,11 +23,16 @@ def endpoint_for_others(description: MissionDescription) -> str:
     return tcp_endpoint(first.address, first.port) if description.other_hosts else ""
 
 
-def command_on(host: Host, description: MissionDescription) -> str:
-    """Return the command that offers this machine to the mission; the file ``secret`` is a copy of the mission's."""
+def command_on(host: Host, description: MissionDescription, record: Path | None = None) -> str:
+    """Return the command that offers this machine to the mission; the file ``secret`` is a copy of the mission's.
+
+    Args:
+        record: Recording of the mission on its first host; None: it is not recorded.
+    """
     words = ["scout-backbone", "creator", "--host", host.name, "--connect", endpoint_for_others(description)]
     words += ["--mission", description.name, *(word for tag in host.tags for word in ("--tag", tag))]
-    return shlex.join([*words, "--secret-file", SECRET_NAME])
+    own = ["--record", record.with_stem(f"{record.stem}-{host.name}").name] if record is not None else []
+    return shlex.join([*words, "--secret-file", SECRET_NAME, *own])
 
 
 @dataclass
@@ -40,10 +46,11 @@ class OtherHosts:
 
     Args:
         now_s: Mission time from which on they count as missing.
+        record: Recording of the mission on its first host; None: it is not recorded.
     """
 
-    def __init__(self, description: MissionDescription, now_s: float) -> None:
-        self._commands = {host.name: command_on(host, description) for host in description.other_hosts}
+    def __init__(self, description: MissionDescription, now_s: float, record: Path | None = None) -> None:
+        self._commands = {host.name: command_on(host, description, record) for host in description.other_hosts}
         self.names = list(self._commands)
         """Names of all other machines, in the order of the mission file."""
         self._creators = {address(Subsystem.BACKBONE, creator_name(host)): host for host in self._commands}

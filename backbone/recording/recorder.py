@@ -9,9 +9,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from backbone.addresses import COMPONENT_DATABASE, RC_MANAGER
+from backbone.bus.host_copies import PICTURES
 from backbone.bus.interface import Bus, Clock, Overhearing, Reply
 from backbone.component.messages import (
     AskParameters,
@@ -31,6 +32,7 @@ from backbone.naming import component_of
 from backbone.rc_manager.messages import AskSchedule, AskSnapshot, ScheduleSnapshot
 from backbone.recording.files import SPLIT_BYTES, SPLIT_S, RecordingFiles
 from backbone.recording.hearing import to_overhear
+from backbone.recording.host_ear import HostEar
 from backbone.recording.presence import Presence
 from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.views import Schedule
@@ -64,6 +66,8 @@ class Recorder:
         keys: Patterns of the keys to record, without ``scout/<mission>/``; empty: all.
         mission_xml: The mission's file; empty: not known.
         user: The person who records; empty: nobody.
+        ear: Where it hears the processes of its host without the network; None: it overhears all on the bus.
+        host_only: True: it hears those alone, and asks nobody; False: of others all but pictures.
     """
 
     def __init__(
@@ -79,9 +83,12 @@ class Recorder:
         keys: tuple[str, ...] = (),
         mission_xml: str = "",
         user: str = "",
+        ear: HostEar | None = None,
+        host_only: bool = False,
     ) -> None:
         self._bus, self._clock, self._user = bus, clock, user
         self._files, self._keys = files, keys
+        self._ear, self._host_only = ear, host_only and ear is not None
         self._split_s, self._split_bytes = split_s, split_bytes
         self._facts = classes, about, keys, mission_xml
         self._writer, self._before = self._new_writer(), 0
@@ -104,24 +111,29 @@ class Recorder:
     @property
     def dropped(self) -> int:
         """Messages that it had no time for."""
-        return sum(each.dropped for each in self._subscribed)
+        return sum(each.dropped for each in self._subscribed) + (self._ear.dropped if self._ear is not None else 0)
 
     def end(self) -> None:
         """End in good order; then ``run`` returns."""
         self._ended.set()
 
-    async def run(self) -> None:
+    async def run(self, on_begun: Callable[[], None] = lambda: None) -> None:
         """Record until the end; then the file is whole, unless the disc is full.
+
+        Args:
+            on_begun: Called when it listens.
 
         Raises:
             BaseException: A bug ended it.
         """
         self._bus.on_bug = self._fail
-        for conversation in to_overhear(self._keys):
-            self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
-        self._bus.watch_alive("*/*", self._alive_changed)
+        if self._ear is not None:
+            await self._ear.open(self._heard, self._fail)
+        if not self._host_only:
+            self._overhear()
         self._bus.watch_link(self._link_changed)
         self._say(f"{self._who} records the mission to {self._files.path.name}", LogLevel.NOTICE)
+        on_begun()
         asking = asyncio.create_task(self._ask(), name="what was said before")
         try:
             await self._flush_until_end()
@@ -129,11 +141,20 @@ class Recorder:
             asking.cancel()
             await asyncio.wait({asking})
             await self._hear_the_last()
+            if self._ear is not None:
+                await self._ear.close()
             self._finish()
         if not asking.cancelled():
             asking.result()
         if self._bug is not None:
             raise self._bug
+
+    def _overhear(self) -> None:
+        elsewhere = PICTURES if self._ear is not None else frozenset()
+        for conversation in to_overhear(self._keys):
+            if conversation not in elsewhere:
+                self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
+        self._bus.watch_alive("*/*", self._alive_changed)
 
     async def _flush_until_end(self) -> None:
         dropped, silent_s = 0, 0.0
@@ -227,7 +248,7 @@ class Recorder:
     # ------------------------------------------------------------------ what was said before
     async def _ask(self) -> None:
         """Ask for what was said before anybody overheard it; the answers come as all others do."""
-        if Conversation.TOLD in to_overhear(self._keys):
+        if not self._host_only and Conversation.TOLD in to_overhear(self._keys):
             await asyncio.gather(self._ask_for_snapshots(), self._ask_who_appears())
 
     async def _ask_for_snapshots(self) -> None:

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import tempfile
 import time
+from asyncio.subprocess import PIPE
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,11 +23,16 @@ from running_mission import BIN, MISSION_XML, RunningMission, mission_up
 from tutorial_commands import run_all
 
 from backbone.addresses import RC_MANAGER
+from backbone.bus.host_copies import HostCopies
+from backbone.component.messages import StoryEvent
+from backbone.keys import Conversation
+from backbone.keys import key as key_of
 from backbone.rc_manager.messages import AskSchedule, AskWhy
 from backbone.recording.decisions import decided_anew
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.reasons import reasons_at
 from backbone.scheduling.views import Schedule, Why
+from backbone.wire import WIRE_VERSION, Envelope, write
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
 
@@ -192,6 +198,31 @@ def test_a_recorder_that_is_killed_is_absent_until_the_recording_goes_on(tmp_pat
         assert mission.down() == 0, mission.story()
     assert path.with_stem("it-2").stat().st_size > 0
     assert messages(path.with_stem("it-2"))
+
+
+async def test_the_recorder_of_a_host_writes_its_copies_alone_and_ends_with_the_process_that_started_it(
+    mission: RunningMission, tmp_path: Path
+) -> None:
+    path = tmp_path / "far.mcap"
+    with tempfile.TemporaryDirectory(prefix="s-") as folder:
+        words = ["record", "--to", str(path), "--mission", mission.name, "--host-folder", folder, "--host-only"]
+        recorder = await asyncio.create_subprocess_exec(
+            *(str(BIN / "scout-backbone"), *words), env=mission.environment, stdin=PIPE, stderr=PIPE
+        )
+        assert recorder.stdin is not None
+        assert recorder.stderr is not None
+        async with asyncio.timeout(30.0):
+            await recorder.stderr.readline()
+            copies = HostCopies(Path(folder))
+            story = StoryEvent(1.0, "resource_pool/far", "it is far", "far", "")
+            envelope = Envelope(WIRE_VERSION, "resource_pool/far", 1, mission.clock.now_s(), "", story)
+            copies.send(key_of(mission.name, "resource_pool/far", Conversation.LOG), write(envelope))
+            await asyncio.sleep(1.0)
+            copies.close()
+            recorder.stdin.close()
+            assert await recorder.wait() == 0
+    [found] = messages(path)
+    assert (found.id, found.body["what"]) == ("resource_pool/far#1", "it is far")
 
 
 def test_a_recording_that_exists_is_refused_before_anything_runs(tmp_path: Path) -> None:

@@ -240,9 +240,9 @@ def machines(folder: Path, *options: str) -> Iterator[ThreeHosts]:
 
 
 @contextlib.contextmanager
-def mission_on_three_hosts(folder: Path) -> Iterator[ThreeHosts]:
+def mission_on_three_hosts(folder: Path, *options: str) -> Iterator[ThreeHosts]:
     """Give the mission when it is whole; take it down afterwards, and see that nothing is left on any machine."""
-    with machines(folder) as mission:
+    with machines(folder, *options) as mission:
         for host in ("near", "far"):
             mission.type_what_up_prints(host)
         mission.wait(

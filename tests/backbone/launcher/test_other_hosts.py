@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from typer.testing import CliRunner
 
@@ -67,3 +69,9 @@ def test_the_command_line_understands_the_printed_command(host: Host, monkeypatc
     monkeypatch.chdir("/")
     done = CliRunner().invoke(app, words[1:])  # there is no file 'secret' in /
     assert (done.exit_code, "run.secret" in done.output) == (4, True)
+
+
+def test_of_a_mission_that_is_recorded_each_host_is_told_to_record_what_it_says() -> None:
+    command = command_on(FAR, mission(BASE, FAR), Path("/data/night.mcap"))
+    assert command.endswith("--record night-far.mcap")
+    assert "--record" not in command_on(FAR, mission(BASE, FAR))

@@ -1,0 +1,128 @@
+"""What a process sends reaches the recorder of its host whole and in order; nobody waits for that recorder."""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from backbone.bus import host_copies
+from backbone.bus.host_copies import MOST_WAITING_BYTES, HostCopies
+from backbone.keys import Conversation
+from backbone.recording.host_ear import HostEar
+
+KEY = "scout/night/resource_pool/scout1/frames"
+WITHIN_S = 10.0
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="s-") as name:
+        yield Path(name)
+
+
+class Heard(list[tuple[str, bytes]]):
+    def take(self, key: str, raw: bytes) -> None:
+        self.append((key, raw))
+
+
+def fail(bug: BaseException) -> None:
+    raise bug
+
+
+@asynccontextmanager
+async def listening(folder: Path, heard: Heard, *, pictures_only: bool = False) -> AsyncIterator[HostEar]:
+    ear = HostEar(folder, pictures_only=pictures_only)
+    await ear.open(heard.take, fail)
+    try:
+        yield ear
+    finally:
+        await ear.close()
+
+
+async def until(holds: Callable[[], bool], what: str) -> None:
+    try:
+        async with asyncio.timeout(WITHIN_S):
+            while not holds():  # noqa: ASYNC110  the socket's other end sets no event
+                await asyncio.sleep(0.01)
+    except TimeoutError:
+        pytest.fail(f"not within {WITHIN_S} s: {what}")
+
+
+async def test_copies_arrive_whole_and_in_order_large_ones_too(folder: Path) -> None:
+    heard = Heard()
+    async with listening(folder, heard) as ear:
+        copies = HostCopies(folder)
+        sent = [(KEY, bytes([n]) * (n * 40_000)) for n in range(12)] + [(KEY, b"last")]
+        for key, raw in sent:
+            copies.send(key, raw)
+        await until(lambda: len(heard) == len(sent), "all came")
+        assert heard == sent
+        assert (copies.dropped, ear.dropped) == (0, 0)
+        copies.close()
+
+
+async def test_while_a_recorder_hangs_copies_are_dropped_and_counted(folder: Path) -> None:
+    heard = Heard()
+    async with listening(folder, heard) as ear:
+        copies = HostCopies(folder)
+        picture, count = bytes(100_000), 200
+        for _ in range(count):  # without a turn for the recorder
+            copies.send(KEY, picture)
+        assert 0 < copies.dropped < count
+        assert (count - copies.dropped) * len(picture) < MOST_WAITING_BYTES + 1_000_000
+        await until(lambda: len(heard) == count - copies.dropped, "what was not dropped came")
+        copies.send(KEY, b"after")
+        await until(lambda: ear.dropped == copies.dropped, "the recorder knows how many were dropped")
+        assert heard[-1] == (KEY, b"after")
+        copies.close()
+        await until(lambda: copies.dropped == ear.dropped, "they are still counted")
+
+
+async def test_a_recorder_that_begins_late_or_again_gets_what_is_sent_from_then_on(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(host_copies, "LOOK_EACH_S", 0.02)
+    copies, heard = HostCopies(folder), Heard()
+    assert not copies.wants(Conversation.LOG)
+    copies.send(KEY, b"too early")
+    for again in range(2):
+        async with listening(folder, heard):
+            await until(lambda: copies.wants(Conversation.LOG), "it found the recorder")
+            copies.send(KEY, b"%d" % again)
+            await until(lambda n=again: len(heard) == n + 1, "it came")  # type: ignore[misc]
+
+        def is_lost() -> bool:
+            copies.send(KEY, b"to nobody")
+            return not copies.wants(Conversation.LOG)
+
+        await until(is_lost, "it noticed that the recorder is gone")
+    assert heard == [(KEY, b"0"), (KEY, b"1")]
+    copies.close()
+
+
+async def test_of_a_host_whose_recorder_wants_pictures_only_pictures_are_copied(folder: Path) -> None:
+    async with listening(folder, Heard(), pictures_only=True):
+        copies = HostCopies(folder)
+        wanted = {conversation for conversation in Conversation if copies.wants(conversation)}
+        assert wanted == {Conversation.FRAMES, Conversation.VIEWS}
+        copies.close()
+        assert not copies.wants(Conversation.FRAMES)
+        copies.close()
+
+
+async def test_nonsense_on_the_socket_ends_that_connection_alone(folder: Path) -> None:
+    heard = Heard()
+    async with listening(folder, heard):
+        _reader, writer = await asyncio.open_unix_connection(folder / "all.sock")
+        writer.write(b"\xff" * 100)
+        assert await _reader.read() == b""
+        writer.close()
+        copies = HostCopies(folder)
+        copies.send(KEY, b"sense")
+        await until(lambda: bool(heard), "sense came")
+        copies.close()
