@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import subprocess
@@ -21,10 +22,12 @@ from backbone.recording.reader import Recorded, Recording, missing_numbers
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 
 HOSTS = ("base", "near", "far")
+FAR_ROBOT = "resource_pool/scout2"
 PICTURES = ("*/frames",)
 RECORDED_S = 6.0
 UNANSWERED = 40  # grabber and localizer ask a world in vain that is not there yet; those that end are asked once more
 OFF_S = 2.0
+CUT_S = 6.0  # longer than a host that is cut off goes on
 
 
 class Night:
@@ -54,8 +57,7 @@ class Night:
         return not message.key.endswith("/ask") or self.hosts.get(address_of(message.key)) == host
 
     def of(self, host: str, patterns: tuple[str, ...] = ()) -> list[Recorded]:
-        with self.files[host].open("rb") as file:
-            return [*Recording(file).messages(patterns)]
+        return messages(self.files[host], patterns)
 
 
 @pytest.fixture(scope="module")
@@ -95,8 +97,7 @@ def test_pictures_are_recorded_by_their_own_host(night: Night) -> None:
 
 
 def test_the_joined_file_has_each_message_once_and_right_clocks_stay_right(night: Night) -> None:
-    with night.joined.open("rb") as file:
-        found = [*Recording(file).messages()]
+    found = messages(night.joined)
     named = [(one.key, one.source, one.sequence, one.schema, one.stamp_s) for one in found if one.source]
     assert len(named) == len(set(named))
     heard = {(one.source, one.sequence, one.stamp_s) for host in HOSTS for one in night.of(host) if one.source}
@@ -132,3 +133,35 @@ def before_their_causes(messages: list[Recorded] | Iterator[Recorded]) -> list[s
     for number, one in enumerate(listed):
         place.setdefault(one.id, number)
     return [one.id for number, one in enumerate(listed) if place.get(one.cause, -1) > number]
+
+
+@pytest.mark.alone
+def test_what_a_host_says_while_its_link_is_cut_is_recorded_and_afterwards_it_goes_on_in_a_further_file(
+    short_path: Path,
+) -> None:
+    with mission_on_three_hosts(short_path, "--record", "night.mcap") as mission:
+        far = mission.hosts["far"]
+        time.sleep(2.0)
+        far.cut()
+        time.sleep(CUT_S)
+        far.heal()
+        mission.wait("the mission is whole again", mission.is_whole, 60.0)
+        time.sleep(2.0)
+        left = Night(mission)
+    further = far.folder / "night-far-2.mcap"
+    again_s = messages(further)[0].at_s
+    seen_s = max(one.at_s for one in left.of("base") if one.source == FAR_ROBOT and one.at_s < again_s)
+    during = {one.id for one in left.of("far") if one.source == FAR_ROBOT and one.at_s > seen_s}
+    assert during
+    with contextlib.ExitStack() as stack:
+        paths = [*left.files.values(), further]
+        opened = {str(path): Recording(stack.enter_context(path.open("rb"))) for path in paths}
+        join(opened, made := io.BytesIO())
+    found = [*Recording(made).messages()]
+    assert during <= {one.id for one in found if seen_s < one.at_s < again_s}
+    assert {one.id for one in messages(further)} <= {one.id for one in found}
+
+
+def messages(path: Path, patterns: tuple[str, ...] = ()) -> list[Recorded]:
+    with path.open("rb") as file:
+        return [*Recording(file).messages(patterns)]
