@@ -1,0 +1,204 @@
+"""What watchers cost a person who drives: a hundred commands a second, while others attach, watch all, and leave.
+
+Brings the mission of IROS 2001 up and takes its third Scout as a console does. Turns it by a command every 10 ms, in
+parts of three kinds that take turns:
+
+* ``watched``: a process attaches to the mission, watches all keys as ``scout-backbone watch`` does, and leaves, several
+  times. It is one process, so no interpreter starts meanwhile.
+* ``floor``: that process waits, as long.
+* ``busy``: it uses as much of a core for as long, and knows no mission: what a watcher costs by being on this machine.
+
+``applied`` is from the wish, or from when it was due if the command before was late, until the robot's RC had applied
+it; ``answered`` until the console knew. Prints one JSON line. Ratios are of ``applied``, with watchers over the floor;
+``ratio_p99_of_parts`` is of the median parts, so that a moment in which the machine did something else counts less, and
+``ratio_p99_of_busy_parts`` the same over ``busy``: what the mission does for watchers.
+
+With ``--cycles 1 --seconds 10`` a watcher stays through its part: what watching costs, without attaching and leaving.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import io
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from dataclasses import dataclass, field
+from statistics import median
+
+import uvloop
+from measuring import BIN, MISSION_XML, percentile, report, summary
+
+from backbone.command_line.watching import Watched, watch
+from backbone.command_line.where import Where
+from backbone.recording.known_messages import message_classes
+from ui_console.model.driving import MoveWish
+from ui_console.model.events import CommandApplied, ConsoleEvent
+from ui_console.session.joining import join
+from ui_console.session.teleoperation import Teleoperation
+
+WHERE = Where("iros2001", None, None)
+CLAIM = {"robot": "scout3", "kind": "drive", "priority": 100}
+TURN = MoveWish(forward_m_s=0.0, turn_rad_s=0.3)  # chosen: the robot stays where it is
+PERIOD_S = 0.01  # a command loop of 100 Hz
+WATCHES_S = 0.2  # chosen: as long as a person needs to see that the mission speaks
+SETTLE_S = 1.0  # chosen: what a part began is over before the next
+KINDS = ("watched", "floor", "busy")
+TURNS = (*KINDS, "watched", "busy", "floor")
+"""Each kind follows both others; the first is watched, because the others last as long."""
+
+
+@dataclass
+class Times:
+    """Seconds of each command in the parts of one kind.
+
+    Attributes:
+        late_s: Of each part, the time until applied under which 99 % of its commands lie.
+    """
+
+    applied_s: list[float] = field(default_factory=list)
+    answered_s: list[float] = field(default_factory=list)
+    late_s: list[float] = field(default_factory=list)
+    failed: int = 0
+
+
+class Driver:
+    """Turns the robot by a command every ``PERIOD_S``.
+
+    Attributes:
+        times: Of each kind of part.
+        shown: Number of messages that watchers showed.
+    """
+
+    def __init__(self) -> None:
+        self.times: dict[str, Times] = defaultdict(Times)
+        self.shown = 0
+        self._applied_s = 0.0
+
+    def heard(self, event: ConsoleEvent) -> None:
+        """Note when the RC applied a command."""
+        if isinstance(event, CommandApplied):
+            self._applied_s = event.at_s
+
+    async def drive(self, console: Teleoperation, part: asyncio.Task[bytes], times: Times) -> None:
+        """Command until the part is over; mission times are those of the machine."""
+        clock, due_s, before = console.clock, console.clock.now_s(), len(times.applied_s)
+        while not part.done():
+            due_s += PERIOD_S
+            began_s = due_s
+            if clock.now_s() < due_s:
+                await clock.sleep_until_s(due_s)
+                began_s = clock.now_s()
+            if await console.do(TURN):
+                times.applied_s.append(self._applied_s - began_s)
+                times.answered_s.append(clock.now_s() - began_s)
+            else:
+                times.failed += 1
+        times.late_s.append(percentile(times.applied_s[before:], 0.99))
+        self.shown += int(part.result())
+
+
+class Counter(io.TextIOBase):
+    """Counts what is printed; a terminal would cost more."""
+
+    def __init__(self) -> None:
+        self.lines = 0
+
+    def write(self, text: str) -> int:
+        """Count the lines."""
+        self.lines += text.count("\n")
+        return len(text)
+
+
+def be_watcher(cycles: int, seconds: float) -> None:
+    """Do a part of the kind that each line of the input says; print how many messages were shown."""
+    message_classes()  # read once, not at each attaching
+    lasted_s = used_s = 0.0
+    for line in sys.stdin:
+        began_s, used_before_s, counter = time.monotonic(), time.process_time(), Counter()
+        if line.strip() == "watched":
+            with contextlib.redirect_stdout(counter):
+                for _ in range(cycles):
+                    uvloop.run(watch(WHERE, Watched((), for_s=seconds)))
+            lasted_s, used_s = time.monotonic() - began_s, time.process_time() - used_before_s
+        else:
+            for cycle in range(1, cycles + 1):
+                while line.strip() == "busy" and time.process_time() - used_before_s < used_s * cycle / cycles:
+                    pass
+                time.sleep(max(0.0, began_s + lasted_s * cycle / cycles - time.monotonic()))
+        print(counter.lines, flush=True)
+
+
+async def measure(given: argparse.Namespace) -> Driver:
+    """Drive in parts of all kinds; return the driver."""
+    driver = Driver()
+    words = ["--watcher", "--cycles", str(given.cycles), "--seconds", str(given.seconds)]
+    watcher = await asyncio.create_subprocess_exec(
+        sys.executable, __file__, *words, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    orders, answers = watcher.stdin, watcher.stdout
+    assert orders is not None
+    assert answers is not None
+
+    async def work(console: Teleoperation) -> None:
+        await console.wait_granted()
+        for number in range(len(KINDS) * given.rounds):
+            kind = TURNS[number % len(TURNS)]
+            await console.clock.sleep_s(SETTLE_S)
+            orders.write(f"{kind}\n".encode())
+            await driver.drive(console, asyncio.create_task(answers.readline()), driver.times[kind])
+
+    joining = await join(WHERE, dict(CLAIM))
+    bus = await joining.open_bus()
+    await Teleoperation(joining.launch, bus, joining.clock, show=driver.heard, work=work, watches=False).run()
+    orders.close()
+    await watcher.wait()
+    return driver
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--watcher", action="store_true", help="be the process that attaches, watches and leaves")
+    parser.add_argument("--rounds", type=int, default=10, help="parts of each kind")
+    parser.add_argument("--cycles", type=int, default=5, help="watchers in a part, one after the other")
+    parser.add_argument("--seconds", type=float, default=WATCHES_S, help="how long each of them watches")
+    given = parser.parse_args()
+    if given.watcher:
+        be_watcher(given.cycles, given.seconds)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        command = [str(BIN / "scout-backbone"), "up", str(MISSION_XML), "--headless"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
+            assert launcher.stderr is not None
+            next(line for line in launcher.stderr if line.startswith("all ready"))
+            driver = uvloop.run(measure(given))
+            launcher.terminate()
+            launcher.stderr.read()
+    kinds = [(kind, driver.times[kind]) for kind in KINDS]
+    half, late = ({kind: percentile(times.applied_s, share) for kind, times in kinds} for share in (0.5, 0.99))
+    of_parts = {kind: median(times.late_s) for kind, times in kinds}
+    report(
+        "watching",
+        attached=given.rounds * given.cycles,
+        messages_shown=driver.shown,
+        commands={kind: len(times.applied_s) for kind, times in kinds},
+        failed={kind: times.failed for kind, times in kinds},
+        applied={kind: summary(times.applied_s) for kind, times in kinds},
+        answered={kind: summary(times.answered_s) for kind, times in kinds},
+        ratio=round(half["watched"] / half["floor"], 3),
+        ratio_p99=round(late["watched"] / late["floor"], 3),
+        ratio_p99_of_parts=round(of_parts["watched"] / of_parts["floor"], 3),
+        ratio_p99_of_busy_parts=round(of_parts["watched"] / of_parts["busy"], 3),
+        aim_p99=1.05,
+    )
+
+
+if __name__ == "__main__":
+    main()
