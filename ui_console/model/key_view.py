@@ -1,0 +1,87 @@
+"""Key view: the newest message of one key, and its numbers over time. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ui_console.model.message_views import (
+    UNREADABLE,
+    FieldRow,
+    MessageView,
+    Picture,
+    Views,
+    field_rows,
+)
+from ui_console.model.series import SPAN_S, Series
+
+MOST_SERIES = 200  # chosen: as many as a message has rows
+
+
+class KeyView:
+    """What is shown of the messages of one key and schema; its size is bounded however many come.
+
+    Args:
+        schema: Of the messages.
+        views: Schema → how it is shown.
+        span_s: How much of the past its plots keep, mission seconds.
+    """
+
+    def __init__(self, schema: str, views: Views, span_s: float = SPAN_S) -> None:
+        self._view, self._span_s = views.get(schema, MessageView)(), span_s
+        self._series: dict[str, Series] = {}
+        self._newest: tuple[float, int] | None = None
+        self.rows: Sequence[FieldRow] = ()
+        """Of the newest message."""
+        self.picture: Picture | None = None
+        """Of the newest message; None: it has none."""
+        self.messages = 0
+        """Number of messages so far."""
+        self.trouble = ""
+        """Why the message is shown as a table of its fields; empty: its view shows it."""
+
+    @property
+    def at_s(self) -> float:
+        """Mission time of the newest message; −1: there was none."""
+        return self._newest[0] if self._newest is not None else -1.0
+
+    def take(self, body: object, at_s: float, sequence: int) -> None:
+        """Show a message.
+
+        Args:
+            body: Its fields by name; or a list, or bytes, if its class is not known here.
+            at_s: Mission time of its sending.
+            sequence: Number among those of its sender. The newest message, said again by a player, changes nothing.
+        """
+        if self._newest == (at_s, sequence):
+            return
+        self._newest = at_s, sequence
+        self.messages += 1
+        self.trouble = ""
+        self.rows, self.picture = self._shown(body)
+        for row in self.rows:
+            if row.number is not None:
+                self._series_of(row.name).add(at_s, row.number)
+
+    def series(self, name: str) -> Series | None:
+        """Return the numbers of a row over time; None: it has none."""
+        return self._series.get(name)
+
+    def names(self) -> list[str]:
+        """Return the rows that have numbers, in their order in the newest message."""
+        return [row.name for row in self.rows if row.name in self._series and row.number is not None]
+
+    def _shown(self, body: object) -> tuple[Sequence[FieldRow], Picture | None]:
+        if isinstance(body, Mapping):
+            try:
+                return self._view.rows(body), self._view.picture(body)
+            except UNREADABLE as error:
+                self.trouble = f"{type(self._view).__name__} cannot show it: {type(error).__name__} {error}"
+        return field_rows(body), None
+
+    def _series_of(self, name: str) -> Series:
+        """Return the series, a new one in place of the one that was begun first if there are too many."""
+        if name not in self._series:
+            if len(self._series) >= MOST_SERIES:
+                del self._series[next(iter(self._series))]
+            self._series[name] = Series(self._span_s)
+        return self._series[name]

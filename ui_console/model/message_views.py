@@ -1,0 +1,163 @@
+"""Message views: how a message of a schema is shown. Pure.
+
+A package names its views as entry points of the group ``scout_backbone.views``: tables of schema → class derived from
+``MessageView``. A message of any other schema is shown as a table of its fields.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from importlib.metadata import entry_points
+from itertools import islice
+
+import msgspec
+
+from backbone.printable_text import printable
+from backbone.spoken import counted
+
+GROUP = "scout_backbone.views"
+MOST_ROWS = 200  # chosen: several screens; a longer message is looked into by a view of its own
+MOST_ITEMS = 16  # chosen: a longer list is told by its length
+LONGEST_TEXT = 160  # chosen: a line of a wide terminal
+UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
+"""What a view may raise at a message whose fields are not those that it expects."""
+
+log = logging.getLogger(__name__)
+
+Fields = Mapping[str, object]
+"""Fields of a message by name, as a recording has them: numbers, texts, lists, mappings; bytes as base64."""
+
+
+class FieldRow(msgspec.Struct, frozen=True):
+    """One row of a table.
+
+    Attributes:
+        name: The field; within others ``outer.inner``, in a list ``outer.0``.
+        text: Its value, for people.
+        number: Its value as a number, which can be plotted; None: it is none.
+    """
+
+    name: str
+    text: str
+    number: float | None = None
+
+
+class Picture(msgspec.Struct, frozen=True):
+    """Pixels.
+
+    Attributes:
+        width_px: Columns.
+        height_px: Rows.
+        pixels: Row by row from the top: grey levels, or red, green and blue of each.
+    """
+
+    width_px: int
+    height_px: int
+    pixels: bytes
+
+    @property
+    def is_color(self) -> bool:
+        """Whether each pixel has red, green and blue."""
+        return len(self.pixels) == 3 * self.width_px * self.height_px
+
+
+class MessageView:
+    """Shows each field of a message in a row. Derive from it to show the messages of a schema otherwise."""
+
+    def rows(self, fields: Fields) -> Sequence[FieldRow]:
+        """Return the rows of the table; each with a number can be plotted.
+
+        When: for each message. Not: anything that takes long, or remembers.
+        """
+        return field_rows(fields)
+
+    def picture(self, fields: Fields) -> Picture | None:  # noqa: ARG002
+        """Return the picture in the message; None: it has none."""
+        return None
+
+
+class PictureView(MessageView):
+    """Shows a message of ``width_px``, ``height_px`` and ``pixels`` as a picture, and its other fields as rows."""
+
+    def rows(self, fields: Fields) -> Sequence[FieldRow]:
+        """Return all fields but the pixels."""
+        return field_rows({name: value for name, value in fields.items() if name != "pixels"})
+
+    def picture(self, fields: Fields) -> Picture | None:
+        """Return the picture; None: it is not as large as it says."""
+        try:
+            pixels = base64.b64decode(str(fields["pixels"]), validate=True)
+        except binascii.Error:
+            return None
+        width, height = int(str(fields["width_px"])), int(str(fields["height_px"]))
+        is_whole = width > 0 and height > 0 and len(pixels) in (width * height, 3 * width * height)
+        return Picture(width, height, pixels) if is_whole else None
+
+
+Views = Mapping[str, type[MessageView]]
+VIEWS: Views = {"Frame/1": PictureView, "ViewPicture/1": PictureView}
+"""The views of this package."""
+
+
+@cache
+def installed_views() -> Views:
+    """Return the views of the installed packages, by schema; one that cannot be loaded is left out."""
+    found: dict[str, type[MessageView]] = {}
+    for entry in entry_points(group=GROUP):
+        try:
+            found |= entry.load()
+        except (ImportError, AttributeError) as error:
+            log.warning("the views of %s are left out: %s", entry.name, error)
+    return found
+
+
+def field_rows(body: object) -> list[FieldRow]:
+    """Return a row for each value within; at most ``MOST_ROWS``.
+
+    Example:
+        >>> [(row.name, row.text, row.number) for row in field_rows({"at": {"x_m": 1.5}, "on": True, "rcs": ["radio"]})]
+        [('at.x_m', '1.5', 1.5), ('on', 'yes', 1.0), ('rcs.0', 'radio', None)]
+    """
+    return list(islice(_rows("", body), MOST_ROWS))
+
+
+def _rows(name: str, value: object) -> Iterator[FieldRow]:
+    match value:
+        case Mapping() if value:
+            for inner, each in islice(value.items(), MOST_ROWS):
+                yield from _rows(f"{name}.{inner}" if name else str(inner), each)
+        case list() if 0 < len(value) <= MOST_ITEMS:
+            for number, each in enumerate(value):
+                yield from _rows(f"{name}.{number}" if name else str(number), each)
+        case _:
+            yield _row(name, value)
+
+
+def _row(name: str, value: object) -> FieldRow:
+    shown = printable(name, LONGEST_TEXT)
+    match value:
+        case bool():
+            return FieldRow(shown, "yes" if value else "no", float(value))
+        case int() | float():
+            text = f"{value:.6g}" if isinstance(value, float) else printable(str(value), LONGEST_TEXT)
+            return FieldRow(shown, text, _as_number(value))
+        case list():
+            return FieldRow(shown, counted(len(value), "item"))
+        case bytes():
+            return FieldRow(shown, counted(len(value), "byte"))
+        case None:
+            return FieldRow(shown, "none")
+        case _:
+            return FieldRow(shown, printable(str(value), LONGEST_TEXT))
+
+
+def _as_number(value: float) -> float | None:
+    """Return the number, of which a whole one may be too large to plot; None: it is."""
+    try:
+        return float(value)
+    except OverflowError:
+        return None
