@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import json
 import signal
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
@@ -26,6 +26,7 @@ from backbone.command_line.message_lines import (
 from backbone.command_line.where import Where
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.recording.hearing import Hearing, to_overhear
 from backbone.recording.known_messages import message_classes
@@ -99,14 +100,22 @@ async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
     return ExitCode.DONE
 
 
-async def mission_classes(bus: Bus) -> dict[str, type[Message]]:
-    """Return the message classes of the installed packages and of the mission's component types, by schema."""
+async def mission_classes(bus: Bus, trouble: Callable[[str], None] = say) -> dict[str, type[Message]]:
+    """Return the message classes of the installed packages and of the mission's component types, by schema.
+
+    They are imported in a thread, so that whoever asks goes on meanwhile.
+
+    Args:
+        bus: The bus.
+        trouble: Called with a sentence if those of the mission's component types are not known.
+    """
+    modules: set[str] = set()
     try:
         types = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
+        modules = {one.component_type.class_path.partition(":")[0] for one in types.types}
     except (LinkError, Refusal) as error:
-        say(f"messages of the mission's own types have no names of fields: {error}")
-        return message_classes()
-    return message_classes(sorted({one.component_type.class_path.partition(":")[0] for one in types.types}))
+        trouble(f"messages of the mission's own types have no names of fields: {error}")
+    return await asyncio.to_thread(message_classes, sorted(modules))
 
 
 def _lines(key: str, message: Translated, at_s: float, wanted: Watched) -> Iterator[str]:
@@ -131,20 +140,38 @@ async def _listening(
 
 @asynccontextmanager
 async def overhearing(
-    bus: Bus, clock: Clock, keys: tuple[str, ...], heard: Callable[[str, Translated, float], None]
+    bus: Bus,
+    clock: Clock,
+    keys: tuple[str, ...],
+    heard: Callable[[str, Translated, float], None],
+    classes: Mapping[str, type[Message]] | None = None,
+    of: str = "",
 ) -> AsyncIterator[list[Overhearing]]:
-    """Call ``heard`` with key, message and mission time of all that is meant."""
-    hearing = Hearing(await mission_classes(bus), keys)
+    """Call ``heard`` with key, message and mission time of all that is meant.
+
+    Args:
+        bus: The bus.
+        clock: The mission's.
+        keys: Patterns of keys; none: all.
+        heard: Called in the event loop.
+        classes: Message classes by schema; None: those of the mission.
+        of: Address of the keys; empty: any.
+    """
+    hearing = Hearing(await mission_classes(bus) if classes is None else classes, keys)
 
     def came(key: str, raw: bytes) -> None:
         at_s = clock.now_s()
         for said_at, message in hearing.heard(key, raw, at_s):
             heard(said_at, message, at_s)
 
-    subscribed = [bus.overhear(one, came, MOST_WAITING_BYTES) for one in to_overhear(keys)]
-    yield subscribed
-    for one in subscribed:
-        one.close()
+    subscribed = [
+        bus.overhear(one, came, MOST_WAITING_BYTES, "" if one is Conversation.TOLD else of) for one in to_overhear(keys)
+    ]
+    try:
+        yield subscribed
+    finally:
+        for one in subscribed:
+            one.close()
 
 
 @asynccontextmanager

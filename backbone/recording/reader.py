@@ -151,7 +151,13 @@ class Recording:
         return found.data.decode() if found is not None else ""
 
     def messages(
-        self, patterns: tuple[str, ...] = (), since_s: float = 0.0, until_s: float | None = None, source: str = ""
+        self,
+        patterns: tuple[str, ...] = (),
+        since_s: float = 0.0,
+        until_s: float | None = None,
+        source: str = "",
+        *,
+        newest_first: bool = False,
     ) -> Iterator[Recorded]:
         """Yield the messages in the order of sending.
 
@@ -160,12 +166,20 @@ class Recording:
             since_s: Not before this mission time.
             until_s: Not after it; None: to the end.
             source: Only of this sender; empty: of all.
+            newest_first: In the opposite order.
         """
-        for _schema, _channel, _message, recorded in self.records(patterns, since_s, until_s, source):
+        records = self.records(patterns, since_s, until_s, source, newest_first=newest_first)
+        for _schema, _channel, _message, recorded in records:
             yield recorded
 
     def records(
-        self, patterns: tuple[str, ...] = (), since_s: float = 0.0, until_s: float | None = None, source: str = ""
+        self,
+        patterns: tuple[str, ...] = (),
+        since_s: float = 0.0,
+        until_s: float | None = None,
+        source: str = "",
+        *,
+        newest_first: bool = False,
     ) -> Iterator[tuple[Schema | None, Channel, Message, Recorded]]:
         """Yield the messages, see ``messages``, with their records in the file."""
         if until_s is not None and until_s < since_s:
@@ -177,7 +191,8 @@ class Recording:
             if not key or ((not patterns or is_meant(key, patterns)) and source in ("", sender))
         }
         end_ns = None if until_s is None else round(until_s * NS)
-        found = self._reader.iter_messages(topics, starting_at=max(0, round(since_s * NS)), ending_at=end_ns)
+        begin_ns = max(0, round(since_s * NS))
+        found = self._reader.iter_messages(topics, starting_at=begin_ns, ending_at=end_ns, reverse=newest_first)
         try:
             for schema, channel, message in found:
                 recorded = _recorded(channel, message)

@@ -20,6 +20,8 @@ from backbone.moments import Now
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import GiveWish, MoveWish
 from ui_console.model.events import ConsoleEvent
+from ui_console.model.key_table import KeyRow
+from ui_console.model.key_view import KeyView
 from ui_console.model.orders import Order
 from ui_console.session.verbs import Session
 
@@ -37,6 +39,8 @@ class WrittenSession(Session):
         self.is_sure = True
         self.log: Log | Refusal = Log([])
         self.views: dict[str, Views] = {}
+        self.listed: list[list[KeyRow]] = []
+        self.heard = KeyView("", {})
         self.seen: list[ViewPicture | ViewValue | Refusal] = []
 
     def picture(self) -> NDArray[np.uint8] | None:
@@ -126,6 +130,24 @@ class WrittenSession(Session):
     async def debug_views(self) -> dict[str, Views]:
         self.wanted.append("views")
         return self.views
+
+    async def keep_listing(self, show: Callable[[list[KeyRow]], None]) -> None:
+        self.wanted.append("list")
+        try:
+            for rows in self.listed:
+                show(rows)
+                await asyncio.sleep(1.0)
+            await asyncio.Event().wait()
+        finally:
+            self.wanted.append("lists no more")
+
+    async def keep_hearing(self, row: KeyRow, begin: Callable[[KeyView], None]) -> None:
+        self.wanted.append(("hear", *row.id))
+        try:
+            begin(self.heard)
+            await asyncio.Event().wait()
+        finally:
+            self.wanted.append("hears no more")
 
     async def keep_looking(
         self,

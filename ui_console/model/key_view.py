@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from backbone.printable_text import printable
 from ui_console.model.message_views import (
+    LONGEST_TEXT,
     UNREADABLE,
     FieldRow,
     MessageView,
@@ -75,7 +77,8 @@ class KeyView:
             try:
                 return self._view.rows(body), self._view.picture(body)
             except UNREADABLE as error:
-                self.trouble = f"{type(self._view).__name__} cannot show it: {type(error).__name__} {error}"
+                why = f"{type(self._view).__name__} cannot show it: {type(error).__name__} {error}"
+                self.trouble = printable(why, LONGEST_TEXT)
         return field_rows(body), None
 
     def _series_of(self, name: str) -> Series:

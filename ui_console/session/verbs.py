@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
+from backbone.command_line.watching import mission_classes
 from backbone.component.messages import LifeState
 from backbone.debug_views import ViewPicture, Views, ViewValue
 from backbone.errors import LinkError, Refusal
 from backbone.mission_log.log import AskLog, Log
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
+from backbone.wire import Message
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import GiveWish, MoveWish, move_by_stick
+from ui_console.model.key_table import KeyRow
+from ui_console.model.key_view import KeyView
+from ui_console.model.message_views import installed_views
 from ui_console.model.orders import GivenOrder, Order
+from ui_console.session.key_looking import keep_hearing, keep_listing
 from ui_console.session.looking import all_views, keep_looking
 from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
+
+log = logging.getLogger(__name__)
 
 
 class Session:
@@ -35,6 +45,7 @@ class Session:
         self._console: AnyObserver | None = None
         self._frame: Frame | None = None
         self._picture: NDArray[np.uint8] | None = None
+        self._classes: Mapping[str, type[Message]] | None = None
 
     def picture(self) -> NDArray[np.uint8] | None:
         """Return the newest picture, grey levels, shape (height, width), or None."""
@@ -202,6 +213,25 @@ class Session:
         """Look at a debug view until cancelled; see ``looking.keep_looking``."""
         console = self._ready_console()
         await keep_looking(console.bus, console.clock, behavior, view, show, trouble=trouble)
+
+    # ------------------------------------------------------------------ what is said
+    async def keep_listing(self, show: Callable[[list[KeyRow]], None]) -> None:
+        """Call ``show`` each second with the keys at which something is said, until cancelled."""
+        console = self._ready_console()
+        await keep_listing(console.bus, console.clock, await self._known_classes(), show)
+
+    async def keep_hearing(self, row: KeyRow, begin: Callable[[KeyView], None]) -> None:
+        """Call ``begin`` with a view of a key, then show in it what is said there, until cancelled."""
+        console = self._ready_console()
+        classes = await self._known_classes()
+        view = KeyView(row.schema, await asyncio.to_thread(installed_views))
+        begin(view)
+        await keep_hearing(console.bus, console.clock, classes, row, view)
+
+    async def _known_classes(self) -> Mapping[str, type[Message]]:
+        if self._classes is None:
+            self._classes = await mission_classes(self._ready_console().bus, log.info)
+        return self._classes
 
     def _with_robot(self, act: Callable[[Teleoperation], object]) -> None:
         if isinstance(self._console, Teleoperation) and self._console.is_ready:

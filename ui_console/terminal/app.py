@@ -16,11 +16,13 @@ from backbone.launcher.endings import ExitCode
 from backbone.naming import component_of
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.driving import DIRECTIONS, STICK_LASTS_S, Direction, faster
+from ui_console.model.key_table import KeyRow
 from ui_console.model.profile import Profile
 from ui_console.model.views import AlarmView
 from ui_console.session.gamepad import buttons_help
 from ui_console.terminal.dialogs import Dialog, LiftQuestion, LineQuestion, Reading, RobotPicker, command_dialog
 from ui_console.terminal.display import ConsoleDisplay
+from ui_console.terminal.key_dialogs import KeyDialog, KeyPicker
 from ui_console.terminal.keys import keys_help, stop_meant
 from ui_console.terminal.lines import robot_rows
 from ui_console.terminal.log_search import SEARCH_HELP, LogResult, read_search
@@ -352,6 +354,14 @@ class ConsoleApp(ConsoleDisplay):
         keep_looking = partial(self._session.keep_looking, behavior, view)
         has_pixels = self._has_pixels and self.profile is Profile.MONITOR  # the terminal keeps one picture
         return ViewDialog(f"{component_of(behavior)}: {view}", keep_looking, has_pixels=has_pixels)
+
+    def action_heard(self) -> None:
+        """List what is said, and show the messages of the key that is chosen."""
+        self._open(KeyPicker(self._session.keep_listing), lambda row: self._open(self._key_dialog(row)))
+
+    def _key_dialog(self, row: KeyRow) -> KeyDialog:
+        has_pixels = self._has_pixels and self.profile is Profile.MONITOR  # the terminal keeps one picture
+        return KeyDialog(row, self._session.keep_hearing, self._session.now_s, has_pixels=has_pixels)
 
     def action_bare(self) -> None:
         """Show the picture alone, or everything again."""

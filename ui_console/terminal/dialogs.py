@@ -35,6 +35,10 @@ Dialog OptionList { height: auto; max-height: 20; }
 Dialog VerticalScroll { height: auto; max-height: 100%; }
 ViewDialog > Vertical { height: 90%; }
 ViewDialog Video { height: 1fr; }
+KeyPicker > Vertical, KeyDialog > Vertical { height: 90%; max-width: 100%; }
+KeyDialog Video, Dialog DataTable { height: 1fr; }
+KeyDialog #plot-room { height: 6; align-horizontal: right; }
+KeyDialog Sparkline { height: 100%; }
 Dialog .remark { color: $text-muted; }
 """
 READ_S = 0.5  # chosen: people need longer to read a line

@@ -24,7 +24,7 @@ from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Dialog, LiftQuestion
 from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
-from ui_console.terminal.keys import KEYS, has, hints, robot_meant
+from ui_console.terminal.keys import KEYS, Hint, has, hints, robot_meant
 from ui_console.terminal.lines import Row, table_rows
 from ui_console.terminal.log_search import FOUND_SHOWN, LogResult
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName
@@ -165,8 +165,7 @@ class ConsoleDisplay(EndingApp):
         found = self._found if self._turn is PanelName.LOG else None
         turn.border_title = Text(found.title if found is not None else self._turn)
         self._show(self._turn, turn, view)
-        keys = hints(view, self.profile, self._robot_meant())
-        main.query_one(KeyLine).show(keys, rows=1 if self.size.width >= NARROW_COLUMNS else 2)
+        main.query_one(KeyLine).show(self._hints(view), rows=1 if self.size.width >= NARROW_COLUMNS else 2)
         if isinstance(self.screen, LiftQuestion):
             subject = self.screen.subject
             self.screen.look(next((robot.stop for robot in view.robots if robot.robot == subject), None))
@@ -200,6 +199,9 @@ class ConsoleDisplay(EndingApp):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
         """Hide the keys that this profile does not have."""
         return has(self.profile, action)
+
+    def _hints(self, view: ConsoleView) -> list[Hint]:
+        return hints(view, self.profile, self._robot_meant())
 
     def _show_head(self, main: Screen[object], view: ConsoleView) -> None:
         first = head(view, self.size.width, self.profile, self.speed)

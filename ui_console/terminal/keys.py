@@ -5,7 +5,7 @@ Rules of this file: no screen; a view and a width in, texts out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from rich.style import Style
@@ -63,6 +63,7 @@ KEYS = [
         "search the mission's log: words, a robot, a person, a level, a time",
     ),
     Binding("b", "look", "what the behaviors see: choose a view, and look at it live"),
+    Binding("B", "heard", "what is said: list all keys with their rates, choose one, and see its messages"),
     Binding("v", "bare", "picture alone, and back"),
     Binding("question_mark,f1", "keys", "these keys"),
     Binding("q,alt+q", "quit", "give the robot back and leave"),
@@ -110,9 +111,14 @@ def keys_help(profile: Profile, name_of: Callable[[Binding], str]) -> list[str]:
         profile: The profile.
         name_of: Names a key for people.
     """
+    return help_lines([one for one in Binding.make_bindings(KEYS) if has(profile, action_of(one))], name_of)
+
+
+def help_lines(bindings: Iterable[Binding], name_of: Callable[[Binding], str]) -> list[str]:
+    """Return the action of each key, a line for each action."""
     keys: dict[str, list[str]] = {}
-    for binding in Binding.make_bindings(KEYS):
-        if has(profile, action_of(binding)) and binding.key not in ARRIVES_AS:
+    for binding in Binding.make_bindings(bindings):
+        if binding.key not in ARRIVES_AS:
             keys.setdefault(binding.description, []).append(name_of(binding))
     return [f"{_span(names):<14} {description}" for description, names in keys.items()]
 

@@ -117,6 +117,7 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
         "f1",
         "e",
         "slash",
+        "B",
     }
     elsewhere |= {"left_square_bracket", "pageup", "right_square_bracket", "pagedown", "4", "5", "6", "7", "8", "9"}
     known = set(ConsoleApp(WrittenSession())._bindings.key_to_bindings)  # noqa: SLF001  what the footer is made of

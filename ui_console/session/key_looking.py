@@ -1,0 +1,98 @@
+"""Looks at keys: how often each says something, and what one of them says; only while somebody looks.
+
+What is said live is overheard, so nobody waits for a console, and copies are made for it only while it looks. What was
+recorded is read from the recording, so it has its past, too.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from itertools import islice
+
+from backbone.bus.interface import Bus, Clock
+from backbone.command_line.watching import overhearing
+from backbone.keys import address_of
+from backbone.recording.playback import Playback
+from backbone.recording.reader import Recording, heard_now
+from backbone.recording.translation import Translated
+from backbone.waiting import first_to_end
+from backbone.wire import Message
+from ui_console.model.key_table import PART_S, PARTS, KeyRow, KeyTable
+from ui_console.model.key_view import KeyView
+from ui_console.model.series import SPAN_S
+
+LIST_EACH_S = 1.0  # chosen: as ``scout-backbone top``; seconds of the machine
+MOST_BEFORE = 500  # chosen: read within a second; what was said before is of another schema then
+
+Classes = Mapping[str, type[Message]]
+ShowRows = Callable[[list[KeyRow]], None]
+
+
+# ---------------------------------------------------------------------- live
+async def keep_listing(bus: Bus, clock: Clock, classes: Classes, show: ShowRows) -> None:
+    """Call ``show`` each second with all keys at which something was said by now, until cancelled."""
+    table = KeyTable(clock.now_s())
+
+    def heard(key: str, message: Translated, at_s: float) -> None:
+        table.add(key, message.source, message.schema, message.size_bytes, at_s)
+
+    async with overhearing(bus, clock, (), heard, classes):
+        await _keep_showing(clock, lambda: show(table.rows(clock.now_s(), clock.rate)))
+
+
+async def keep_hearing(bus: Bus, clock: Clock, classes: Classes, row: KeyRow, view: KeyView) -> None:
+    """Show the messages of one row of the list in ``view`` as they come, until cancelled."""
+
+    def heard(key: str, message: Translated, at_s: float) -> None:
+        if (message.source, message.schema) == (row.source, row.schema):
+            body = heard_now(key, message, at_s).body
+            view.take(body, message.stamp_s if message.source else at_s, message.sequence)
+
+    of = address_of(f"scout/mission/{row.key}")
+    async with overhearing(bus, clock, (row.key,), heard, classes, of):
+        await asyncio.Event().wait()
+
+
+# ---------------------------------------------------------------------- recorded
+async def keep_listing_recorded(recording: Recording, playback: Playback, show: ShowRows) -> None:
+    """Call ``show`` each second with all keys of a recording, until cancelled; rates are per mission second.
+
+    Raises:
+        NoRecording: The recording is damaged from here on.
+    """
+    since_s = max(playback.begin_s, playback.now_s() - PARTS * PART_S)
+    table = KeyTable(since_s, [(one.key, one.source, one.schema) for one in recording.contents().counts])
+
+    async def follow() -> None:
+        for _schema, _channel, record, one in recording.records(since_s=since_s):
+            await playback.sleep_until_s(one.at_s)
+            table.add(one.key, one.source, one.schema, len(record.data), one.at_s)
+        await asyncio.Event().wait()
+
+    showing = _keep_showing(playback, lambda: show(table.rows(playback.now_s())))
+    await first_to_end(follow(), showing)
+
+
+async def keep_reading(recording: Recording, playback: Playback, row: KeyRow, view: KeyView) -> None:
+    """Show the messages of one row in ``view``: the last one before, those of the last minute, and those that follow.
+
+    Raises:
+        NoRecording: The recording is damaged from here on.
+    """
+    since_s = max(playback.begin_s, playback.now_s() - SPAN_S)
+    before = recording.messages((row.key,), until_s=since_s, source=row.source, newest_first=True)
+    of_row = (one for one in islice(before, MOST_BEFORE) if one.schema == row.schema)
+    if (last := await asyncio.to_thread(next, of_row, None)) is not None:
+        view.take(last.body, last.at_s, last.sequence)
+    for one in recording.messages((row.key,), since_s, source=row.source):
+        await playback.sleep_until_s(one.at_s)
+        if one.schema == row.schema:
+            view.take(one.body, one.at_s, one.sequence)
+    await asyncio.Event().wait()
+
+
+async def _keep_showing(clock: Clock, show: Callable[[], None]) -> None:
+    while True:
+        show()
+        await clock.sleep_s(LIST_EACH_S * clock.rate)
