@@ -151,12 +151,19 @@ def attach(
 def monitor(
     as_json: Annotated[bool, typer.Option("--json", help="JSON lines instead of a screen.")] = False,
     once: Annotated[bool, typer.Option("--once", help="All that screens show now, as one JSON object.")] = False,
+    recording: Annotated[
+        Path | None,
+        typer.Option(help="Watch this recording instead: play it, go to any time, ask why; nothing needs to be up."),
+    ] = None,
     user: User = "",
     mission: Mission = None,
     connect: Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
     """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
+    if recording is not None:
+        names_mission = mission is not None or connect is not None
+        _watch_recording(recording, user or _user(), names_mission=names_mission, for_programs=as_json or once)
     where, user = chosen(mission, connect, secret_file), user or _user()
     if once:
         from ui_console.session.headless import look_once
@@ -296,6 +303,17 @@ def _watch(where: Where, user: str, *, as_json: bool) -> None:
     from ui_console.terminal.on_screen import watch_on_screen
 
     run(lambda: watch_on_screen(where, user))
+
+
+def _watch_recording(path: Path, user: str, *, names_mission: bool, for_programs: bool) -> None:
+    if names_mission:
+        raise _usage("--recording watches a file; --mission and --connect are for missions that are up")
+    if for_programs:
+        raise _usage("--json and --once are for missions that are up; for a recording: scout-backbone recording print")
+    _need_a_terminal("monitor --recording", "scout-backbone recording")
+    from ui_console.terminal.recorded_session import watch_recording
+
+    run(lambda: watch_recording(path, user))
 
 
 def _usage(complaint: str) -> typer.Exit:

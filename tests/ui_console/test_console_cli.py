@@ -47,6 +47,13 @@ def test_without_a_terminal_it_says_what_to_use_instead(arguments: list[str]) ->
     assert "--json" in done.stderr
 
 
+@pytest.mark.parametrize("words", [["--json"], ["--once"], ["--mission", "iros2001"], []])
+def test_a_recording_is_watched_at_a_terminal_and_no_mission_with_it(words: list[str]) -> None:
+    done = CliRunner().invoke(app, ["monitor", "--recording", "night.mcap", *words])
+    assert done.exit_code == 2
+    assert ("needs a terminal" if not words else "missions that are up") in done.stderr
+
+
 def test_another_machines_mission_must_be_named() -> None:
     done = CliRunner().invoke(app, ["monitor", "--json", "--connect", "tcp/127.0.0.1:1"])
     assert done.exit_code == 2

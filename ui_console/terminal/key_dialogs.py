@@ -89,8 +89,7 @@ class KeyPicker(Dialog[KeyRow]):
     def _show_row(self, table: DataTable[Text], name: str, row: KeyRow) -> None:
         if name not in self._rows:
             table.add_row(*map(Text, ("", "", "", "", "", "")), key=name)
-            sender = "" if row.key.startswith(f"{row.source}/") else row.source
-            for column, text in (("key", row.key), ("schema", row.schema or "no message"), ("from", sender)):
+            for column, text in (("key", row.key), ("schema", row.schema or "no message"), ("from", _sender(row))):
                 table.update_cell(name, column, Text(text), update_width=True)
         numbers = (f"{row.messages_per_s:.2f}", f"{row.bytes_per_s:.0f}", f"{row.mean_bytes:.0f}")
         for column, text in zip(COLUMNS[1:4], numbers, strict=True):
@@ -170,11 +169,12 @@ class KeyDialog(Dialog[None]):
         self._redraw_plot()
 
     def _line(self, view: KeyView) -> str:
-        sender = "" if self._row.key.startswith(f"{self._row.source}/") else f" from {self._row.source}"
+        sender = _sender(self._row)
+        what = f"{self._row.schema or 'no message'}{f' from {sender}' if sender else ''}"
         if not view.messages:
-            return f"{self._row.schema}{sender}: nothing was said yet"
+            return f"{what}: nothing was said yet"
         age_s = max(0.0, self._now_s() - view.at_s)
-        said = f"{self._row.schema}{sender}: {counted(view.messages, 'message')}, the last {age_s:.1f} s ago"
+        said = f"{what}: {counted(view.messages, 'message')}, the last {age_s:.1f} s ago"
         return f"{said}\n{view.trouble}" if view.trouble else said
 
     def _redraw_fields(self, view: KeyView) -> None:
@@ -212,6 +212,11 @@ class KeyDialog(Dialog[None]):
         if picture is not self._drawn[0]:
             self._drawn = picture, _pixels_of(picture) if picture is not None else None
         return self._drawn[1]
+
+
+def _sender(row: KeyRow) -> str:
+    """Return the sender, unless it is the component of the key."""
+    return "" if row.key.startswith(f"{row.source}/") else row.source
 
 
 def _pixels_of(picture: Picture) -> NDArray[np.uint8]:

@@ -22,6 +22,7 @@ from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.session.verbs import Session
 from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.hangup import HangupWatch
 from ui_console.terminal.pixels import can_show_pixels
 
@@ -93,7 +94,7 @@ class TerminalSession(Session):
         playing = asyncio.create_task(self._play_gamepad(screen), name="gamepad")
         try:
             if pilot is None:
-                await self._on_terminal(screen, console)
+                await on_terminal(screen, console.end)
             else:
                 await screen.run_async(headless=True, size=size, auto_pilot=pilot)
         finally:
@@ -139,20 +140,25 @@ class TerminalSession(Session):
             case _:
                 assert_never(wish)
 
-    @staticmethod
-    async def _on_terminal(screen: ConsoleApp, console: AnyObserver) -> None:
-        """Run the screen; a terminal that goes away ends the console and with it the hold on the robot."""
 
-        def gone() -> None:
-            console.end("the terminal has gone away")
-            screening.cancel()
+async def on_terminal(screen: EndingApp, end: Callable[[str], None]) -> None:
+    """Run the screen; a terminal that goes away ends the console and with it the hold on the robot.
 
-        screening = asyncio.create_task(screen.run_async(), name="screen")
-        watch = HangupWatch(sys.stdin.fileno(), gone)
-        try:
-            await asyncio.wait({screening})
-            if not screening.cancelled():
-                screening.result()
-        finally:
-            watch.close()
-            screening.cancel()
+    Args:
+        screen: The screen.
+        end: Ends the console, with the reason.
+    """
+
+    def gone() -> None:
+        end("the terminal has gone away")
+        screening.cancel()
+
+    screening = asyncio.create_task(screen.run_async(), name="screen")
+    watch = HangupWatch(sys.stdin.fileno(), gone)
+    try:
+        await asyncio.wait({screening})
+        if not screening.cancelled():
+            screening.result()
+    finally:
+        watch.close()
+        screening.cancel()

@@ -1,0 +1,208 @@
+"""Playing a recording to a console in this process: its time stands still, passes, or is somewhere else.
+
+A player says on a local bus what was said, and a console hears it. To go back, or far ahead, both begin anew at that
+time; the screen stays. Nothing can be commanded.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Generic, Protocol, TypeVar
+
+from backbone.bus.interface import Clock
+from backbone.bus.local_bus import LocalNetwork
+from backbone.command_line.unusable_file import FileUnusable
+from backbone.component.launch import Launch
+from backbone.keys import Conversation
+from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
+from backbone.recording.checkpoints import Checkpoints
+from backbone.recording.known_messages import message_classes
+from backbone.recording.markers import markers_in
+from backbone.recording.playback import Playback
+from backbone.recording.player import Player
+from backbone.recording.reader import Recording
+from backbone.waiting import end_tasks, first_to_end
+
+NEAR_S = 2.0  # chosen: a step ahead is played, so that nothing between is left out; mission seconds
+LOOK_EACH_S = 0.1  # chosen: the end is noticed before a person wonders; machine seconds
+AGAIN_EACH_S = 1.0  # chosen: what is opened while time stands still has its pictures soon; machine seconds
+STEPS_TO = tuple(f"*/{one}" for one in (Conversation.FRAMES, Conversation.LOG, Conversation.SCHEDULE))
+NOT_NOW = "This is a recording: nothing in it can be commanded. It can be played, and asked why."
+
+
+class Shows(Protocol):
+    """What hears a recording from one time on."""
+
+    async def run(self) -> None:
+        """Hear it until cancelled."""
+
+
+Console = TypeVar("Console", bound=Shows)
+NewConsole = Callable[[Launch, LocalNetwork, Playback], Console]
+
+
+def opener(path: Path) -> Callable[[], IO[bytes]]:
+    """Return what opens this file; it raises ``FileUnusable`` if that cannot be done."""
+
+    def opened() -> IO[bytes]:
+        try:
+            return path.open("rb")
+        except OSError as error:
+            raise FileUnusable(f"{path} cannot be read: {error.strerror}") from error
+
+    return opened
+
+
+class Performance(Generic[Console]):
+    """A recording that is played from one instant on, and the console that hears it."""
+
+    def __init__(self, player: Player, console: Console, close: Callable[[], asyncio.Future[None]]) -> None:
+        self.player, self.console, self._close = player, console, close
+
+    async def begin(self) -> None:
+        """Take in what was said before; the screen stays usable meanwhile.
+
+        Raises:
+            NoRecording: The recording is damaged.
+        """
+        await asyncio.to_thread(self.player.catch_up)
+        self.player.begin()
+
+    async def run(self) -> None:
+        """Play until cancelled.
+
+        Raises:
+            NoRecording: The recording is damaged from here on.
+            BaseException: The bug that ended the console.
+        """
+        tasks = [asyncio.create_task(life) for life in (self.player.run(), self.console.run())]
+        try:
+            await asyncio.gather(*tasks)
+        finally:
+            await end_tasks(*tasks)
+            await self._close()
+
+
+class RecordedPlay(Generic[Console]):
+    """Plays a recording.
+
+    Args:
+        opened: Opens the recording's file once more.
+        machine: Its seconds are those of the machine.
+        name: Of the console.
+        new_console: Makes what hears the recording from a time on; its bus is joined to that network.
+
+    Raises:
+        NoRecording: The file is none, or its recorder was killed.
+        OtherForm: It is of another release.
+    """
+
+    def __init__(
+        self, opened: Callable[[], IO[bytes]], machine: Clock, name: str, new_console: NewConsole[Console]
+    ) -> None:
+        self._opened, self._machine, self._name, self._new_console = opened, machine, name, new_console
+        self.moved: Callable[[Console], None] = lambda _console: None
+        """Called with what shows the time of now, when a jump has made another one."""
+        self.classes = message_classes()
+        """Known message classes by schema."""
+        self._recording = Recording(opened())
+        found = self._recording.contents()
+        self.mission = legal((found.about.get("mission") or "recording")[:MAX_NAME_LENGTH])
+        self.playback = Playback(machine, found.begin_s, found.end_s)
+        self.markers = markers_in(self._recording)
+        """In the order of time."""
+        self._checkpoints = Checkpoints(self.classes)
+        self._is_elsewhere, self._arrived, self._ended = asyncio.Event(), asyncio.Event(), asyncio.Event()
+        self._performance = self._new_performance()
+
+    @property
+    def console(self) -> Console:
+        """What shows the time of now; another one after a jump."""
+        return self._performance.console
+
+    def reopened(self) -> Recording:
+        """Return the recording, for somebody else to read."""
+        return Recording(self._opened())
+
+    async def wait_arrived(self) -> None:
+        """Return when the time that a person went to is shown: answers are of that time."""
+        await self._arrived.wait()
+
+    async def wait_elsewhere(self) -> None:
+        """Return when a person has gone to a time that begins anew."""
+        await self._is_elsewhere.wait()
+
+    # ------------------------------------------------------------------ verbs of a person
+    def play(self, speed: float) -> None:
+        """Let time pass, from the begin again if it has come to the end."""
+        if self.playback.now_s() >= self.playback.end_s:
+            self.go_to(self.playback.begin_s)
+        self.playback.play(speed)
+
+    def go_to(self, at_s: float) -> None:
+        """Show another time."""
+        before_s = self.playback.now_s()
+        self.playback.go_to(at_s)
+        if not 0.0 <= self.playback.now_s() - before_s <= NEAR_S:
+            self._arrived.clear()
+            self._is_elsewhere.set()
+
+    def step(self) -> None:
+        """Go on to the next picture, decision or event, and stand still there."""
+        since_s = math.nextafter(self.playback.now_s(), math.inf)
+        following = next(self._recording.messages(STEPS_TO, since_s), None)
+        self.playback.pause()
+        self.go_to(self.playback.end_s if following is None else following.at_s)
+
+    # ------------------------------------------------------------------ its life
+    def end(self, _reason: str) -> None:
+        """Make ``run`` return."""
+        self._ended.set()
+
+    async def run(self) -> None:
+        """Play to the console until ``end``.
+
+        Raises:
+            NoRecording: The recording is damaged.
+            BaseException: A bug.
+        """
+        await first_to_end(self._ended.wait(), self._perform_for_ever(), self._keep_to_the_end(), self._keep_saying())
+
+    async def _perform_for_ever(self) -> None:
+        await self._performance.begin()
+        while True:
+            if not self._is_elsewhere.is_set():
+                self._arrived.set()
+            await first_to_end(self._performance.run(), self._is_elsewhere.wait())
+            while self._is_elsewhere.is_set():
+                self._is_elsewhere.clear()
+                performance = self._new_performance()
+                await performance.begin()
+                if not self._is_elsewhere.is_set():
+                    self._performance = performance
+                    self.moved(performance.console)
+
+    def _new_performance(self) -> Performance[Console]:
+        playback, kind = self.playback, "ui_console.session.observer:Observer"
+        launch = Launch(self.mission, Subsystem.UI_CONSOLE, self._name, "console", kind, "", "", 0.0, playback.rate)
+        network = LocalNetwork(self.mission)
+        bus = network.join(f"{Subsystem.BACKBONE}/replay", playback)
+        recording, since_s = self.reopened(), playback.now_s()
+        player = Player(bus, playback, recording, self.classes, since_s=since_s, checkpoints=self._checkpoints)
+        console = self._new_console(launch, network, playback)
+        return Performance(player, console, lambda: asyncio.ensure_future(bus.close()))
+
+    async def _keep_to_the_end(self) -> None:
+        while True:
+            if self.playback.now_s() >= self.playback.end_s:
+                self.playback.pause()
+            await self._machine.sleep_s(LOOK_EACH_S * self._machine.rate)
+
+    async def _keep_saying(self) -> None:
+        while True:
+            await self._machine.sleep_s(AGAIN_EACH_S * self._machine.rate)
+            if not self.playback.is_playing and not self._is_elsewhere.is_set():
+                self._performance.player.say_again()
