@@ -284,3 +284,31 @@ def test_a_console_that_crashes_gives_its_robot_back_and_the_terminal_and_says_s
         assert not holder(mission, "scout3").startswith("console-")
         assert "broken on purpose" in shown
         assert re.search(r"^echo$", shown, re.MULTILINE), shown
+
+
+def test_a_recording_is_played_and_asked_key_by_key(mission: RunningMission, tmp_path: Path) -> None:
+    file = tmp_path / "night.mcap"
+    done = mission.command("scout-backbone", "record", "--to", str(file), "--for", "8", "--mission", mission.name)
+    assert done.returncode == 0, done.stderr
+    with terminal(mission, tmp_path) as screen:
+        screen.open("scout-console", "monitor", "--recording", str(file), "--user", "ben")
+        screen.shows(r"‖ 1 ×  \d+\.\d s of \d+\.\d s: recording of ")
+        screen.press("Space")
+        screen.shows(r"▶ 1 × ")
+        screen.press("End")
+        screen.shows(r"‖ 1 ×  (\d+\.\d) s of \1 s")
+        screen.shows(r"timeline[^?]*watch")
+        screen.press("X")
+        screen.shows(r"nothing in it can be commanded")
+        screen.press("y")
+        screen.shows(r"why \w+\?")
+        screen.press("Enter", "B")
+        screen.shows(r"\d rows;")
+        screen.press(*"frame")
+        screen.shows(r"frames[^\n]*Frame/1")
+        screen.press("Enter")
+        screen.shows(r"\d messages?, the last")
+        screen.press("Escape")
+        screen.shows(r"─ timeline ─")
+        screen.press("q")
+        screen.shows(r"ENDED WITH 0")

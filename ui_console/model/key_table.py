@@ -109,6 +109,18 @@ class KeyTable:
             del self._rows[min(self._rows, key=lambda name: self._rows[name].heard_s)]
 
 
+def with_words(rows: Iterable[KeyRow], words: str) -> list[KeyRow]:
+    """Return the rows that have all of these words in key, sender or schema; case does not matter.
+
+    Example:
+        >>> rows = [KeyRow("resource_pool/eye/frames", "resource_pool/eye", "Frame/1"), KeyRow("a/b/log", "a/b", "")]
+        >>> [row.key for row in with_words(rows, "eye FRAME")]
+        ['resource_pool/eye/frames']
+    """
+    wanted = words.casefold().split()
+    return [row for row in rows if all(word in " ".join(row.id).casefold() for word in wanted)]
+
+
 def _is_last(counts: _Counts, number: int) -> bool:
     """Return whether this part of time is the last that was counted, as it stays if time falls."""
     return bool(counts.parts) and number <= counts.parts[-1][0]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.text import Text
 from textual import work
 from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.widgets import DataTable, Sparkline, Static
 from textual.widgets.data_table import RowKey
@@ -16,10 +18,10 @@ from textual.widgets.data_table import RowKey
 from backbone.errors import LinkError, Refusal
 from backbone.printable_text import printable_lines
 from backbone.spoken import counted
-from ui_console.model.key_table import KeyRow
+from ui_console.model.key_table import KeyRow, with_words
 from ui_console.model.key_view import KeyView
 from ui_console.model.message_views import Picture
-from ui_console.terminal.dialogs import Dialog
+from ui_console.terminal.dialogs import FIELD_REMARK, Dialog, Field
 from ui_console.terminal.widgets import Video
 
 REDRAW_EACH_S = 0.3  # chosen: people read no faster
@@ -30,22 +32,32 @@ KeepHearing = Callable[[KeyRow, Callable[[KeyView], None]], Coroutine[object, No
 
 
 class KeyPicker(Dialog[KeyRow]):
-    """Choose one of the keys at which something is said; answers its row.
+    """Choose one of the keys at which something is said; answers its row. Words that are typed narrow the list.
 
     Args:
         keep_listing: Calls what it gets with the rows each second, until cancelled.
     """
 
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding(key, f"cursor('{key}')", show=False) for key in ("up", "down", "pageup", "pagedown")
+    ]
+
     def __init__(self, keep_listing: KeepListing) -> None:
         super().__init__()
         self._keep_listing = keep_listing
+        self._heard: Sequence[KeyRow] = ()
         self._rows: dict[str, KeyRow] = {}
 
     def compose(self) -> ComposeResult:
         """Lay out the list."""
         with Vertical() as box:
             box.border_title = "what is said (enter shows it)"
-            yield DataTable[Text](cursor_type="row")
+            field = Field(placeholder="words in key, sender or schema")
+            field.cursor_blink = False
+            yield field
+            table = DataTable[Text](cursor_type="row")
+            table.can_focus = False
+            yield table
             yield Static("nothing was heard yet", id="trouble", classes="remark", markup=False)
 
     def on_mount(self) -> None:
@@ -55,8 +67,28 @@ class KeyPicker(Dialog[KeyRow]):
         self._list()
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
-        """Answer."""
+        """Answer: a row was clicked on."""
         self.answer(self._rows.get(event.row_key.value or ""))
+
+    def on_input_submitted(self, _event: Field.Submitted) -> None:
+        """Answer with the row under the cursor."""
+        here = self._here()
+        self.answer(self._rows.get(here.value or "") if here is not None else None)
+
+    def on_input_changed(self, _event: Field.Changed) -> None:
+        """List what has the words."""
+        self._show(self._heard)
+
+    def action_cursor(self, key: str) -> None:
+        """Move the cursor of the table."""
+        table = self._table
+        moves = {
+            "up": table.action_cursor_up,
+            "down": table.action_cursor_down,
+            "pageup": table.action_page_up,
+            "pagedown": table.action_page_down,
+        }
+        moves[key]()
 
     @property
     def _table(self) -> DataTable[Text]:
@@ -72,9 +104,9 @@ class KeyPicker(Dialog[KeyRow]):
     def _show(self, rows: Sequence[KeyRow]) -> None:
         if not self.is_mounted:
             return
-        table = self._table
-        shown = {"\n".join(row.id): row for row in rows}
-        here = table.coordinate_to_cell_key(table.cursor_coordinate).row_key if table.row_count else None
+        self._heard = rows
+        table, here = self._table, self._here()
+        shown = {"\n".join(row.id): row for row in with_words(rows, self.query_one(Field).value)}
         for gone in self._rows.keys() - shown.keys():
             table.remove_row(gone)
         has_new = shown.keys() - self._rows.keys()
@@ -84,7 +116,14 @@ class KeyPicker(Dialog[KeyRow]):
         if has_new:
             table.sort("key", "from", "schema", key=lambda cells: [cell.plain for cell in cells])
             _return_to(table, here)
-        self.query_one("#trouble", Static).update(f"{counted(len(rows), 'row')}; escape leaves" if rows else "")
+        count = counted(len(rows), "row")
+        told = f"{len(shown)} of {count}" if len(shown) < len(rows) else count
+        self.query_one("#trouble", Static).update(f"{told}; {FIELD_REMARK}" if rows else "nothing was heard yet")
+
+    def _here(self) -> RowKey | None:
+        """Return the key of the row under the cursor; None: there is no row."""
+        table = self._table
+        return table.coordinate_to_cell_key(table.cursor_coordinate).row_key if table.row_count else None
 
     def _show_row(self, table: DataTable[Text], name: str, row: KeyRow) -> None:
         if name not in self._rows:

@@ -75,6 +75,30 @@ async def test_the_cursor_stays_on_its_key_while_others_come_and_go() -> None:
         assert f"{COMMAND.key} 20.00 800 40 Drive/1 {COMMAND.source}" in words(pilot.app)
 
 
+async def test_words_narrow_the_list() -> None:
+    session = WrittenSession()
+    session.listed = [[COMMAND, FRAMES, READINGS]]
+    async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
+        await pilot.press("B")
+        await pilot.pause()
+        await pilot.press(*"scout1 drive")
+        await pilot.pause()
+        assert "1 of 3 rows" in screen_text(pilot.app)
+        await pilot.press("enter")
+        await pilot.pause()
+        assert session.wanted[-1] == ("hear", *COMMAND.id)
+
+
+async def test_no_row_is_no_answer() -> None:
+    session = WrittenSession()
+    async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
+        await pilot.press("B")
+        await pilot.pause()
+        await pilot.press("down", "enter")
+        await settle(pilot)
+        assert len(pilot.app.screen_stack) == 1
+
+
 async def test_the_field_under_the_cursor_is_plotted_and_a_text_is_not() -> None:
     session = WrittenSession()
     session.listed, session.heard = [[READINGS]], readings()
