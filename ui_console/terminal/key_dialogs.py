@@ -71,9 +71,10 @@ class KeyPicker(Dialog[KeyRow]):
         self.answer(self._rows.get(event.row_key.value or ""))
 
     def on_input_submitted(self, _event: Field.Submitted) -> None:
-        """Answer with the row under the cursor."""
+        """Answer with the row under the cursor, if there is one."""
         here = self._here()
-        self.answer(self._rows.get(here.value or "") if here is not None else None)
+        if here is not None:
+            self.answer(self._rows.get(here.value or ""))
 
     def on_input_changed(self, _event: Field.Changed) -> None:
         """List what has the words."""

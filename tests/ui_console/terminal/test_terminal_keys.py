@@ -89,14 +89,15 @@ async def test_words_narrow_the_list() -> None:
         assert session.wanted[-1] == ("hear", *COMMAND.id)
 
 
-async def test_no_row_is_no_answer() -> None:
+async def test_without_a_row_enter_chooses_nothing() -> None:
     session = WrittenSession()
     async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
         await pilot.press("B")
         await pilot.pause()
         await pilot.press("down", "enter")
-        await settle(pilot)
-        assert len(pilot.app.screen_stack) == 1
+        await pilot.pause()
+        assert isinstance(pilot.app.screen, KeyPicker)
+        assert session.wanted == ["list"]
 
 
 async def test_the_field_under_the_cursor_is_plotted_and_a_text_is_not() -> None:
