@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -11,7 +12,9 @@ import pytest
 from behaviors_at_work import example
 from recorded_missions import CLASSES, record_mission
 
+from backbone.command_line.replaying import run_without
 from backbone.component.process import load_class
+from backbone.launcher.endings import ExitCode
 from backbone.recording.comparison import compared
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.rerun import launch_of, run_again
@@ -23,9 +26,14 @@ Said = dict[tuple[str, str], list[tuple[str, bytes]]]
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recording]:
-    path = tmp_path_factory.mktemp("rerun") / "it.mcap"
-    record_mission(path, example(PATROL, SERVO), LASTED_S)
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("rerun") / "it.mcap"
+    record_mission(made, example(PATROL, SERVO), LASTED_S)
+    return made
+
+
+@pytest.fixture(scope="module")
+def recording(path: Path) -> Iterator[Recording]:
     with path.open("rb") as file:
         yield Recording(file)
 
@@ -54,6 +62,15 @@ def test_all_that_it_says_is_the_same_to_the_byte_with_its_causes(recording: Rec
     for key, said in then.items():
         assert now[key] == said, key
     assert sum(len(said) for (_key, schema), said in then.items() if schema == MOVE) > 100
+
+
+async def test_the_command_tells_both(path: Path, capsys: pytest.CaptureFixture[str]):
+    assert await run_without(path, PATROL, "", {}, {}, as_json=False) is ExitCode.DONE
+    assert capsys.readouterr().out == ""
+    assert await run_without(path, PATROL, "", {"speed_m_s": 0.19}, {}, as_json=False) is ExitCode.REFUSED
+    told = capsys.readouterr()
+    assert "patrol-scout1-drive/ask  Move" in told.out
+    assert "; the first is message 0 of " in told.err
 
 
 def test_there_is_something_to_decide(recording: Recording):
