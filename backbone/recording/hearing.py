@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from backbone.keys import NEVER_DROPPED, Conversation
-from backbone.recording.translation import Translated, Translator
+from backbone.recording.translation import Translated, Translator, copies_in
 from backbone.wire import Message
 
 _COPIED = frozenset({*NEVER_DROPPED, Conversation.ASK})
@@ -32,20 +32,21 @@ class Hearing:
             raw: The bytes.
             at_s: Mission time when they came.
         """
-        told = self._translator.copies(raw) if key.endswith(f"/{Conversation.TOLD}") else None
-        if told is None:
-            if self._is_meant(key):
-                yield key, self._translator.translate(raw, at_s)
-            return
-        mission = "/".join(key.split("/")[:2])
-        for copies in told:
-            told_key = f"{mission}/{copies.address}/{copies.conversation}"
-            if self._is_meant(told_key):
-                for quoted in copies.messages:
-                    yield told_key, self._translator.translate(quoted, at_s)
+        for said_at, envelope in unfolded(key, raw):
+            if not self._keys or is_meant(said_at, self._keys):
+                yield said_at, self._translator.translate(envelope, at_s)
 
-    def _is_meant(self, key: str) -> bool:
-        return not self._keys or is_meant(key, self._keys)
+
+def unfolded(key: str, raw: bytes) -> Iterator[tuple[str, bytes]]:
+    """Yield key and envelope of what was overheard; of ``Told`` each copied message, with the key that it had."""
+    told = copies_in(raw) if key.endswith(f"/{Conversation.TOLD}") else None
+    if told is None:
+        yield key, raw
+        return
+    mission = "/".join(key.split("/")[:2])
+    for copies in told:
+        for quoted in copies.messages:
+            yield f"{mission}/{copies.address}/{copies.conversation}", quoted
 
 
 def is_meant(key: str, patterns: Sequence[str]) -> bool:

@@ -64,7 +64,6 @@ class Translator:
     def __init__(self, classes: Mapping[str, type[Message]]) -> None:
         known: Any = Union[tuple(classes.values())]  # noqa: UP007  made at run time
         self._known = msgspec.msgpack.Decoder(Envelope[known])
-        self._told = msgspec.msgpack.Decoder(Envelope[Told])
         self._any: Any = msgspec.msgpack.Decoder(Envelope[Any])
 
     def translate(self, raw: bytes, heard_s: float) -> Translated:
@@ -80,13 +79,6 @@ class Translator:
         except _UNSPEAKABLE:
             return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
 
-    def copies(self, raw: bytes) -> list[Copies] | None:
-        """Return the copies that these bytes hold; None if they are no copies."""
-        try:
-            return self._told.decode(raw).body.copies
-        except _UNREADABLE:
-            return None
-
     def _unknown(self, raw: bytes, heard_s: float) -> Translated:
         try:
             envelope = self._any.decode(raw)
@@ -97,6 +89,47 @@ class Translator:
                 with suppress(*_UNSPEAKABLE):
                     return _translated(envelope, schema, None, envelope.body, heard_s, len(raw))
         return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
+
+
+class _Tagged(msgspec.Struct, frozen=True, array_like=True):
+    schema: str
+
+
+class Heading(msgspec.Struct, frozen=True, array_like=True):
+    """The begin of a message: who says what; the rest is not read, so it costs little however long that is."""
+
+    wire: int
+    source: str
+    sequence: int
+    stamp_s: float
+    cause: str
+    body: _Tagged
+
+    @property
+    def schema(self) -> str:
+        """``<Name>/<version>``; empty: the bytes are no message."""
+        return self.body.schema
+
+
+NO_HEADING = Heading(0, "", 0, 0.0, "", _Tagged(""))
+_headings = msgspec.msgpack.Decoder(Heading)
+_told = msgspec.msgpack.Decoder(Envelope[Told])
+
+
+def heading_of(raw: bytes) -> Heading:
+    """Return the begin of a message; ``NO_HEADING``: the bytes are none."""
+    try:
+        return _headings.decode(raw)
+    except _UNREADABLE:
+        return NO_HEADING
+
+
+def copies_in(raw: bytes) -> list[Copies] | None:
+    """Return the copies that these bytes hold; None if they are no copies."""
+    try:
+        return _told.decode(raw).body.copies
+    except _UNREADABLE:
+        return None
 
 
 def _translated(

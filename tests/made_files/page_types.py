@@ -29,6 +29,7 @@ from ui_console.design.views import (
 from ui_console.model import views
 from ui_console.model.arc_abilities import ArcAbilities
 from ui_console.model.debug_views import SeenViews
+from ui_console.model.key_shown import KeyList, MessageShown
 from ui_console.model.map import BodyView, FloorView
 from ui_console.model.playback import PlaybackView
 from ui_console.model.timeline import TimelineView
@@ -189,24 +190,27 @@ class Page:
         view: All that it shows.
         answers: To what it asks.
         said: What it says.
+        packed: What comes to it as pictures do.
     """
 
     view: type[msgspec.Struct]
     answers: tuple[type[msgspec.Struct], ...]
     said: tuple[type[msgspec.Struct], ...]
+    packed: tuple[type[msgspec.Struct], ...] = ()
 
 
 CONSOLE = Page(
     View,
     (WhyAnswer, RefusedAnswer, ParametersAnswer, SetAnswer, LogFoundAnswer, LogRefusedAnswer),
     (Hello, BeatRequest, *get_args(Intent), *get_args(Playing)),
+    (KeyList, MessageShown),
 )
 DESIGNER = Page(DesignView, get_args(DesignAnswer), (Hello, BeatRequest, *get_args(DesignIntent)))
 
 
 def declarations(page: Page) -> str:
     """Return the whole file of a page's types."""
-    heard = _declared([page.view, *page.answers], is_sent_whole=True)
+    heard = _declared([page.view, *page.answers, *page.packed], is_sent_whole=True)
     said = _declared(page.said, is_sent_whole=False)
     news = f"{{ view: Partial<{page.view.__name__}>; answer?: undefined }}"
     return "\n".join(

@@ -32,6 +32,7 @@ from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.observer import AnyObserver, Observer
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.web.floor import FloorSection
+from ui_console.web.key_watch import KeyWatch
 from ui_console.web.login import ProtocolViolation, ViolationKind, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
@@ -60,10 +61,19 @@ class WebHub:
         join: Opens a bus for one more component of this process.
         kind: Component type of the ARCs that operators claim; empty: one for the robot, with pictures.
         away_after_s: A console gives its robot back after so long without a touch of its operator; 0: never.
+        is_played: True: the mission is a recording.
     """
 
     def __init__(
-        self, launch: Launch, bus: Bus, clock: Clock, join: Join, *, kind: str = "", away_after_s: float = 0.0
+        self,
+        launch: Launch,
+        bus: Bus,
+        clock: Clock,
+        join: Join,
+        *,
+        kind: str = "",
+        away_after_s: float = 0.0,
+        is_played: bool = False,
     ) -> None:
         self.clock = clock
         self.team = TeamModel(launch.mission, LIFT_REMEDY)
@@ -87,6 +97,8 @@ class WebHub:
         self._numbers: dict[str, int] = {}
         self.sights = Sights(bus, clock, lambda: self.clients, self.observer.start_task)
         """The debug views that its operators look at."""
+        self.keys = KeyWatch(bus, clock, lambda: self.clients, self.observer.start_task, is_played=is_played)
+        """The messages on the bus that its operators look at."""
         self._consoles = itertools.count(1)
         self._has_operators = asyncio.Event()
         self._told_s: dict[ViolationKind, float] = {}
@@ -155,6 +167,8 @@ class WebHub:
             self._send_map([operator.outbox for operator in self.clients])
             for operator in self.clients:
                 operator.refresh(now_s)
+            self.sights_changed()
+            self.keys_changed()
             await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
 
     # ------------------------------------------------------------------ services for operators; see OperatorServices
@@ -200,8 +214,14 @@ class WebHub:
             self._streams[robot] = (wanted[robot], self._listen(robot, wanted[robot]))
 
     def sights_changed(self) -> None:
-        """Look at the debug views that an operator looks at, and at no others."""
-        self.sights.changed()
+        """Look at the debug views that an operator looks at, and at no others, as soon as the component runs."""
+        if self.observer.state is LifeState.READY:
+            self.sights.changed()
+
+    def keys_changed(self) -> None:
+        """Look at the messages that an operator looks at, and at no others, as soon as the component runs."""
+        if self.observer.state is LifeState.READY:
+            self.keys.changed()
 
     def attention_changed(self) -> None:
         """Note whether any operator looks after the mission."""

@@ -26,6 +26,7 @@ from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.web import protocol
 from ui_console.web.found_log import FoundLog
+from ui_console.web.key_sight import KeySight, NoSuchKey
 from ui_console.web.login import Welcome
 from ui_console.web.ordering import Ordering
 from ui_console.web.outbox import Outbox
@@ -71,6 +72,9 @@ class OperatorServices(Protocol):
     def sights_changed(self) -> None:
         """Note that an operator looks at other debug views."""
 
+    def keys_changed(self) -> None:
+        """Note that an operator looks at other messages on the bus."""
+
 
 class Operator:
     """A person at a browser, from the right token to the end of the connection.
@@ -89,6 +93,8 @@ class Operator:
         self.is_there = True
         self.sight: PageSight = PageSight() if former is None else former.sight
         """The debug views that this page shows."""
+        self.key_sight: KeySight = KeySight() if former is None else former.key_sight
+        """The messages on the bus that this page shows."""
         self.model = ConsoleModel(welcome.user, welcome.user, services.team)
         self.answers = ConsentAnswers(welcome.user, services.clock, self.show, services.observer.acted)
         """The questions of others to this person."""
@@ -123,6 +129,8 @@ class Operator:
                 self._services.watching_changed()
             case protocol.LookInto(behavior, view):
                 self._look(PageSight(behavior, view))
+            case protocol.ListKeys() | protocol.ViewKey():
+                self._watch_keys(intent)
             case protocol.Acknowledge(key):
                 self._acknowledge(key)
             case protocol.MoreLog(number, first):
@@ -197,7 +205,7 @@ class Operator:
         self.news.set()
 
     def saw_view(self, stream: str, number: int, at_s: float, packed: bytes) -> None:
-        """Send a picture of a debug view."""
+        """Send a picture of a debug view, or the newest of the messages that this page looks at."""
         self.outbox.put_picture(stream, number, at_s, packed)
         self.news.set()
 
@@ -245,9 +253,8 @@ class Operator:
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)
         self.news.set()
-        if captured_s is not None:
+        if captured_s is not None and "/" not in robot:  # no debug view, and no message of a key
             self._ordering.drawn(robot, captured_s)
-        if captured_s is not None and robot != self.sight.stream:
             took_s = max(0.0, self._services.clock.now_s() - captured_s)
             before_s = self._latency_s.get(robot, took_s)
             self._latency_s[robot] = before_s + LATENCY_STEP * (took_s - before_s)
@@ -258,6 +265,15 @@ class Operator:
         self.sight = sight
         self.outbox.look(sight.stream)
         self._services.sights_changed()
+
+    def _watch_keys(self, intent: protocol.ListKeys | protocol.ViewKey) -> None:
+        try:
+            self.key_sight = self.key_sight.after(intent)
+        except NoSuchKey as refusal:
+            self._answer({"refused": f"{refusal.detail}. {refusal.remedy}"})
+            return
+        self.outbox.open_beside(self.key_sight.streams)
+        self._services.keys_changed()
 
     def _acknowledge(self, key: str) -> None:
         seen = self.model.acknowledge(key)

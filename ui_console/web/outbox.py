@@ -2,7 +2,8 @@
 
 Rules of this file: no socket, no clock; times are seconds of the machine.
 
-* Nothing queues: a newer picture of a robot, or a newer section of the view, takes the place of the older.
+* Nothing queues: a newer picture of a robot, a newer message of a key, or a newer section of the view takes the place
+  of the older.
 * At most ``PICTURES_UNDERWAY`` pictures of a robot are on their way; the next goes when the browser has drawn one. So a
   slow link shows few pictures, not old ones.
 * Answers to the operator are all sent, but for the oldest when there are more than ``ANSWERS_KEPT``.
@@ -37,6 +38,7 @@ class Outbox:
         self._streams: dict[str, _PictureStream] = {}
         self._robots = frozenset[str]()
         self._view = ""
+        self._beside = frozenset[str]()
         self._turns = 0
         self.skipped = 0
         """Pictures that a newer one replaced before they were sent."""
@@ -71,8 +73,13 @@ class Outbox:
         self._view = view
         self._keep_streams()
 
+    def open_beside(self, streams: frozenset[str]) -> None:
+        """Send what comes in these streams, too; a page says of each part, as of a picture, that it is drawn."""
+        self._beside = streams
+        self._keep_streams()
+
     def _keep_streams(self) -> None:
-        names = sorted(self._robots | ({self._view} if self._view else set()))
+        names = sorted(self._robots | self._beside | ({self._view} if self._view else set()))
         self._streams = {name: self._streams.get(name) or _PictureStream() for name in names}
 
     @property

@@ -14,15 +14,29 @@ from ui_console.web.protocol import (
     Drawn,
     Here,
     Intent,
+    ListKeys,
     LookInto,
     MoreLog,
     ParametersRequest,
     SearchLog,
+    ViewKey,
     Watch,
     WhyRequest,
 )
 
-Looking = Acknowledge | Drawn | Here | LookInto | MoreLog | ParametersRequest | SearchLog | Watch | WhyRequest
+Looking = (
+    Acknowledge
+    | Drawn
+    | Here
+    | ListKeys
+    | LookInto
+    | MoreLog
+    | ParametersRequest
+    | SearchLog
+    | ViewKey
+    | Watch
+    | WhyRequest
+)
 """Intents that command nothing."""
 
 

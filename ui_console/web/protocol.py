@@ -10,8 +10,9 @@ from typing import Annotated, Any
 import msgspec
 
 from backbone.mission_log.question import LogQuestion
-from backbone.ranges import EXACT, LONGEST_LINE, Meters, PixelCount
+from backbone.ranges import EXACT, LONGEST_LINE, LONGEST_MENTION, Meters, PixelCount
 from ui_console.model.consent import MAX_WHY
+from ui_console.model.key_shown import KeyOrder
 from ui_console.model.orders import OrderKind
 from ui_console.web.login import BeatRequest, Hello, ShortText
 
@@ -22,6 +23,8 @@ MOST_ORDERED = 32  # chosen: more robots than one person can have in view
 MOST_FIELDS = 64  # chosen: more than a person fills in
 
 GivenValue = Annotated[int, msgspec.Meta(ge=-EXACT, le=EXACT)] | float | bool | ShortLine
+KeyText = Annotated[str, msgspec.Meta(max_length=LONGEST_MENTION, pattern=r"^([a-z_]+(/[A-Za-z0-9_.-]+)+)?\Z")]
+"""A key of one component without ``scout/<mission>/``, or an address; empty: none."""
 Numbered = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 Robots = Annotated[list[ShortText], msgspec.Meta(min_length=1, max_length=MOST_ORDERED)]
 PixelPoint = Annotated[float, msgspec.Meta(ge=-0.5, le=8_192.0)]
@@ -186,6 +189,36 @@ class LookInto(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
     view: ShortText = ""
 
 
+class ListKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="list_keys"):
+    """Show the keys on the bus, and how much is said at each; while no page does, nothing is counted.
+
+    Attributes:
+        is_open: False: show none.
+        words: Only rows with all of these in key, sender or schema.
+        order: Of the rows.
+    """
+
+    is_open: bool
+    words: ShortText = ""
+    order: KeyOrder = KeyOrder.KEY
+
+
+class ViewKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="view_key"):
+    """Show the newest message of one key, and of no other.
+
+    Attributes:
+        number: Comes back in the names of the streams with what is shown.
+        key: As in the list; empty: show none.
+        source: Sender of the messages.
+        schema: Theirs.
+    """
+
+    number: Numbered
+    key: KeyText = ""
+    source: KeyText = ""
+    schema: Annotated[str, msgspec.Meta(max_length=LONGEST_MENTION)] = ""
+
+
 class WhyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="why"):
     """Explain the state of a component or request."""
 
@@ -258,6 +291,8 @@ Intent = (
     | Watch
     | Drawn
     | LookInto
+    | ListKeys
+    | ViewKey
     | WhyRequest
     | SearchLog
     | MoreLog

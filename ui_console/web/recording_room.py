@@ -71,7 +71,7 @@ class Performance:
 
         self._bus = network.join(f"{Subsystem.BACKBONE}/replay", playback)
         self.player = Player(self._bus, playback, recording, CLASSES, since_s=playback.now_s(), checkpoints=checkpoints)
-        self.hub = WebHub(launch, network.join(launch.address, playback), playback, join)
+        self.hub = WebHub(launch, network.join(launch.address, playback), playback, join, is_played=True)
 
     async def begin(self) -> None:
         """Take in what was said before; the page stays usable meanwhile.

@@ -14,7 +14,7 @@ from message_catalogue import catalogue, honest_body, limit_bodies
 from backbone.recording.json_schema import schema_json
 from backbone.recording.known_messages import message_classes
 from backbone.recording.revival import OtherForm, revived
-from backbone.recording.translation import Translator
+from backbone.recording.translation import NO_HEADING, Translator, heading_of
 from backbone.wire import Message, schema_of
 from resource_pool.messages import GiveCommand
 
@@ -53,6 +53,20 @@ def test_a_message_is_what_its_schema_says_and_comes_back_as_it_was(kind: type[M
         validator.validate(said)
         sent = msgspec.msgpack.decode(msgspec.msgpack.encode(body), type=kind)
         assert revived(kind, said["body"]) == sent
+
+
+@pytest.mark.parametrize("kind", CATALOGUE, ids=schema_of)
+def test_the_heading_of_a_message_says_the_same_as_the_whole_message(kind: type[Message]) -> None:
+    raw = on_the_wire(honest_body(kind))
+    head, whole = heading_of(raw), TRANSLATOR.translate(raw, 12.6)
+    assert (head.source, head.sequence, head.stamp_s) == (whole.source, whole.sequence, whole.stamp_s)
+    assert head.schema == whole.schema
+
+
+@given(st.binary(max_size=200))
+def test_bytes_that_are_no_message_have_no_heading(raw: bytes) -> None:
+    if TRANSLATOR.translate(raw, 0.0).source == "":
+        assert heading_of(raw) == NO_HEADING
 
 
 def test_a_message_inside_another_keeps_its_schema() -> None:

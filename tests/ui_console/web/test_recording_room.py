@@ -23,7 +23,7 @@ from backbone.keys import Conversation
 from backbone.recording.presence import Presence
 from backbone.scheduling.requests import Holder
 from backbone.scheduling.views import RcView, Schedule
-from backbone.wire import Message
+from backbone.wire import Message, schema_of
 from resource_pool.arc_client import Frame
 from ui_console.web import playing, protocol
 from ui_console.web.login import Welcome
@@ -80,6 +80,7 @@ class Page:
         self.view: dict[str, Any] = {}
         self.answers: list[dict[str, Any]] = []
         self.pictures = 0
+        self.told: dict[str, Any] = {}
 
     async def does(self, intent: Any) -> None:
         await self.room.obey(self.viewer, intent)
@@ -91,9 +92,13 @@ class Page:
         while clock.now_s() < until_s:
             while (message := self.viewer.outbox.next(clock.now_s())) is not None:
                 if isinstance(message, bytes):
-                    self.pictures += 1
+                    stream = message[1 : 1 + message[0]].decode()
                     number = int.from_bytes(message[1 + message[0] : 5 + message[0]], "big")
-                    await self.does(protocol.Drawn("scout1", number))
+                    await self.does(protocol.Drawn(stream, number))
+                    if stream.startswith("/"):
+                        self.told[stream] = json.loads(message[13 + message[0] :])
+                    else:
+                        self.pictures += 1
                     continue
                 said = json.loads(message)
                 self.view |= said.get("view", {})
@@ -199,6 +204,20 @@ def test_nothing_can_be_commanded(intent: protocol.Intent):
         await page.does(intent)
         await page.looks()
         assert page.answers == [{"refused": NOT_NOW}]
+
+    on_a_page(scene)
+
+
+def test_what_was_said_is_listed_and_viewed_at_any_time():
+    async def scene(_room: RecordingRoom, page: Page) -> None:
+        await page.does(protocol.ListKeys(True, "status"))
+        await page.does(protocol.ViewKey(1, f"{SCOUT}/status", SCOUT, schema_of(ComponentState)))
+        for at_s in (33.0, 12.0):
+            await page.does(playing.ShowTime(at_s))
+            await page.looks()
+            assert f"{SCOUT}/status" in {row["key"] for row in page.told["/keys"]["rows"]}
+            fields = {row["name"]: row["text"] for row in page.told["/fields/1"]["rows"]}
+            assert fields["feedback"] == round_at(at_s)
 
     on_a_page(scene)
 

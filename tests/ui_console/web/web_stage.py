@@ -53,6 +53,8 @@ class Browser:
         self.view: dict[str, Any] = {}
         self.answers: list[dict[str, Any]] = []
         self.pictures: dict[str, list[int]] = {}
+        self.told: dict[str, list[Any]] = {}
+        """Lists of keys, and messages of the key in view, by stream."""
         self.news = asyncio.Event()
 
     async def listen(self) -> None:
@@ -61,8 +63,12 @@ class Browser:
                 if isinstance(message, bytes):
                     robot = message[1 : 1 + message[0]].decode()
                     (number,) = struct.unpack_from(">I", message, 1 + message[0])
-                    assert message[13 + message[0] :].startswith(b"\xff\xd8"), "a JPEG"
-                    self.pictures.setdefault(robot, []).append(number)
+                    packed = message[13 + message[0] :]
+                    if robot.startswith(("/keys", "/fields")):
+                        self.told.setdefault(robot, []).append(json.loads(packed))
+                    else:
+                        assert packed.startswith(b"\xff\xd8"), "a JPEG"
+                        self.pictures.setdefault(robot, []).append(number)
                     await self.say(do="drawn", robot=robot, number=number)
                 else:
                     said = json.loads(message)

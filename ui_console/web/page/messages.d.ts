@@ -120,6 +120,12 @@ export interface FieldForm {
   doc: string;
 }
 
+export interface FieldRow {
+  name: string;
+  text: string;
+  number: number | null;
+}
+
 export interface FloorShape {
   name: string;
   kind: ShapeKind;
@@ -161,6 +167,23 @@ export interface GaugeView {
 export interface HealthView {
   word: string;
   lines: string[];
+}
+
+export interface KeyList {
+  rows: KeyRow[];
+  matching: number;
+  heard: number;
+  dropped: number;
+}
+
+export interface KeyRow {
+  key: string;
+  source: string;
+  schema: string;
+  messages_per_s: number;
+  bytes_per_s: number;
+  mean_bytes: number;
+  heard_s: number;
 }
 
 export interface KindChoice {
@@ -236,6 +259,17 @@ export type MarkerKind =
   | "grant"
   | "operator"
   | "revoked";
+
+export interface MessageShown {
+  number: number;
+  stamp_s: number;
+  sequence: number;
+  cause: string;
+  size_bytes: number;
+  rows: FieldRow[];
+  trouble: string;
+  has_picture: boolean;
+}
 
 export type NodeState =
   | "failure"
@@ -571,10 +605,21 @@ export interface Here {
   is_there: boolean;
 }
 
+export type KeyOrder =
+  | "bytes"
+  | "key";
+
 export interface LiftRequest {
   do: "lift";
   robot: string;
   number: number;
+}
+
+export interface ListKeys {
+  do: "list_keys";
+  is_open: boolean;
+  words?: string;
+  order?: KeyOrder;
 }
 
 export interface LookInto {
@@ -687,6 +732,14 @@ export interface TakeOver {
   kind?: string;
 }
 
+export interface ViewKey {
+  do: "view_key";
+  number: number;
+  key?: string;
+  source?: string;
+  schema?: string;
+}
+
 export interface Watch {
   do: "watch";
   robots: string[];
@@ -727,6 +780,8 @@ export type Said =
   | Watch
   | Drawn
   | LookInto
+  | ListKeys
+  | ViewKey
   | WhyRequest
   | SearchLog
   | MoreLog

@@ -1,0 +1,111 @@
+"""What one page looks at on the bus: the list of keys, or one of them. Pure."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from backbone.errors import Refusal
+from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.naming import did_you_mean
+from ui_console.model.key_shown import KeyOrder
+from ui_console.web.protocol import ListKeys, ViewKey
+
+LIST_STREAM = "/keys"
+"""Streams of a page's outbox beside those of robots, whose names have no slash."""
+_HIDDEN = (Conversation.ALIVE, Conversation.TOLD)  # tokens are no messages, and copies are shown at their own keys
+
+
+class NoSuchKey(Refusal):
+    """No message can be sent at this key."""
+
+    code = "web.key"
+    remedy = "Choose a key of the list."
+
+
+class KeySight(NamedTuple):
+    """What a page looks at.
+
+    Attributes:
+        is_listed: The list of keys is open.
+        words: Only rows with these words.
+        order: Of the list.
+        number: Of the view, chosen by the page; what comes for an earlier view has another one.
+        key: Of the view, without ``scout/<mission>/``; empty: none is open.
+        source: Sender of the messages in view.
+        schema: Theirs.
+    """
+
+    is_listed: bool = False
+    words: str = ""
+    order: KeyOrder = KeyOrder.KEY
+    number: int = 0
+    key: str = ""
+    source: str = ""
+    schema: str = ""
+
+    @property
+    def view(self) -> tuple[str, str, str] | None:
+        """Key, sender and schema in view; None: no view is open."""
+        return (self.key, self.source, self.schema) if self.key else None
+
+    @property
+    def fields_stream(self) -> str:
+        """Name of the stream of its messages."""
+        return f"/fields/{self.number}"
+
+    @property
+    def picture_stream(self) -> str:
+        """Name of the stream of its pictures."""
+        return f"/picture/{self.number}"
+
+    @property
+    def streams(self) -> frozenset[str]:
+        """All streams that the page is to get."""
+        listed = {LIST_STREAM} if self.is_listed else set[str]()
+        return frozenset(listed | ({self.fields_stream, self.picture_stream} if self.key else set()))
+
+    def after(self, intent: ListKeys | ViewKey) -> KeySight:
+        """Return what the page looks at then.
+
+        Raises:
+            NoSuchKey: No message can be sent at that key.
+        """
+        match intent:
+            case ListKeys(is_open, words, order):
+                return self._replace(is_listed=is_open, words=words, order=order)
+            case ViewKey(number, key, source, schema):
+                if key:
+                    conversation_of(key)
+                return self._replace(number=number, key=key, source=source, schema=schema)
+
+
+def conversation_of(key: str) -> Conversation:
+    """Return the conversation of a key.
+
+    Raises:
+        NoSuchKey: It has none that can be heard.
+    """
+    known = {one.value: one for one in Conversation if one not in _HIDDEN}
+    address, _, name = key.rpartition("/")
+    if name not in known or "/" not in address:
+        raise NoSuchKey(f"no message is sent at {key}{did_you_mean(name, known)}")
+    return known[name]
+
+
+def where_heard(key: str, source: str, *, is_played: bool) -> tuple[Conversation, str]:
+    """Return which conversation to overhear for a key, and of whom, so that no other component makes copies.
+
+    Args:
+        key: Without ``scout/<mission>/``.
+        source: Sender of the messages.
+        is_played: True: a player says them, so that no sender can be delayed.
+
+    Raises:
+        NoSuchKey: No message can be sent at that key.
+    """
+    address, conversation = key.rpartition("/")[0], conversation_of(key)
+    if conversation is Conversation.ASK:
+        return Conversation.TOLD, address  # the one who answers copies questions too
+    if conversation in NEVER_DROPPED and not is_played:
+        return Conversation.TOLD, source or address
+    return conversation, address
