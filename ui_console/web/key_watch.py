@@ -25,7 +25,7 @@ from backbone.bus.interface import Bus, Clock, Overhearing
 from backbone.command_line.message_lines import short_key
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
-from backbone.keys import Conversation
+from backbone.keys import ROOT, Conversation
 from backbone.printable_text import printable
 from backbone.recording.hearing import to_overhear, unfolded
 from backbone.recording.known_messages import message_classes
@@ -157,6 +157,7 @@ class KeyWatch:
         self._task: asyncio.Task[None] | None = None
         self._table: KeyTable | None = None
         self._counting: list[Overhearing] = []
+        self._known: list[tuple[str, str, str]] = []  # rows of the last list, so that the next one has them at once
         self._viewed: dict[tuple[str, str, str], Viewed] = {}
         self._lists: dict[KeyWatcher, KeySight] = {}
         self._listed_s = 0.0
@@ -200,12 +201,16 @@ class KeyWatch:
         """Overhear what these look at, and nothing else."""
         is_listed = any(one.key_sight.is_listed for one in wanting)
         if is_listed and not self._counting:
-            self._table = KeyTable(self._clock.now_s())
+            mission = self._bus.mission
+            known = [(f"{ROOT}/{mission}/{key}", source, schema) for key, source, schema in self._known]
+            self._table = KeyTable(self._clock.now_s(), known)
             conversations = PLAYED if self._is_played else to_overhear(())
             self._counting = [self._bus.overhear(one, self._count, MOST_WAITING_BYTES) for one in conversations]
         elif not is_listed:
             for each in self._counting:
                 each.close()
+            if self._table is not None:
+                self._known = [row.id for row in self._table.rows(self._clock.now_s())]
             self._counting, self._table, self._lists = [], None, {}
         views = {view for one in wanting if (view := one.key_sight.view) is not None}
         for gone in self._viewed.keys() - views:

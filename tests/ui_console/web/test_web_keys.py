@@ -3,47 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
+from bus_speaker import LOGGED, PICTURES, SPEAKER, event, speaker
 from web_stage import LOW, Browser, Stage
 
-from backbone.bus.interface import Bus
-from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import NEVER_DROPPED, Conversation
 from backbone.recording.hearing import to_overhear
-from resource_pool.arc_client import Frame
 from ui_console.web.key_sight import KeySight, NoSuchKey, where_heard
 from ui_console.web.protocol import ListKeys, ViewKey
-
-ADDRESS = "resource_pool/watch-capture"
-LOGGED = {"key": f"{ADDRESS}/log", "source": ADDRESS, "schema": "StoryEvent/1"}
-PICTURES = {"key": f"{ADDRESS}/frames", "source": ADDRESS, "schema": "Frame/1"}
-EACH_S = 0.01
-
-
-@asynccontextmanager
-async def speaker(stage: Stage) -> AsyncIterator[Bus]:
-    """Publish an event and a picture a hundred times a second, from numbers that grow."""
-    bus = stage.network.join(ADDRESS, stage.clock)
-
-    async def speak() -> None:
-        for number in range(1_000_000):
-            event = StoryEvent(stage.clock.now_s(), ADDRESS, f"round {number}", "scout1", "", LogLevel.INFO)
-            bus.publish(ADDRESS, Conversation.LOG, event)
-            picture = Frame("grabber", "watch", 1, "scout1", number, 0.0, 4, 2, bytes([number % 256]) * 8)
-            bus.publish(ADDRESS, Conversation.FRAMES, picture)
-            await asyncio.sleep(EACH_S)
-
-    speaking = asyncio.create_task(speak())
-    try:
-        yield bus
-    finally:
-        speaking.cancel()
-        await asyncio.wait({speaking})
-        await bus.close()
 
 
 def row_of(browser: Browser, key: str) -> dict[str, Any] | None:
@@ -78,13 +47,17 @@ async def test_keys_are_counted_only_while_a_page_has_the_list_open(stage: Stage
         await anna.wait(lambda: (row_of(anna, LOGGED["key"]) or {})["messages_per_s"] > 10.0, "a rate")
         row = row_of(anna, LOGGED["key"])
         assert row is not None
-        assert (row["source"], row["schema"], row["mean_bytes"] > 40) == (ADDRESS, "StoryEvent/1", True)
+        assert (row["source"], row["schema"], row["mean_bytes"] > 40) == (SPEAKER, "StoryEvent/1", True)
         await anna.say(do="list_keys", is_open=True, words="CAPTURE frame", order="bytes")
         await anna.wait(lambda: anna.told["/keys"][-1]["matching"] == 1, "the words")
         assert row_of(anna, PICTURES["key"]) is not None
         await anna.say(do="list_keys", is_open=False)
         await ben.say(do="list_keys", is_open=False)
         await wait_nothing_heard(stage)
+        ben.told.clear()
+        await ben.say(do="list_keys", is_open=True)
+        await ben.wait(lambda: "/keys" in ben.told, "the list again")
+        assert LOGGED["key"] in {row["key"] for row in ben.told["/keys"][0]["rows"]}, "known from before"
 
 
 async def test_two_pages_that_view_a_key_cost_one_subscription_and_the_last_to_go_ends_it(stage: Stage) -> None:
@@ -132,11 +105,11 @@ async def test_a_page_that_draws_nothing_is_sent_little(stage: Stage) -> None:
 
 
 async def test_a_page_that_comes_later_has_the_last_message_of_a_silent_key_too(stage: Stage) -> None:
-    bus = stage.network.join(ADDRESS, stage.clock)
+    bus = stage.network.join(SPEAKER, stage.clock)
     async with stage.browser() as anna, stage.browser(LOW) as ben:
         await anna.say(do="view_key", number=1, **LOGGED)
         await stage.placer.wait(lambda: len(stage.network.overhearers) == 1)
-        bus.publish(ADDRESS, Conversation.LOG, StoryEvent(1.0, ADDRESS, "round 7", "scout1", "", LogLevel.INFO))
+        bus.publish(SPEAKER, Conversation.LOG, event(stage, 7))
         await anna.wait(lambda: rounds(anna, 1) == [7], "the message")
         await ben.say(do="view_key", number=1, **LOGGED)
         await ben.wait(lambda: rounds(ben, 1) == [7], "the same")

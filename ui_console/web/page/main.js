@@ -1,6 +1,7 @@
 // The page: joins the connection, the cards, the controls and the tables.
 
 import { Blindness } from "./blind.js";
+import { BusKeys } from "./bus.js";
 import { Cards } from "./cards.js";
 import { Commands } from "./commands.js";
 import { find, queryAll } from "./dom.js";
@@ -39,6 +40,22 @@ const seen = new Seen({
   told: find("seen-told"),
   values: find("seen-values"),
   place: find("seen-place"),
+  say,
+});
+const bus = new BusKeys({
+  panel: find("bus-panel", HTMLDetailsElement),
+  list: find("bus-list"),
+  words: find("bus-words", HTMLInputElement),
+  order: find("bus-order", HTMLSelectElement),
+  told: find("bus-told"),
+  keys: find("bus-keys"),
+  view: find("bus-view"),
+  back: find("bus-back"),
+  title: find("bus-title"),
+  head: find("bus-head"),
+  fields: find("bus-fields"),
+  plots: find("bus-plots"),
+  place: find("bus-place"),
   say,
 });
 const log = new Log({
@@ -100,6 +117,7 @@ function changed({ is, why, ageMs }) {
   if (is === "fresh") {
     cards.watch();
     seen.again();
+    bus.again();
   }
   if (is === "refused") {
     find("console").hidden = true;
@@ -109,9 +127,10 @@ function changed({ is, why, ageMs }) {
 }
 
 // ---------------------------------------------------------------- messages of the server
-/** @param {Picture} picture Of a robot, or of a view, whose names have a slash. */
+/** @param {Picture} picture Of a robot; of a view, whose names have a slash; of the bus, whose names begin with one. */
 function saw(picture) {
-  if (picture.robot.includes("/")) seen.saw(picture);
+  if (picture.robot.startsWith("/")) bus.saw(picture);
+  else if (picture.robot.includes("/")) seen.saw(picture);
   else cards.saw(picture);
 }
 
