@@ -244,7 +244,13 @@ def serve(
             help="Give a robot back when its operator touched nothing for so many seconds; 0: never.",
         ),
     ] = AWAY_AFTER_S,
-    mission: Mission = None,
+    mission: Annotated[
+        list[str] | None,
+        typer.Option(
+            autocompletion=complete_mission,
+            help="Name of a mission that is up on this machine; again for each of several, each with its own page.",
+        ),
+    ] = None,
     connect: Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
@@ -257,14 +263,17 @@ def serve(
         raise _usage(f"--operator {wrong}") from wrong
     if key and not certificate:
         raise _usage("--key belongs to a --certificate")
-    if (design or recording) and (mission is not None or connect is not None):
+    if (design or recording) and (mission or connect is not None):
         raise _usage("--design and --recording serve a file; --mission and --connect are for missions that are up")
+    names: list[str | None] = list(mission) if mission else [None]
+    if (connect is not None and len(names) > 1) or len(set(names)) < len(names):
+        raise _usage("several --mission have different names, and are up on this machine, without --connect")
     if design and recording:
         raise _usage("--design and --recording cannot be served by one server")
     try:
         from ui_console.design.serving import serve_designer
         from ui_console.web.recording_serving import serve_recording
-        from ui_console.web.serving import Claims, ServerOptions, serve_console
+        from ui_console.web.serving import Claims, ServerOptions, serve_consoles
     except ModuleNotFoundError as missing:
         raise _usage(f"{missing.name} is not installed; install scout-backbone[web]") from missing
     options, claims = ServerOptions(host, port, certificate, key, new_tokens), Claims(kind, away_after)
@@ -272,8 +281,8 @@ def serve(
         run(lambda: serve_designer(design, rights, options))
     if recording is not None:
         run(lambda: serve_recording(recording, rights, options))
-    where = chosen(mission, connect, secret_file)
-    run(lambda: serve_console(where, rights, options, claims))
+    missions = [chosen(name, connect, secret_file) for name in names]
+    run(lambda: serve_consoles(missions, rights, options, claims))
 
 
 @app.command(hidden=True, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})

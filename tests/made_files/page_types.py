@@ -48,11 +48,12 @@ HEAD = "// What the page and its server send each other. Written by tests/made_f
 
 
 class Welcomed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Who came in, and where."""
+    """Who came in, and where; ``missions`` are all of this server."""
 
     user: str
     priority: int
     mission: str
+    missions: list[str]
 
 
 class LoggedEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

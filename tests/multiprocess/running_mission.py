@@ -165,7 +165,11 @@ def marked(mark: str) -> list[psutil.Process]:
 
 @contextlib.contextmanager
 def mission_up(
-    *options: str, name: str = "", mission_xml: Path = MISSION_XML, change: dict[str, str] | None = None
+    *options: str,
+    name: str = "",
+    mission_xml: Path = MISSION_XML,
+    change: dict[str, str] | None = None,
+    beside: RunningMission | None = None,
 ) -> Iterator[RunningMission]:
     """Bring a mission up, yield it when all is ready, and make sure that nothing of it is left afterwards.
 
@@ -174,6 +178,7 @@ def mission_up(
         name: Another mission name than the file's.
         mission_xml: The mission file.
         change: Texts to replace in the file.
+        beside: Another mission of the same user; None: it has a runtime folder of its own.
     """
     with tempfile.TemporaryDirectory(prefix="scout-test-") as folder:
         mark = uuid.uuid4().hex
@@ -184,7 +189,8 @@ def mission_up(
             text = text.replace(old, new)
         file = Path(folder) / "mission.xml"
         file.write_text(text)
-        environment = {**os.environ, "XDG_RUNTIME_DIR": folder, MARK: mark}
+        runtime = folder if beside is None else beside.environment["XDG_RUNTIME_DIR"]
+        environment = {**os.environ, "XDG_RUNTIME_DIR": runtime, MARK: mark}
         launcher = subprocess.Popen(
             [str(BIN / "scout-backbone"), "up", str(file), "--headless", *options],
             env=environment,

@@ -87,6 +87,9 @@ class WebHub:
             answers_of=self._answers_of,
             has_map=True,
         )
+        self.mission = launch.mission
+        self.served = [launch.mission]
+        """Names of all missions of the same server."""
         self.clients: dict[Operator, None] = {}
         self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False, alarms=self.team.alarms)
         self._launch, self._bus, self._join = launch, bus, join
@@ -110,7 +113,8 @@ class WebHub:
         """Return a new operator, whose page gets the whole view; ``former`` as in ``Operator``."""
         operator = Operator(self, welcome, former)
         self.clients[operator] = None
-        welcomed = {"user": welcome.user, "priority": welcome.priority, "mission": self._launch.mission}
+        who = {"user": welcome.user, "priority": welcome.priority}
+        welcomed = who | {"mission": self.mission, "missions": self.served}
         operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))
         self._send_tables([operator.outbox])
         self._send_map([operator.outbox])

@@ -1,11 +1,10 @@
-"""Server of a page: files over HTTP, messages over WebSockets; the application behind it gives them meaning."""
+"""Server of pages: files over HTTP, messages over WebSockets; the application behind it gives them meaning."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Sized
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sized
 from contextlib import asynccontextmanager
-from functools import partial
 from ssl import SSLContext
 from typing import Any, Generic, Protocol, TypeVar, cast
 
@@ -44,6 +43,7 @@ FATAL_CODES = {
     ViolationKind.CROWD: CloseCode.TRY_AGAIN_LATER,
 }
 MOST_REASON = 120  # of the 123 bytes for it in a close frame
+NOT_SERVED = "this mission is not served any more"
 KEEPALIVE_REASON = "keepalive ping timeout"
 
 
@@ -121,53 +121,41 @@ class PageServer(Generic[ClientT, IntentT]):
             understand,
         )
         self._pages: dict[tuple[str, str], ServerConnection] = {}
+        self._connections: set[ServerConnection] = set()
+        self._is_over = False
 
     @asynccontextmanager
     async def open(self, host: str, port: int, encryption: SSLContext | None = None) -> AsyncIterator[Server]:
-        """Accept browsers, until left or the server is closed.
-
-        Args:
-            host: Address to listen at.
-            port: Port; 0: any that is free.
-            encryption: See ``encryption_with``; None: plain HTTP.
+        """Accept browsers, until left or the server is closed; see ``open_pages``.
 
         Raises:
             CannotListen: The address is not free, or not one of this machine.
         """
-        pending = PendingConnections(encryption, self._application.report_violation)
-        async with await self._listen(host, port, pending) as server:
-            try:
-                yield server
-            finally:
-                server.close()
-                pending.close()
+        async with open_pages({"/": self}, host, port, encryption) as server:
+            yield server
 
-    async def _listen(self, host: str, port: int, pending: PendingConnections) -> Server:
-        try:
-            return await serve(
-                partial(self._meet, pending),
-                host,
-                port,
-                process_request=partial(self._answer, pending),
-                create_connection=cast(Any, pending.new_protocol),
-                compression=None,
-                server_header=None,
-                open_timeout=OPEN_WITHIN_S,
-                ping_interval=PING_EVERY_S,
-                ping_timeout=READ_WITHIN_S,
-                close_timeout=CLOSE_WITHIN_S,
-                max_size=MAX_MESSAGE_BYTES,
-                max_queue=MOST_UNREAD,
-                write_limit=SEND_AHEAD_BYTES,
-            )
-        except OSError as error:
-            raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error
+    async def end(self) -> None:
+        """Close the connections of its pages, and serve no more."""
+        self._is_over = True
+        closing = [connection.close(CloseCode.GOING_AWAY, NOT_SERVED) for connection in self._connections]
+        await asyncio.gather(*closing)
 
-    def _answer(self, pending: PendingConnections, connection: ServerConnection, request: Request) -> Response | None:
-        """Return the file asked for; None: it is the page's socket."""
-        pending.asked(connection)
-        if request.path.partition("?")[0] != SOCKET_PATH:
-            return _response(self._files.answer(request.path, request.headers.get("If-None-Match", "")))
+    def report_violation(self, who: str, violation: ProtocolViolation) -> None:
+        """Show the clients a violation."""
+        self._application.report_violation(who, violation)
+
+    def answer(self, connection: ServerConnection, request: Request, path: str) -> Response | None:
+        """Return the file asked for; None: it is the page's socket.
+
+        Args:
+            connection: The browser's.
+            request: Its request.
+            path: Below this page's own.
+        """
+        if self._is_over:
+            return connection.respond(404, f"{NOT_SERVED}.\n")
+        if path.partition("?")[0] != SOCKET_PATH:
+            return _response(self._files.answer(path, request.headers.get("If-None-Match", "")))
         if not is_own_page(request.headers.get("Origin", ""), request.headers.get("Host", "")):
             remedy = "Close that page; only this server's own may connect."
             self._application.report_violation(
@@ -176,8 +164,15 @@ class PageServer(Generic[ClientT, IntentT]):
             return connection.respond(403, "A page of another site may not connect.\n")
         return None
 
-    async def _meet(self, pending: PendingConnections, connection: ServerConnection) -> None:
+    async def meet(self, pending: PendingConnections, connection: ServerConnection) -> None:
         """Serve one connection to its end."""
+        self._connections.add(connection)
+        try:
+            await self._admit(pending, connection)
+        finally:
+            self._connections.discard(connection)
+
+    async def _admit(self, pending: PendingConnections, connection: ServerConnection) -> None:
         session = ClientSession(self._authenticator, self._understand, _now_s())
         welcome = await self._wait_welcome(connection, session)
         if welcome is None:
@@ -293,6 +288,79 @@ class PageServer(Generic[ClientT, IntentT]):
         if violation.is_fatal:
             code = FATAL_CODES.get(violation.kind, CloseCode.POLICY_VIOLATION)
             await connection.close(code, f"This page {violation.line}. {violation.remedy}"[:MOST_REASON])
+
+
+@asynccontextmanager
+async def open_pages(
+    pages: Mapping[str, PageServer[Any, Any]], host: str, port: int, encryption: SSLContext | None = None
+) -> AsyncIterator[Server]:
+    """Accept browsers of several pages at one address, until left or the server is closed.
+
+    Args:
+        pages: Path of each, which ends with a slash; none begins with another.
+        host: Address to listen at.
+        port: Port; 0: any that is free.
+        encryption: See ``encryption_with``; None: plain HTTP.
+
+    Raises:
+        CannotListen: The address is not free, or not one of this machine.
+    """
+
+    def report(who: str, violation: ProtocolViolation) -> None:
+        for page in pages.values():
+            page.report_violation(who, violation)
+
+    def of(request: Request) -> tuple[PageServer[Any, Any], str] | None:
+        found = ((page, request.path[len(at) - 1 :]) for at, page in pages.items() if request.path.startswith(at))
+        return next(found, None)
+
+    def answer(connection: ServerConnection, request: Request) -> Response | None:
+        pending.asked(connection)
+        found = of(request)
+        if found is None:
+            return connection.respond(404, "There is no such page. Open an address that serve printed.\n")
+        return found[0].answer(connection, request, found[1])
+
+    async def meet(connection: ServerConnection) -> None:
+        found = of(connection.request) if connection.request is not None else None
+        if found is not None:
+            await found[0].meet(pending, connection)
+
+    pending = PendingConnections(encryption, report)
+    async with await _listen(meet, answer, pending, host, port) as server:
+        try:
+            yield server
+        finally:
+            server.close()
+            pending.close()
+
+
+async def _listen(
+    meet: Callable[[ServerConnection], Awaitable[None]],
+    answer: Callable[[ServerConnection, Request], Response | None],
+    pending: PendingConnections,
+    host: str,
+    port: int,
+) -> Server:
+    try:
+        return await serve(
+            meet,
+            host,
+            port,
+            process_request=answer,
+            create_connection=cast(Any, pending.new_protocol),
+            compression=None,
+            server_header=None,
+            open_timeout=OPEN_WITHIN_S,
+            ping_interval=PING_EVERY_S,
+            ping_timeout=READ_WITHIN_S,
+            close_timeout=CLOSE_WITHIN_S,
+            max_size=MAX_MESSAGE_BYTES,
+            max_queue=MOST_UNREAD,
+            write_limit=SEND_AHEAD_BYTES,
+        )
+    except OSError as error:
+        raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error
 
 
 def port_of(server: Server) -> int:

@@ -1,10 +1,11 @@
-"""The commands that serve pages: the console of a mission that is up, and the addresses with tokens."""
+"""The commands that serve pages: the consoles of missions that are up, and the addresses with tokens."""
 
 from __future__ import annotations
 
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from ssl import SSLContext
 
@@ -14,12 +15,11 @@ from backbone.bus.interface import Bus
 from backbone.command_line.where import Where
 from backbone.component.launch import Launch
 from backbone.launcher.endings import ExitCode, say
-from ui_console.session.joining import end_server_on_signals, join, write_line
+from ui_console.session.joining import Joining, end_server_on_signals, join, write_line
 from ui_console.web.encryption import encryption_with
 from ui_console.web.hub import WebHub
-from ui_console.web.login import Authenticator, TokenRights
-from ui_console.web.page_server import CannotListen
-from ui_console.web.server import WebServer
+from ui_console.web.login import Authenticator, TokenRights, new_token
+from ui_console.web.server import Console, WebServer, path_of
 from ui_console.web.token_file import TokenFile, TokensNotKept, kept_or_new
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
@@ -57,19 +57,27 @@ class ServerOptions:
         """Return the valid tokens: the tokens of the server before, if they are kept and wanted, else the new ones."""
         return rights if tokens is None or self.has_new_tokens else kept_or_new(rights, tokens.read())
 
-    def opened(self, port: int, tokens: TokenFile | None, rights: Mapping[str, TokenRights]) -> None:
+    def opened(self, port: int, tokens: TokenFile | None, rights: Mapping[str, TokenRights], mission: str = "") -> None:
         """Keep the tokens for the next server, and print the page's address for each.
 
         Args:
             port: The server listens there.
             tokens: The file that keeps the tokens; None: none does.
             rights: Token → its rights.
+            mission: One of several that are served; empty: the page is the only one.
         """
         _keep(tokens, rights)
         scheme = "https" if self.certificate else "http"
+        path = path_of(mission, is_alone=not mission)
         for token, granted in rights.items():
-            who = f"{granted.user}: " if granted.user else ""
-            write_line(f"{who}{scheme}://{_shown(self.host)}:{port}/#token={token}".encode())
+            who = ", ".join(filter(None, (mission, granted.user)))
+            at = f"{scheme}://{_shown(self.host)}:{port}{path}#token={token}"
+            write_line(f"{who}: {at}".encode() if who else at.encode())
+        if not mission:
+            self.warn_if_readable()
+
+    def warn_if_readable(self) -> None:
+        """Say so if others on the network can read the pages' messages."""
         if self.host not in LOOPBACK and not self.certificate:
             say(
                 "the connection is not encrypted, so others on the network can read its messages: use it on networks "
@@ -90,38 +98,74 @@ class Claims:
     away_after_s: float
 
 
-async def serve_console(where: Where, rights: Mapping[str, TokenRights], options: ServerOptions, claims: Claims) -> int:
-    """Serve the console until a signal ends it; return the command's exit code.
+@dataclass(frozen=True)
+class _Served:
+    console: Console
+    tokens: TokenFile | None
+    rights: Mapping[str, TokenRights]
+
+
+async def serve_consoles(
+    missions: Sequence[Where], rights: Mapping[str, TokenRights], options: ServerOptions, claims: Claims
+) -> int:
+    """Serve the consoles of one or several missions until a signal ends it; return the command's exit code.
 
     Args:
-        where: The mission.
-        rights: Token → its rights.
+        missions: The missions, with different names.
+        rights: Token → its rights in the first mission; in each other one new tokens have the same rights.
         options: Address and encryption.
         claims: Claims of the operators.
 
     Raises:
         CannotListen: The address is not free, or not one of this machine.
         NoCertificate: The certificate or its key is missing or not valid.
+        Refusal: One of the missions is not up on this machine.
+        LinkError: The hub of one does not answer.
     """
     encryption = options.encryption
-    joining = await join(where)
+    joinings = [await join(where) for where in missions]
+    async with AsyncExitStack() as stack:
+        served = list[_Served]()
+        for where, joining in zip(missions, joinings, strict=True):
+            own = {new_token() if served else token: granted for token, granted in rights.items()}
+            served.append(await _console(where, joining, own, options, claims, stack))
+
+        def end(reason: str) -> None:
+            for each in served:
+                each.console.hub.observer.end(reason)
+
+        def opened(port: int) -> None:
+            for each in served:
+                mission = each.console.hub.mission if len(served) > 1 else ""
+                options.opened(port, each.tokens, each.rights, mission)
+            if len(served) > 1:
+                options.warn_if_readable()
+
+        interrupted = end_server_on_signals(end)
+        await WebServer(*(each.console for each in served)).run(options.host, options.port, opened, encryption)
+    return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
+
+
+async def _console(
+    where: Where,
+    joining: Joining,
+    rights: Mapping[str, TokenRights],
+    options: ServerOptions,
+    claims: Claims,
+    stack: AsyncExitStack,
+) -> _Served:
+    """Return the console of one mission; its bus is closed with the stack."""
     launch = msgspec.structs.replace(joining.launch, name=f"web-{os.getpid()}")
     tokens = _tokens_of_mission(where, launch.mission, joining.secret, options.port)
-    rights = options.rights_with(tokens, rights)
+    valid = options.rights_with(tokens, rights)
 
     async def one_more(launch: Launch) -> Bus:
         return await joining.open_bus(launch)
 
     bus = await one_more(launch)
+    stack.push_async_callback(bus.close)
     hub = WebHub(launch, bus, joining.clock, one_more, kind=claims.kind, away_after_s=claims.away_after_s)
-    interrupted = end_server_on_signals(hub.observer.end)
-    server = WebServer(hub, Authenticator(rights))
-    try:
-        await server.run(options.host, options.port, lambda port: options.opened(port, tokens, rights), encryption)
-    except CannotListen:
-        await bus.close()
-        raise
-    return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
+    return _Served(Console(hub, Authenticator(valid)), tokens, valid)
 
 
 def _tokens_of_mission(where: Where, mission: str, secret: str, port: int) -> TokenFile | None:

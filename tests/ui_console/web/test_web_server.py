@@ -20,7 +20,7 @@ from resource_pool.commands import Halt, Move
 from ui_console.web import login, page_server
 from ui_console.web.login import MAX_MESSAGE_BYTES, Authenticator
 from ui_console.web.page_server import CannotListen
-from ui_console.web.server import WebServer
+from ui_console.web.server import Console, WebServer
 
 
 async def all_in_turn(sends: Iterator[Awaitable[None]]) -> None:
@@ -290,7 +290,7 @@ async def test_only_so_many_operators_are_served_and_the_next_is_told_so(
 
 async def test_an_address_that_cannot_be_had_is_refused_with_a_remedy(stage: Stage) -> None:
     with pytest.raises(CannotListen, match=str(stage.port)) as refused:
-        await WebServer(stage.hub, Authenticator(RIGHTS)).run("127.0.0.1", stage.port, lambda port: None)
+        await WebServer(Console(stage.hub, Authenticator(RIGHTS))).run("127.0.0.1", stage.port, lambda port: None)
     assert "--port" in refused.value.remedy
 
 

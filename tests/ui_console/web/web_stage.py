@@ -157,13 +157,15 @@ class Stage:
 
     def __init__(self, network: Any, clock: MissionClock, placer: FakePlacer, rc_manager: Bus) -> None:
         self.placer, self.clock, self.rc_manager = placer, clock, rc_manager
-        launch = Launch(MISSION, Subsystem.UI_CONSOLE, "web-1", "console", "in this process", "local", "", 0.0, 1.0)
+        launch = Launch(
+            network.mission, Subsystem.UI_CONSOLE, "web-1", "console", "in this process", "local", "", 0.0, 1.0
+        )
 
         async def join(one_more: Launch) -> Bus:
             return network.join(one_more.address, clock)
 
         self.hub = WebHub(launch, network.join(launch.address, clock), clock, join, kind="capture")
-        self.port = 0
+        self.port, self.path = 0, "/"
         self.robots: dict[str, FakeRobot] = {}
         self.network = network
         self._others: list[Bus] = []
@@ -171,7 +173,7 @@ class Stage:
     @property
     def address(self) -> str:
         """Address of the page, for a person who states a name."""
-        return f"http://127.0.0.1:{self.port}/#token={ANYBODY}"
+        return f"http://127.0.0.1:{self.port}{self.path}#token={ANYBODY}"
 
     def place_robots(self, *names: str) -> None:
         """Add robots that can be stopped, without holders."""
@@ -228,7 +230,7 @@ class Stage:
                 await asyncio.wait({listening})
 
     def connection(self, **options: Any) -> connect:
-        return connect(f"ws://127.0.0.1:{self.port}/socket", compression=None, proxy=None, **options)
+        return connect(f"ws://127.0.0.1:{self.port}{self.path}socket", compression=None, proxy=None, **options)
 
     def grant_all(self) -> None:
         """Grant every ARC its robot at once, as if no other ARC were there."""

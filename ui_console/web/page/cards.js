@@ -3,6 +3,7 @@
 import { make } from "./dom.js";
 import { Gauges, lineOf } from "./gauges.js";
 import { actWhenHeld } from "./holding.js";
+import { ofMission } from "./missions.js";
 import { notice } from "./notices.js";
 import { Screen } from "./pictures.js";
 import { lasting, set } from "./text.js";
@@ -173,7 +174,7 @@ class Card {
     const row = make("div", "row");
     const stop = this.button("Stop", "stop_robot");
     stop.className = "emergency";
-    stop.setAttribute("aria-label", `Stop ${this.name}`);
+    stop.setAttribute("aria-label", `Stop ${this.name}${ofMission()}`);
     const why = this.button("Why?", "why");
     why.setAttribute("aria-label", `Why is ${this.name} as it is?`);
     row.append(this.take, stop, why);

@@ -1,6 +1,7 @@
 // This operator's own part: the robot held, the robot lost, the questions of others.
 
 import { find } from "./dom.js";
+import { remembered } from "./memory.js";
 import { atStick } from "./orders.js";
 import { lasting, set } from "./text.js";
 
@@ -218,15 +219,15 @@ class Memory {
    * @param {number} at
    */
   keep(robot, why, at) {
-    sessionStorage.setItem(MEMORY, JSON.stringify({ robot, why, at }));
+    sessionStorage.setItem(remembered(MEMORY), JSON.stringify({ robot, why, at }));
   }
 
   forget() {
-    sessionStorage.removeItem(MEMORY);
+    sessionStorage.removeItem(remembered(MEMORY));
   }
 
   /** @returns {{ robot: string, why: string, at: number } | null} */
   get kept() {
-    return JSON.parse(sessionStorage.getItem(MEMORY) ?? "null");
+    return JSON.parse(sessionStorage.getItem(remembered(MEMORY)) ?? "null");
   }
 }

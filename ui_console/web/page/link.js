@@ -70,7 +70,10 @@ export class Link {
 
   connect() {
     clearTimeout(this.timer);
-    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
+    const at = new URL("socket", location.href); // of this page's own mission
+    at.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    at.search = at.hash = "";
+    const socket = new WebSocket(at);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     socket.onopen = () => socket.send(JSON.stringify({ do: "hello", page: this.page, ...this.hello }));

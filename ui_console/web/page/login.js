@@ -1,6 +1,7 @@
 // Login: the token comes with the address or from a form, and is kept for this tab only.
 
 import { find } from "./dom.js";
+import { remembered } from "./memory.js";
 import { set } from "./text.js";
 
 /** Calls `enter({token, user})` as soon as there is a token to try. */
@@ -18,21 +19,24 @@ export class Login {
   }
 
   begin() {
+    addEventListener("hashchange", () => {
+      if (location.hash.includes("token=")) location.reload(); // an address was opened where its page is open
+    });
     const given = new URLSearchParams(location.hash.slice(1));
     const [newToken, newUser] = [given.get("token"), given.get("user")];
     if (newToken !== null) {
-      sessionStorage.setItem("token", newToken);
-      if (newUser !== null) sessionStorage.setItem("user", newUser);
+      sessionStorage.setItem(remembered("token"), newToken);
+      if (newUser !== null) sessionStorage.setItem(remembered("user"), newUser);
       history.replaceState(null, "", location.pathname); // so that no picture of the screen shows the token
     }
-    const token = sessionStorage.getItem("token");
-    if (token) this.try(token, sessionStorage.getItem("user") ?? "");
+    const token = sessionStorage.getItem(remembered("token"));
+    if (token) this.try(token, sessionStorage.getItem(remembered("user")) ?? "");
     else this.ask("");
   }
 
   /** @param {string} why */
   ask(why) {
-    sessionStorage.removeItem("token");
+    sessionStorage.removeItem(remembered("token"));
     set(find("login-why"), why);
     this.form.hidden = false;
     this.token.focus();
@@ -43,8 +47,8 @@ export class Login {
    * @param {string} user
    */
   try(token, user) {
-    sessionStorage.setItem("token", token);
-    sessionStorage.setItem("user", user);
+    sessionStorage.setItem(remembered("token"), token);
+    sessionStorage.setItem(remembered("user"), user);
     this.form.hidden = true;
     this.enter({ token, user });
   }

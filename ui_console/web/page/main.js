@@ -12,6 +12,7 @@ import { Link } from "./link.js";
 import { Log } from "./log.js";
 import { Login } from "./login.js";
 import { RobotMap } from "./map.js";
+import { showMissions } from "./missions.js";
 import { notice, read, showAlarm, showHealth } from "./notices.js";
 import { Orders } from "./orders.js";
 import { Playback } from "./playback.js";
@@ -144,6 +145,7 @@ function heard(message) {
   Object.assign(view, changes);
   if (changes.welcome) {
     const { mission, user, priority } = changes.welcome;
+    showMissions(changes.welcome);
     find("mission").textContent = `${mission} · ${user}, priority ${priority}`;
     document.title = `${mission} – Scout console`;
   }

@@ -547,6 +547,7 @@ export interface Welcomed {
   user: string;
   priority: number;
   mission: string;
+  missions: string[];
 }
 
 export interface WhyAnswer {
