@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import msgspec
 
-from ui_console.model.key_table import KeyRow
+from ui_console.model.key_table import KeyRow, with_words
 from ui_console.model.message_views import FieldRow
 
 MOST_LISTED = 100  # chosen: several screens; words find the others
@@ -65,17 +65,11 @@ def key_list(rows: Sequence[KeyRow], words: str, order: KeyOrder, dropped: int) 
 
     Args:
         rows: In the order of keys.
-        words: Parted by blanks; case does not matter.
+        words: See ``with_words``.
         order: Of the result.
         dropped: Number of messages that came too fast to be counted.
     """
-    wanted = words.casefold().split()
-    found = [row for row in rows if _has(row, wanted)] if wanted else list(rows)
+    found = with_words(rows, words)
     if order is KeyOrder.BYTES:
         found.sort(key=lambda row: -row.bytes_per_s)
     return KeyList(found[:MOST_LISTED], len(found), len(rows), dropped)
-
-
-def _has(row: KeyRow, words: Sequence[str]) -> bool:
-    text = " ".join(row.id).casefold()
-    return all(word in text for word in words)

@@ -20,11 +20,9 @@ from typing import NamedTuple, Protocol
 
 import msgspec
 
-from backbone.addresses import COMPONENT_DATABASE
 from backbone.bus.interface import Bus, Clock, Overhearing
 from backbone.command_line.message_lines import short_key
-from backbone.component_database.messages import ListTypes, Types
-from backbone.errors import LinkError, Refusal
+from backbone.command_line.watching import mission_classes
 from backbone.keys import ROOT, Conversation
 from backbone.printable_text import printable
 from backbone.recording.hearing import to_overhear, unfolded
@@ -46,7 +44,6 @@ SHOWN_EVERY_S = 0.1  # chosen: a person follows no more
 LISTED_EVERY_S = 1.0  # chosen: rates are read, not followed
 MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: the pictures of a second of four robots
 REST = 20.0  # chosen: a view takes at most a twentieth of the server's time, which operators' commands need
-REPLY_TIME_S = 1.0  # chosen: a view without names of fields is of use, too
 ASKED_EVERY_S = 10.0  # chosen: a page that asks for messages that nobody knows costs the mission one question
 
 PLAYED = tuple(one for one in Conversation if one not in (Conversation.ASK, Conversation.TOLD, Conversation.ALIVE))
@@ -277,16 +274,7 @@ class KeyWatch:
         now_s = asyncio.get_running_loop().time()
         if unknown and now_s >= self._asked_s + ASKED_EVERY_S:
             self._asked_s = now_s
-            self._know(await asyncio.to_thread(message_classes, await self._modules()))
+            self._know(await mission_classes(self._bus, log.info))
 
     def _know(self, classes: dict[str, type[Message]]) -> None:
         self._schemas, self._translator = frozenset(classes), Translator(classes)
-
-    async def _modules(self) -> list[str]:
-        """Return the modules of the mission's component types; a kind of RC may have its messages beside it."""
-        try:
-            types = await self._bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
-        except (LinkError, Refusal) as error:
-            log.info("messages of the mission's own types have no names of fields: %s", error)
-            return []
-        return sorted({one.component_type.class_path.partition(":")[0] for one in types.types})
