@@ -78,6 +78,7 @@ READING = (
 LOOKING = (
     Place("dialog of views", "_look", "b", "what the behaviors see", "Escape"),
     Place("view of a behavior", "_look", "b Enter", "escape leaves", "Escape"),
+    Place("list of the bus's keys", "action_heard", "B", "what is said", "Escape"),
 )
 LIFTING = (Place("dialog to lift", "action_lift", "c", "lift the stop of", "Escape", "stopped", OTHERS[1]),)
 WRITING = (
@@ -137,6 +138,8 @@ CARD = {
 }
 CONTROLS = ("theme", "stop-all", "pad", "stop-mine", "halt", "take", "may-i", "release", "speed", "panel")
 SEEN = "document.getElementById('seen-panel').open = true; "
+BUS = "document.getElementById('bus-panel').open = true; "
+BUS_VIEW = f"{BUS}document.getElementById('bus-view').hidden = false; "
 MAP = ("go", "watch", "return", "end", "follow", "target")
 CLOSE = "document.getElementById('reading').close()"
 PAGE = (
@@ -145,6 +148,8 @@ PAGE = (
     *(_focus(f"#{control}") for control in CONTROLS),
     *(_focus(f"#map-{control}") for control in MAP),
     *(_focus(f"#seen-{control}", SEEN) for control in ("behavior", "view")),
+    *(_focus(f"#bus-{control}", BUS) for control in ("words", "order", "keys")),
+    *(_focus(f"#bus-{control}", BUS_VIEW) for control in ("back", "fields")),
     *(_revealed("login", selector) for selector in ("#login-token", "#login-user", "#login [type=submit]")),
     *(_revealed("lost", selector) for selector in ("#retake", "#dismiss")),
     _revealed("kinds", "#kind"),
