@@ -17,7 +17,8 @@ from backbone.component.abilities import NO_ABILITIES, Abilities
 SHIPPED = "shipped_classes.json"
 
 _LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
-_META = {"minimum": "ge", "exclusiveMinimum": "gt", "maximum": "le", "exclusiveMaximum": "lt", "pattern": "pattern"}
+_META = {"minimum": "ge", "exclusiveMinimum": "gt", "maximum": "le", "exclusiveMaximum": "lt"}
+_META |= {"pattern": "pattern", "minLength": "min_length", "maxLength": "max_length"}
 _PEOPLE = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
 _TYPES = {"number": float, "integer": int, "string": str, "boolean": bool, "null": None}
 

@@ -15,13 +15,14 @@ import msgspec
 
 from backbone.ranges import A_DAY_S
 from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.behaviors.motion import MOST_TIMES
 from mission_control.children import BRANCH
 from mission_control.composites import ENDLESS, Composite, WhileSuspended
 
 MOST_CHILDREN = 256  # chosen: as many as a path may have steps; a mission has a dozen
 PAUSE_S = 1.0  # chosen: ten times the start of a process, so that a child that fails at once costs little
 PATIENCE_S = 10.0  # chosen: two of the papers' slices
-MOST_TIMES = 100_000  # chosen: once a minute for ten weeks
+
 
 Seconds = Annotated[float, msgspec.Meta(gt=0, le=A_DAY_S)]
 """A mission time that is over at some time."""

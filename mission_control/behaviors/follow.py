@@ -17,7 +17,7 @@ from backbone.errors import Refusal
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
-from mission_control.behaviors.motion import MOST_M_S, FloorPoint
+from mission_control.behaviors.motion import DrivingSpeed, FloorPoint, NamedComponent
 from mission_control.behaviors.way import keep_distance
 
 TOLERANCE_SHARE = 0.1  # chosen: of the distance; less would have the robot move all the time
@@ -36,22 +36,14 @@ class FollowParameters(BehaviorParameters, frozen=True, kw_only=True):
     Attributes:
         target: Body to follow, as the localizer names it: another robot, in a simulated room a person, too.
         localizer: Component that tracks both: its name if it is in the resource pool, else its address.
-        distance_m: Distance between the middles of the two that it keeps, 0.2 to 10.
-        speed_m_s: Fastest speed, above 0, at most 0.3.
+        distance_m: Distance between the middles of the two that it keeps.
+        speed_m_s: Fastest speed.
     """
 
-    target: str
-    localizer: str
+    target: NamedComponent
+    localizer: NamedComponent
     distance_m: Annotated[float, msgspec.Meta(ge=0.2, le=10)] = 0.5
-    speed_m_s: float = 0.2
-
-    def __post_init__(self) -> None:
-        if not self.target:
-            raise ValueError("target is empty: name the body to follow")
-        if not self.localizer:
-            raise ValueError("localizer is empty: name the component that tracks robots")
-        if not 0 < self.speed_m_s <= MOST_M_S:
-            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
+    speed_m_s: DrivingSpeed = 0.2
 
 
 class Follow(Driver[FollowParameters]):

@@ -8,20 +8,18 @@ In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name.
 
 from __future__ import annotations
 
-import math
 from typing import TypeVar
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
+from backbone.ranges import Duration
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
-from mission_control.behaviors.motion import MOST_M_S, NEAREST_M, FloorPoint
+from mission_control.behaviors.motion import Coordinate, DrivingSpeed, FloorPoint, NamedComponent, Reach
 from mission_control.behaviors.way import Way
 from mission_control.messages import BehaviorStatus
-
-FARTHEST_M = 1000.0  # chosen: the largest room
 
 
 class NotThere(Refusal):
@@ -43,25 +41,15 @@ class WayParameters(BehaviorParameters, frozen=True, kw_only=True):
 
     Attributes:
         localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
-        speed_m_s: Speed on the straight way, above 0, at most 0.3.
-        reached_within_m: Distance from the place that counts as reached, at least 0.02.
+        speed_m_s: Speed on the straight way.
+        reached_within_m: Distance from the place that counts as reached.
         within_s: Time after which it fails, of the time in which the robot is held; 0: never.
     """
 
-    localizer: str
-    speed_m_s: float = 0.2
-    reached_within_m: float = 0.08
-    within_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not self.localizer:
-            raise ValueError("localizer is empty: name the component that tracks robots")
-        if not 0 < self.speed_m_s <= MOST_M_S:
-            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
-        if not NEAREST_M <= self.reached_within_m < math.inf:
-            raise ValueError(f"reached_within_m is {self.reached_within_m}: it must be at least {NEAREST_M}")
-        if not 0 <= self.within_s < math.inf:
-            raise ValueError(f"within_s is {self.within_s}: it must be at least 0")
+    localizer: NamedComponent
+    speed_m_s: DrivingSpeed = 0.2
+    reached_within_m: Reach = 0.08
+    within_s: Duration = 0.0
 
 
 class GoToParameters(WayParameters, frozen=True, kw_only=True):
@@ -72,14 +60,8 @@ class GoToParameters(WayParameters, frozen=True, kw_only=True):
         y_m: The place, along the room's depth.
     """
 
-    x_m: float
-    y_m: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name, value in (("x_m", self.x_m), ("y_m", self.y_m)):
-            if not abs(value) <= FARTHEST_M:
-                raise ValueError(f"{name} is {value}: it must be from -{FARTHEST_M:g} to {FARTHEST_M:g}")
+    x_m: Coordinate
+    y_m: Coordinate
 
 
 W = TypeVar("W", bound=WayParameters)

@@ -7,9 +7,10 @@ If it is shorter and the robot still stands at its place, the look around contin
 from __future__ import annotations
 
 import asyncio
-import math
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -17,7 +18,7 @@ from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.dark_search import VIEW_COLUMNS, VIEW_ROWS, DarkSearch, SearchStage, glimpse
 from mission_control.behaviors.driver import Driver
-from mission_control.behaviors.motion import MOST_M_S, STILL
+from mission_control.behaviors.motion import FARTHEST_M, STILL, DrivingSpeed, Times
 from mission_control.behaviors.servo_to_target import UnusablePicture
 from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import Frame
@@ -27,26 +28,16 @@ class HideParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Hide``.
 
     Attributes:
-        dark_level: Floor darker than this is dark: a grey level above 0 and below 255.
-        leg_m: Distance to drive before the next look around, above 0.
-        speed_m_s: Speed of driving, above 0, at most 0.3.
+        dark_level: Floor darker than this is dark: a grey level.
+        leg_m: Distance to drive before the next look around.
+        speed_m_s: Speed of driving.
         looks: Number of looks around after which it fails; 0: never.
     """
 
-    dark_level: float = 60.0
-    leg_m: float = 0.6
-    speed_m_s: float = 0.2
-    looks: int = 20
-
-    def __post_init__(self) -> None:
-        if not 0 < self.dark_level < 255:
-            raise ValueError(f"dark_level is {self.dark_level}: it must be above 0 and below 255")
-        if not 0 < self.leg_m < math.inf:
-            raise ValueError(f"leg_m is {self.leg_m}: it must be above 0")
-        if not 0 < self.speed_m_s <= MOST_M_S:
-            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
-        if self.looks < 0:
-            raise ValueError(f"looks is {self.looks}: write how many, or 0 for no end")
+    dark_level: Annotated[float, Meta(gt=0, lt=255)] = 60.0
+    leg_m: Annotated[float, Meta(gt=0, le=FARTHEST_M)] = 0.6
+    speed_m_s: DrivingSpeed = 0.2
+    looks: Times = 20
 
 
 class Hide(Driver[HideParameters]):

@@ -11,14 +11,18 @@ Source: IROS 2001, section 2: the Scout jumps over objects 30 cm in height.
 from __future__ import annotations
 
 import math
+from typing import Annotated
+
+from msgspec import Meta
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.ranges import Measure
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
 from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, JumpStage, Obstacle
-from mission_control.behaviors.motion import MOST_M_S, Motion, read_places
+from mission_control.behaviors.motion import FARTHEST_M, Attempts, DrivingSpeed, Motion, NamedComponent, read_places
 from mission_control.messages import BehaviorStatus
 
 
@@ -29,35 +33,23 @@ class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
         front: Point of the obstacle's near side to cross: ``x,y`` in meters.
         heading_deg: Direction of the jump: 0 along x, 90 along y.
         localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
-        depth_m: Depth of the obstacle in that direction, above 0, at most 0.2.
+        depth_m: Depth of the obstacle in that direction.
         onward_m: Distance to drive beyond the obstacle.
-        speed_m_s: Speed on straight ways, above 0, at most 0.3.
-        attempts: Number of jumps after which it fails, at least 1.
+        speed_m_s: Speed on straight ways.
+        attempts: Number of jumps after which it fails.
     """
 
     front: str
-    heading_deg: float
-    localizer: str
-    depth_m: float = 0.1
-    onward_m: float = 0.5
-    speed_m_s: float = 0.2
-    attempts: int = 5
+    heading_deg: Measure
+    localizer: NamedComponent
+    depth_m: Annotated[float, Meta(gt=0, le=DEEPEST_M)] = 0.1
+    onward_m: Annotated[float, Meta(ge=0, le=FARTHEST_M)] = 0.5
+    speed_m_s: DrivingSpeed = 0.2
+    attempts: Attempts = 5
 
     def __post_init__(self) -> None:
         if len(read_places(self.front)) != 1:
             raise ValueError(f"front is {self.front!r}: write one place, x,y in meters")
-        if not math.isfinite(self.heading_deg):
-            raise ValueError(f"heading_deg is {self.heading_deg}: write degrees, 0 along x and 90 along y")
-        if not self.localizer:
-            raise ValueError("localizer is empty: name the component that tracks robots")
-        if not 0 < self.depth_m <= DEEPEST_M:
-            raise ValueError(f"depth_m is {self.depth_m}: a jump carries over at most {DEEPEST_M} m")
-        if not 0 <= self.onward_m < math.inf:
-            raise ValueError(f"onward_m is {self.onward_m}: it must be at least 0")
-        if not 0 < self.speed_m_s <= MOST_M_S:
-            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
-        if self.attempts < 1:
-            raise ValueError(f"attempts is {self.attempts}: it must be at least 1")
 
 
 class JumpOver(Driver[JumpOverParameters]):

@@ -11,13 +11,33 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
+
+from backbone.ranges import LONGEST_MENTION
 
 MOST_M_S = 0.30  # chosen: below the 0.35 m/s of the motors, so that a wheel is left to steer with
 NEAREST_M = 0.02  # chosen: tracking from above and a robot of 11 cm allow no less
 MOST_RAD_S = 1.5  # chosen: a quarter turn a second; ten decisions a second turn it 9 degrees at most in between
 TURN_PER_S = 2.5  # chosen: an error of heading shrinks to a tenth in a second, without swinging over at ten decisions
 SLOW_PER_S = 1.5  # chosen: the last 0.2 m before a place are driven ever slower; it comes to rest without overshoot
+FARTHEST_M = 1000.0  # chosen: the largest room
+MOST_TIMES = 100_000  # chosen: once a minute for ten weeks
 TURN_FIRST_RAD = math.radians(50.0)  # chosen: beyond it a robot turns on the spot, so that its path stays short
+
+DrivingSpeed = Annotated[float, Meta(gt=0, le=MOST_M_S)]
+"""A speed on the way, as a parameter."""
+Reach = Annotated[float, Meta(ge=NEAREST_M, le=FARTHEST_M)]
+"""A distance from a place that counts as reached."""
+Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
+"""A place along one side of the room."""
+Attempts = Annotated[int, Meta(ge=1, le=MOST_TIMES)]
+"""How often something is tried."""
+Times = Annotated[int, Meta(ge=0, le=MOST_TIMES)]
+"""How often, or 0 for no end."""
+NamedComponent = Annotated[str, Meta(min_length=1, max_length=LONGEST_MENTION)]
+"""A component or body by its name or address."""
 
 
 @dataclass(frozen=True, slots=True)

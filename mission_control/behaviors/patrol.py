@@ -8,15 +8,14 @@ In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name; a 
 
 from __future__ import annotations
 
-import math
-
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
+from backbone.ranges import Duration
 from mission_control.behavior import BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
-from mission_control.behaviors.motion import MOST_M_S, NEAREST_M, read_places
+from mission_control.behaviors.motion import DrivingSpeed, NamedComponent, Reach, Times, read_places
 from mission_control.behaviors.patrol_route import PatrolRoute, Visit
 from mission_control.messages import BehaviorStatus, WaypointReached
 
@@ -28,30 +27,20 @@ class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
         waypoints: Way points in order: ``x,y`` in meters, separated by blanks, as in ``1,1 3.5,1 3.5,4``.
         localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
         rounds: Number of rounds until success; 0: for ever.
-        speed_m_s: Speed on straight ways, above 0, at most 0.3.
-        reached_within_m: Distance from a way point that counts as reached, at least 0.02.
+        speed_m_s: Speed on straight ways.
+        reached_within_m: Distance from a way point that counts as reached.
         rest_s: Time at each way point; only time of grants counts.
     """
 
     waypoints: str
-    localizer: str
-    rounds: int = 0
-    speed_m_s: float = 0.2
-    reached_within_m: float = 0.08
-    rest_s: float = 0.0
+    localizer: NamedComponent
+    rounds: Times = 0
+    speed_m_s: DrivingSpeed = 0.2
+    reached_within_m: Reach = 0.08
+    rest_s: Duration = 0.0
 
     def __post_init__(self) -> None:
         read_places(self.waypoints)
-        if not self.localizer:
-            raise ValueError("localizer is empty: name the component that tracks robots")
-        if self.rounds < 0:
-            raise ValueError(f"rounds is {self.rounds}: write how many, or 0 for no end")
-        if not 0 < self.speed_m_s <= MOST_M_S:
-            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
-        if not NEAREST_M <= self.reached_within_m < math.inf:
-            raise ValueError(f"reached_within_m is {self.reached_within_m}: it must be at least {NEAREST_M}")
-        if not 0 <= self.rest_s < math.inf:
-            raise ValueError(f"rest_s is {self.rest_s}: it must be at least 0")
 
 
 class Patrol(Driver[PatrolParameters]):

@@ -11,12 +11,16 @@ Source: IROS 2001, "Visual Servoing": Scouts find their way back to where they c
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from msgspec import Meta
+
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from mission_control.behaviors.driver import DECIDE_EVERY_S
-from mission_control.behaviors.motion import MOST_M_S, read_places
+from mission_control.behaviors.motion import Attempts, DrivingSpeed, NamedComponent, read_places
 from mission_control.behaviors.pickup_route import PickupRoute, PickupStage
-from mission_control.behaviors.servo_to_target import Servo, ServoParameters, TargetNotFound
+from mission_control.behaviors.servo_to_target import MOST_TURNS, Servo, ServoParameters, TargetNotFound
 from mission_control.vision.servo_law import Stage as Approach
 from resource_pool.arc_client import Frame
 
@@ -27,29 +31,20 @@ class PickupParameters(ServoParameters, frozen=True, kw_only=True):
     Attributes:
         near: The first goal, ``x,y`` in meters: best 1 to 2 m straight before the mark.
         localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
-        speed_m_s: Speed on the way to it, above 0, at most 0.3.
-        search_turns: Number of turns of one search for the mark, above 0.
-        attempts: Number of vain searches after which it fails, at least 1.
+        speed_m_s: Speed on the way to it.
+        search_turns: Number of turns of one search for the mark.
+        attempts: Number of vain searches after which it fails.
     """
 
     near: str
-    localizer: str
-    speed_m_s: float = 0.2
-    search_turns: float = 1.25
-    attempts: int = 3
+    localizer: NamedComponent
+    speed_m_s: DrivingSpeed = 0.2
+    search_turns: Annotated[float, Meta(gt=0, le=MOST_TURNS)] = 1.25
+    attempts: Attempts = 3
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         if len(read_places(self.near)) != 1:
             raise ValueError(f"near is {self.near!r}: write one place, x,y in meters")
-        if not self.localizer:
-            raise ValueError("localizer is empty: name the component that tracks robots")
-        if not 0 < self.speed_m_s <= MOST_M_S:
-            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
-        if self.search_turns <= 0:
-            raise ValueError(f"search_turns is {self.search_turns}: it must be above 0")
-        if self.attempts < 1:
-            raise ValueError(f"attempts is {self.attempts}: it must be at least 1")
 
 
 class ReturnToPickup(Servo[PickupParameters]):

@@ -14,9 +14,10 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Mapping
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
+from msgspec import Meta
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -37,6 +38,7 @@ PICTURE_PX = (320, 240)  # what ``SCOUT_CAMERA`` was measured for
 SURE_M = 0.3  # chosen: dead reckoning over a few meters knows as much
 LEAST_SPREAD_M = 0.03  # chosen: what servoing was measured to err at its place; a fit alone promises more
 TELL_EVERY_S = 0.2  # chosen: localizers publish as often
+MOST_TURNS = 1e6  # chosen: a month of turning
 SETTLES_S = 2.0  # chosen: about half the time of settling; requested again if it was too short
 
 
@@ -58,22 +60,14 @@ class ServoParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``ServoToTarget``.
 
     Attributes:
-        stop_m: Distance before the target at which to stop, 0.4 to 1.2.
+        stop_m: Distance before the target at which to stop.
         search_turns: Number of turns without a sight of the target after which it fails; 0: never.
-        latency_s: Time from a picture's capture until its command turns the wheels, 0 to 0.5.
+        latency_s: Time from a picture's capture until its command turns the wheels.
     """
 
-    stop_m: float = STOP_M
-    search_turns: float = 3.0
-    latency_s: float = LATENCY_S
-
-    def __post_init__(self) -> None:
-        if not NEAREST_STOP_M <= self.stop_m <= FARTHEST_STOP_M:
-            raise ValueError(f"stop_m is {self.stop_m}: it must be from {NEAREST_STOP_M} to {FARTHEST_STOP_M}")
-        if not 0 <= self.search_turns < math.inf:
-            raise ValueError(f"search_turns is {self.search_turns}: write how many, or 0 for no end")
-        if not 0 <= self.latency_s < 0.5:
-            raise ValueError(f"latency_s is {self.latency_s}: it must be at least 0 and below 0.5")
+    stop_m: Annotated[float, Meta(ge=NEAREST_STOP_M, le=FARTHEST_STOP_M)] = STOP_M
+    search_turns: Annotated[float, Meta(ge=0, le=MOST_TURNS)] = 3.0
+    latency_s: Annotated[float, Meta(ge=0, lt=0.5)] = LATENCY_S
 
 
 S = TypeVar("S", bound=ServoParameters)

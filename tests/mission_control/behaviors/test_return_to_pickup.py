@@ -92,11 +92,11 @@ def test_in_the_world_a_robot_that_was_driven_away_meanwhile_returns_to_its_mark
     [
         ({"near": "1"}, "is no place"),
         ({"near": "1,1 2,2"}, "write one place"),
-        ({"localizer": ""}, "localizer is empty"),
-        ({"speed_m_s": 0.0}, "above 0"),
-        ({"search_turns": 0.0}, "must be above 0"),
-        ({"attempts": 0}, "at least 1"),
-        ({"stop_m": 0.0}, "0.4 to 1.2"),
+        ({"localizer": ""}, "localizer"),
+        ({"speed_m_s": 0.0}, "> 0.0 - at .*speed_m_s"),
+        ({"search_turns": 0.0}, "> 0.0 - at .*search_turns"),
+        ({"attempts": 0}, ">= 1 - at .*attempts"),
+        ({"stop_m": 0.0}, ">= 0.4 - at .*stop_m"),
     ],
 )
 def test_parameters_that_mean_nothing_are_refused_with_the_remedy(given: dict[str, object], complaint: str) -> None:

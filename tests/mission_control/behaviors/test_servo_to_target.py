@@ -133,7 +133,11 @@ def test_a_driving_behavior_without_an_arc_fails_and_says_which_it_needs(local_m
 
 @pytest.mark.parametrize(
     ("given", "complaint"),
-    [({"stop_m": 0.1}, "0.4 to 1.2"), ({"search_turns": -1.0}, "0 for no end"), ({"latency_s": 0.5}, "below 0.5")],
+    [
+        ({"stop_m": 0.1}, ">= 0.4 - at .*stop_m"),
+        ({"search_turns": -1.0}, ">= 0.0 - at .*search_turns"),
+        ({"latency_s": 0.5}, "< 0.5 - at .*latency_s"),
+    ],
 )
 def test_parameters_that_mean_nothing_are_refused_with_the_remedy(given: dict[str, object], complaint: str) -> None:
     with pytest.raises(msgspec.ValidationError, match=complaint):
