@@ -149,12 +149,5 @@ DesignIntent = (
 _intents: msgspec.json.Decoder[Hello | BeatRequest | DesignIntent] = msgspec.json.Decoder(
     Hello | BeatRequest | DesignIntent
 )
-
-
-def understand_designer(data: bytes | str) -> Hello | BeatRequest | DesignIntent:
-    """Return the decoded message.
-
-    Raises:
-        msgspec.DecodeError: The message is not valid.
-    """
-    return _intents.decode(data)
+understand_designer = _intents.decode
+"""Returns the decoded message; raises ``msgspec.DecodeError`` for one that is not valid."""

@@ -135,7 +135,7 @@ class ConnectionProtocol(asyncio.Protocol):
         self._next.connection_made(self._transport)
 
     def data_received(self, data: bytes) -> None:
-        """TokenRights on."""
+        """Pass it on."""
         if not isinstance(self._next, SSLProtocol):
             self._next.data_received(data)
             return
@@ -148,15 +148,15 @@ class ConnectionProtocol(asyncio.Protocol):
             rest = rest[size:]
 
     def eof_received(self) -> bool | None:
-        """TokenRights on."""
+        """Pass it on."""
         return self._next.eof_received()
 
     def pause_writing(self) -> None:
-        """TokenRights on."""
+        """Pass it on."""
         self._next.pause_writing()
 
     def resume_writing(self) -> None:
-        """TokenRights on."""
+        """Pass it on."""
         self._next.resume_writing()
 
     def connection_lost(self, exc: Exception | None) -> None:

@@ -64,12 +64,5 @@ Playing = PlayOn | StandStill | StepOn | ShowTime
 _intents: msgspec.json.Decoder[Hello | BeatRequest | Intent | Playing] = msgspec.json.Decoder(
     Hello | BeatRequest | Intent | Playing
 )
-
-
-def understand(data: bytes | str) -> Hello | BeatRequest | Intent | Playing:
-    """Return the decoded message.
-
-    Raises:
-        msgspec.DecodeError: The message is not valid.
-    """
-    return _intents.decode(data)
+understand = _intents.decode
+"""Returns the decoded message; raises ``msgspec.DecodeError`` for one that is not valid."""

@@ -302,12 +302,5 @@ Intent = (
     | Here
 )
 _intents: msgspec.json.Decoder[Hello | BeatRequest | Intent] = msgspec.json.Decoder(Hello | BeatRequest | Intent)
-
-
-def understand(data: bytes | str) -> Hello | BeatRequest | Intent:
-    """Return the decoded message.
-
-    Raises:
-        msgspec.DecodeError: The message is not valid.
-    """
-    return _intents.decode(data)
+understand = _intents.decode
+"""Returns the decoded message; raises ``msgspec.DecodeError`` for one that is not valid."""
