@@ -171,10 +171,8 @@ def _world_content(world: WorldElement, given: Mapping[str, Mapping[str, object]
         source: Path of the mission file.
     """
     return {
-        "width_m": world.room.width_m,
-        "depth_m": world.room.depth_m,
+        **_standing(world),
         "seed": world.seed,
-        "furniture": list(map(_body, world.furniture)),
         "robots": [
             {
                 **_body(robot, "class_path"),
@@ -184,9 +182,6 @@ def _world_content(world: WorldElement, given: Mapping[str, Mapping[str, object]
             for robot in world.robot
         ],
         "targets": list(map(_target, world.target)),
-        "ramps": list(map(_body, world.ramp)),
-        "landmarks": list(map(_body, world.landmark)),
-        "dark_places": list(map(_body, world.dark)),
         "air": (world.air or AirElement()).model_dump(),
         "mjcf": room_text(source, world.room.mjcf) if world.room.mjcf else "",
     }
@@ -194,11 +189,16 @@ def _world_content(world: WorldElement, given: Mapping[str, Mapping[str, object]
 
 def _room(world: WorldElement) -> dict[str, object]:
     """Return what stands in the room at the beginning, robots with it, as plain data of ``WorldDescription``."""
+    robots = [{**_body(robot, "class_path"), NETWORK_ID: 0} for robot in world.robot]
+    return {**_standing(world), "robots": robots}
+
+
+def _standing(world: WorldElement) -> dict[str, object]:
+    """Return the size of the room and what never moves in it."""
     return {
         "width_m": world.room.width_m,
         "depth_m": world.room.depth_m,
         "furniture": list(map(_body, world.furniture)),
-        "robots": [{**_body(robot, "class_path"), NETWORK_ID: 0} for robot in world.robot],
         "ramps": list(map(_body, world.ramp)),
         "landmarks": list(map(_body, world.landmark)),
         "dark_places": list(map(_body, world.dark)),

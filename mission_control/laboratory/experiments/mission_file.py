@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from functools import lru_cache
-from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from backbone.mission.model import MissionDescription
-from backbone.mission.reader import read_mission
+from backbone.mission.reader import read_mission_bytes
 from mission_control.laboratory.experiments.conditions import Condition
 from mission_control.laboratory.experiments.geometry import (
     EXTRAS,
@@ -41,10 +39,7 @@ def mission_text(condition: Condition) -> str:
 @lru_cache(maxsize=64)
 def mission_of(condition: Condition) -> MissionDescription:
     """Return the checked mission of this condition."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "surveillance.xml"
-        file.write_text(mission_text(condition), encoding="utf-8")
-        return read_mission(file)
+    return read_mission_bytes(mission_text(condition).encode(), "surveillance.xml")
 
 
 def mission_of_trial(condition: Condition, world_seed: int, departs_s: float) -> MissionDescription:

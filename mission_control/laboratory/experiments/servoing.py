@@ -9,11 +9,9 @@ Source: RAM 2002, "Visual Servoing": starts more than 2 m away; reached each tim
 from __future__ import annotations
 
 import math
-import tempfile
 import time
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from random import Random
 from statistics import median
 
@@ -21,7 +19,7 @@ import msgspec
 
 from backbone.bus.clock import run_virtual
 from backbone.mission.model import MissionDescription
-from backbone.mission.reader import read_mission
+from backbone.mission.reader import read_mission_bytes
 from mission_control.behavior import Behavior
 from mission_control.laboratory.experiments.intervals import wilson
 from mission_control.laboratory.harness import Progress, run_all
@@ -238,10 +236,7 @@ def mission_text() -> str:
 
 @lru_cache(maxsize=1)
 def _mission() -> MissionDescription:
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "servoing.xml"
-        file.write_text(mission_text(), encoding="utf-8")
-        return read_mission(file)
+    return read_mission_bytes(mission_text().encode(), "servoing.xml")
 
 
 def _mission_from(start: TrialStart, noise: float) -> MissionDescription:
