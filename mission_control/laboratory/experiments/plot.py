@@ -150,6 +150,8 @@ def _draw(axes: Any, points: Sequence[Point], number: int, of: int, *, is_publis
 def _name(axes: Any, shown: Mapping[str, Sequence[Point]]) -> None:
     """Write the name of each line beside its last point, on the right of all."""
     right = max((points[-1].extra for points in shown.values()), default=0.0)
+    left = min((points[0].extra for points in shown.values()), default=0.0)
+    axes.set_xlim(left - 0.2, right + 0.2)  # also with one point the names stand beside the axes, not far from them
     heights = apart([points[-1].rate for points in shown.values()])
     for number, ((name, points), height) in enumerate(zip(shown.items(), heights, strict=True)):
         color = GREY if _is_published(name) else COLORS[number % len(COLORS)]
