@@ -30,6 +30,8 @@ PLANTED = [
     ("core-services", "backbone/placer/planted.py", "from backbone.nameserver import service"),
     ("core-services", "backbone/rc_manager/planted.py", "import backbone.creator"),
     ("scheduling", "backbone/scheduling/planted.py", "import backbone.rc_manager.service"),
+    ("modules", "mission_control/modules/planted.py", "import asyncio"),
+    ("modules", "mission_control/modules/planted.py", "from backbone.bus.interface import Bus"),
     ("picture", "backbone/picture/planted.py", "import asyncio"),
     ("console-rooms", "ui_console/model/planted.py", "import ui_console.session.feed"),
     ("console-rooms", "ui_console/web/planted.py", "from ui_console.terminal import app"),

@@ -1,0 +1,228 @@
+"""Execution unit: modules that run one after the other, round by round, and hand over the objects themselves.
+
+Pure: time is an argument, and the caller carries values between units. In a round each module runs, in the graph's
+order, if its inputs are there:
+
+* a required input needs a value; a fresh one, a value that the module has not had yet;
+* a module whose fresh inputs are all optional runs if one of them has such a value;
+* a module without fresh inputs runs in every round.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import msgspec
+
+from mission_control.modules.graph import Graph, Member
+from mission_control.modules.module import Module
+from mission_control.modules.ports import Port
+from mission_control.modules.unit_schedule import Trigger, UnitSchedule
+
+Stopwatch = Callable[[], float]
+"""Returns seconds from any origin: to measure how long modules run."""
+
+
+class Produced(NamedTuple):
+    """A value that a module of the unit has produced."""
+
+    key: str
+    value: object
+
+
+class ModuleTimes(msgspec.Struct, frozen=True):
+    """How often and how long a module ran."""
+
+    runs: int = 0
+    busy_s: float = 0.0
+    longest_s: float = 0.0
+
+    def with_run(self, duration_s: float) -> ModuleTimes:
+        """Return the times after one more run."""
+        return ModuleTimes(self.runs + 1, self.busy_s + duration_s, max(self.longest_s, duration_s))
+
+
+class UnitStatistics(msgspec.Struct, frozen=True):
+    """How a unit keeps up.
+
+    Attributes:
+        rounds: Number of rounds.
+        rate_hz: Rounds a second of late.
+        ticks: Rounds that began because of the frequency.
+        missed: Ticks that had no round, because the one before began too late.
+        mean_late_s: How late rounds of the frequency began.
+        most_late_s: The latest of them.
+        overwritten: Key → values from outside that came before the one before them was taken; for fresh inputs.
+        modules: Module → how often and how long it ran.
+    """
+
+    rounds: int
+    rate_hz: float
+    ticks: int
+    missed: int
+    mean_late_s: float
+    most_late_s: float
+    overwritten: dict[str, int]
+    modules: dict[str, ModuleTimes]
+
+
+@dataclass(slots=True)
+class _Slot:
+    """The newest value of a key; ``number`` grows with each."""
+
+    value: object = None
+    number: int = 0
+
+    def put(self, value: object) -> None:
+        self.value, self.number = value, self.number + 1
+
+
+@dataclass(slots=True)
+class _Input:
+    port: Port
+    slot: _Slot
+    seen: int = 0
+
+    @property
+    def is_there(self) -> bool:
+        return self.slot.number > (0 if self.port.is_latest else self.seen)
+
+
+@dataclass(slots=True)
+class _Seat:
+    """A module with its connections."""
+
+    name: str
+    module: Module
+    inputs: list[_Input]
+    outputs: list[tuple[str, str, _Slot]]
+    times: ModuleTimes = field(default_factory=ModuleTimes)
+
+    def taken(self) -> dict[str, object] | None:
+        """Return the inputs that are there, which are seen from now on; None: the module does not run."""
+        fresh = [one for one in self.inputs if not one.port.is_latest]
+        if not all(one.is_there for one in self.inputs if one.port.is_required):
+            return None
+        if fresh and not any(one.is_there for one in fresh):
+            return None
+        given = {one.port.name: one.slot.value for one in self.inputs if one.is_there}
+        for one in self.inputs:
+            one.seen = one.slot.number
+        return given
+
+    def produced(self, outputs: object) -> Iterator[Produced]:
+        """Put the outputs where the others of the unit find them, and yield them."""
+        for name, key, slot in self.outputs:
+            value = getattr(outputs, name)
+            if value is not None:
+                slot.put(value)
+                yield Produced(key, value)
+
+
+class ExecutionUnit:
+    """The modules of one unit at work.
+
+    Args:
+        name: Of the unit.
+        graph: The whole graph.
+        modules: Name → module, at least those of the unit.
+        trigger: When it has rounds.
+        start_s: Time of its first tick.
+        stopwatch: Measures how long each module runs.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        graph: Graph,
+        modules: Mapping[str, Module],
+        trigger: Trigger,
+        start_s: float = 0.0,
+        stopwatch: Stopwatch = time.perf_counter,
+    ) -> None:
+        self.name, self._trigger, self._stopwatch = name, trigger, stopwatch
+        self._slots: dict[str, _Slot] = {}
+        members = {member.name: member for member in graph.units[name]}
+        self._seats = [self._seat(members[one], modules[one]) for one in graph.order[name]]
+        self._into = frozenset(graph.into(name))
+        self._fresh: dict[str, list[_Input]] = {key: [] for key in self._into}
+        for seat, member in ((seat, members[seat.name]) for seat in self._seats):
+            for (key, port), one in zip(member.keyed_inputs, seat.inputs, strict=True):
+                if key in self._into and not port.is_latest:
+                    self._fresh[key].append(one)
+        self._begin(start_s)
+
+    def _begin(self, start_s: float) -> None:
+        awaited = {key for key, inputs in self._fresh.items() if any(one.port.is_required for one in inputs)}
+        self._schedule = UnitSchedule(
+            self._trigger, awaited or {key for key, inputs in self._fresh.items() if inputs}, start_s
+        )
+        self._overwritten: dict[str, int] = {}
+
+    def _seat(self, member: Member, module: Module) -> _Seat:
+        inputs = [_Input(port, self._slot(key)) for key, port in member.keyed_inputs]
+        outputs = [(port.name, key, self._slot(key)) for key, port in member.keyed_outputs]
+        return _Seat(member.name, module, inputs, outputs)
+
+    def _slot(self, key: str) -> _Slot:
+        return self._slots.setdefault(key, _Slot())
+
+    @property
+    def due_s(self) -> float:
+        """Time of the next round of the frequency; infinite without one."""
+        return self._schedule.due_s
+
+    def put(self, key: str, value: object) -> bool:
+        """Take a value from outside the unit; return whether a round is due because of it."""
+        if key not in self._into:
+            return False
+        slot = self._slots[key]
+        if any(one.seen < slot.number for one in self._fresh[key]):
+            self._overwritten[key] = self._overwritten.get(key, 0) + 1
+        slot.put(value)
+        return self._schedule.arrived(key)
+
+    def tick(self, now_s: float) -> bool:
+        """Return whether a round is due because of the time."""
+        return self._schedule.tick(now_s)
+
+    def run(self, now_s: float) -> list[Produced]:
+        """Have a round; return what its modules produced, in the order in which they did."""
+        self._schedule.began(now_s)
+        produced: list[Produced] = []
+        for seat in self._seats:
+            given = seat.taken()
+            if given is not None:
+                began_s = self._stopwatch()
+                outputs = seat.module.update(seat.module.Inputs(**given))
+                seat.times = seat.times.with_run(self._stopwatch() - began_s)
+                produced += seat.produced(outputs)
+        return produced
+
+    def reset(self, start_s: float) -> None:
+        """Begin anew: modules, inputs and statistics are as they were at first."""
+        for slot in self._slots.values():
+            slot.value, slot.number = None, 0
+        for seat in self._seats:
+            seat.times = ModuleTimes()
+            seat.module.reset()
+            for one in seat.inputs:
+                one.seen = 0
+        self._begin(start_s)
+
+    def statistics(self) -> UnitStatistics:
+        """Return how it keeps up."""
+        schedule = self._schedule
+        return UnitStatistics(
+            schedule.rounds,
+            schedule.rate_hz,
+            schedule.ticks,
+            schedule.missed,
+            schedule.late_s / schedule.ticks if schedule.ticks else 0.0,
+            schedule.most_late_s,
+            dict(self._overwritten),
+            {seat.name: seat.times for seat in self._seats},
+        )

@@ -1,0 +1,108 @@
+"""Unit schedule: decides when an execution unit has a round.
+
+Pure: time is an argument. Ticks of a frequency lie on a grid that begins at the unit's start, so a late round delays no
+later one; ticks that are over when a round begins are missed, and not made up for.
+
+Source: RoboFrame 2006, section III: threads are executed at a given frequency and / or on new input.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Collection
+from enum import StrEnum
+from typing import Annotated
+
+import msgspec
+
+RATE_OVER = 64  # chosen: a third of a second at the fastest, a minute at one round a second
+MOST_HZ = 1000.0  # chosen: the resolution of an event loop's timers is a millisecond
+
+
+class OnInput(StrEnum):
+    """On which new inputs from outside the unit a round begins."""
+
+    NONE = "none"
+    ANY = "any"
+    ALL = "all"
+
+
+class Trigger(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """When a unit has a round: at a frequency, on new input, or both.
+
+    Attributes:
+        frequency_hz: Rounds a second; 0: only on input.
+        on_input: ``any``: on each fresh input that comes from outside the unit; ``all``: when each of them has come
+            since the last time that all had; ``none``: only at the frequency.
+    """
+
+    frequency_hz: Annotated[float, msgspec.Meta(ge=0, le=MOST_HZ)] = 0.0
+    on_input: OnInput = OnInput.ANY
+
+    def __post_init__(self) -> None:
+        if self.frequency_hz == 0 and self.on_input is OnInput.NONE:
+            raise ValueError("a unit without a frequency that runs on no input never runs; give it one of them")
+
+
+class UnitSchedule:
+    """The rounds of one unit.
+
+    Args:
+        trigger: When there are rounds.
+        awaited: Keys of the fresh inputs that come from outside the unit.
+        start_s: Time of the first tick.
+    """
+
+    def __init__(self, trigger: Trigger, awaited: Collection[str], start_s: float) -> None:
+        self._trigger, self._awaited, self._start_s = trigger, frozenset(awaited), start_s
+        self._arrived: set[str] = set()
+        self._tick = 0  # number of the next tick
+        self._rounds_s: deque[float] = deque(maxlen=RATE_OVER)
+        self.rounds = self.ticks = self.missed = 0
+        self.late_s = self.most_late_s = 0.0
+        """Sum of all ticks' lateness, and the longest; seconds."""
+
+    @property
+    def due_s(self) -> float:
+        """Time of the next tick; infinite without a frequency."""
+        frequency_hz = self._trigger.frequency_hz
+        return self._start_s + self._tick / frequency_hz if frequency_hz else math.inf
+
+    def arrived(self, key: str) -> bool:
+        """Note a new value from outside; return whether a round is due because of it."""
+        if key not in self._awaited or self._trigger.on_input is OnInput.NONE:
+            return False
+        if self._trigger.on_input is OnInput.ANY:
+            return True
+        self._arrived.add(key)
+        if self._arrived != self._awaited:
+            return False
+        self._arrived.clear()
+        return True
+
+    def tick(self, now_s: float) -> bool:
+        """Return whether a round is due because of the time; if so, the next tick is later than now."""
+        if now_s < self.due_s:
+            return False
+        late_s = now_s - self.due_s
+        self.ticks += 1
+        self.late_s, self.most_late_s = self.late_s + late_s, max(self.most_late_s, late_s)
+        served, self._tick = self._tick, self._tick + 1
+        if self.due_s <= now_s:
+            self._tick = max(self._tick, math.floor((now_s - self._start_s) * self._trigger.frequency_hz))
+        while self.due_s <= now_s:
+            self._tick += 1
+        self.missed += self._tick - served - 1
+        return True
+
+    def began(self, now_s: float) -> None:
+        """Note that a round begins."""
+        self.rounds += 1
+        self._rounds_s.append(now_s)
+
+    @property
+    def rate_hz(self) -> float:
+        """Rounds a second over the last ``RATE_OVER``; 0 before the second one."""
+        span_s = self._rounds_s[-1] - self._rounds_s[0] if self._rounds_s else 0.0
+        return (len(self._rounds_s) - 1) / span_s if span_s > 0 else 0.0

@@ -1,0 +1,87 @@
+"""Units in one process: carries values between them, in an order that depends on nothing but the inputs.
+
+Pure: time is an argument. Between units, too, the object itself is handed over.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict, deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from mission_control.modules.execution_unit import ExecutionUnit, Stopwatch, UnitStatistics
+from mission_control.modules.graph import Graph
+from mission_control.modules.module import Module
+from mission_control.modules.unit_schedule import Trigger
+
+Listener = Callable[[Any], None]
+"""Called with each value of a key; it takes values of that key's class."""
+
+
+class UnitsTogether:
+    """All units of a graph.
+
+    Args:
+        graph: Which modules there are, and how they are connected.
+        modules: Name → module.
+        triggers: Unit → when it has rounds; a unit that is left out has them on any input.
+        start_s: Time of the first ticks.
+        stopwatch: Measures how long modules run.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        modules: Mapping[str, Module],
+        triggers: Mapping[str, Trigger] | None = None,
+        start_s: float = 0.0,
+        stopwatch: Stopwatch = time.perf_counter,
+    ) -> None:
+        given = triggers or {}
+        self._units = {
+            name: ExecutionUnit(name, graph, modules, given.get(name, Trigger()), start_s, stopwatch)
+            for name in graph.units
+        }
+        self._consumers: dict[str, list[ExecutionUnit]] = defaultdict(list)
+        for one in graph.connections:
+            self._consumers[one.key].append(self._units[one.consumer])
+        self._listeners: dict[str, list[Listener]] = defaultdict(list)
+
+    @property
+    def next_s(self) -> float:
+        """Time of the next round of any frequency; infinite if there is none."""
+        return min((unit.due_s for unit in self._units.values()), default=float("inf"))
+
+    def listen(self, key: str, listener: Listener) -> None:
+        """Call the listener with each value that is produced under this key."""
+        self._listeners[key].append(listener)
+
+    def feed(self, key: str, value: object, now_s: float) -> None:
+        """Take a value from outside; return when every unit that is due because of it has run."""
+        self._run([unit for unit in self._consumers[key] if unit.put(key, value)], now_s)
+
+    def tick(self, now_s: float) -> None:
+        """Return when every unit that is due at this time, and all that follow from it, have run."""
+        for unit in self._units.values():
+            if unit.tick(now_s):
+                self._run([unit], now_s)
+
+    def advance(self, until_s: float) -> None:
+        """Let time pass: each round of a frequency up to and including this time is on time."""
+        while (now_s := self.next_s) <= until_s:
+            self.tick(now_s)
+
+    def statistics(self) -> dict[str, UnitStatistics]:
+        """Return unit → how it keeps up."""
+        return {name: unit.statistics() for name, unit in self._units.items()}
+
+    def _run(self, due: list[ExecutionUnit], now_s: float) -> None:
+        waiting = deque(due)
+        while waiting:
+            for key, value in waiting.popleft().run(now_s):
+                for listener in self._listeners.get(key, ()):
+                    listener(value)
+                for unit in self._consumers.get(key, ()):
+                    if unit.put(key, value) and unit not in waiting:
+                        waiting.append(unit)

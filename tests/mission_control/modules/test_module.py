@@ -1,0 +1,85 @@
+"""A module is tried in three lines, and its ports are plain data."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+import pytest
+from sample_modules import Counter, Doubler, Follower, Number, Sum, Summing
+
+from mission_control.modules.module import Module, default_name
+from mission_control.modules.ports import LATEST, Key, ModulePorts, Port, Ports, WrongDeclaration, ports_of
+
+
+def test_a_module_is_tried_in_three_lines() -> None:
+    module = Counter(Counter.Parameters(step=2.0))
+    module.update(Counter.Inputs())
+    assert module.update(Counter.Inputs()) == Counter.Outputs(Number(4.0))
+
+
+def test_after_a_reset_a_module_is_as_it_was_when_it_was_made() -> None:
+    module = Counter()
+    first = module.update(Counter.Inputs())
+    module.reset()
+    assert module.update(Counter.Inputs()) == first
+
+
+def test_ports_are_read_from_the_annotations() -> None:
+    number, total = f"{Number.__module__}:Number", f"{Sum.__module__}:Sum"
+    assert Follower.ports() == ModulePorts(
+        (Port("sum", "sum", total), Port("last", "place", number, is_required=False, is_latest=True)),
+        (Port("place", "place", number),),
+    )
+    assert Summing.ports().outputs == (Port("sum", "sum", total, is_required=False),)
+    assert Counter.ports().inputs == ()
+
+
+class Choice(Ports):
+    either: Number | Sum
+
+
+class BadKey(Ports):
+    number: Annotated[Number, Key("Not A Name")]
+
+
+class Nowhere(Ports):
+    missing: NotThere  # type: ignore[name-defined]  # noqa: F821
+
+
+class MarkInside(Ports):
+    number: Annotated[Number, LATEST] | None = None
+
+
+@pytest.mark.parametrize(("declared", "word"), [(Choice, "choice"), (BadKey, "Not A Name"), (Nowhere, "NotThere")])
+def test_a_declaration_that_cannot_be_read_is_refused(declared: type[Ports], word: str) -> None:
+    with pytest.raises(WrongDeclaration, match=word):
+        ports_of(declared)
+
+
+def test_a_mark_may_stand_inside_the_choice_of_nothing() -> None:
+    assert ports_of(MarkInside) == (
+        Port("number", "number", f"{Number.__module__}:Number", is_required=False, is_latest=True),
+    )
+
+
+def test_what_is_shown_costs_nothing_while_nobody_looks_and_is_seen_when_somebody_does() -> None:
+    module = Doubler()
+    module.debug.picture("never", lambda: pytest.fail("a picture was made"))
+    seen: dict[str, object] = {}
+
+    class Looking:
+        def picture(self, view: str, make: Any) -> None:
+            seen[view] = make()
+
+        def value(self, view: str, value: float | bool | str) -> None:
+            seen[view] = value
+
+    module.debug = Looking()
+    module.update(Doubler.Inputs(Number(1.0)))
+    module.debug.picture("made", lambda: np.zeros(1))
+    assert seen == {"factor": 2.0, "made": np.zeros(1)}
+
+
+def test_the_name_of_a_module_is_its_classs() -> None:
+    assert default_name(type("BallModeling2", (Module,), {})) == "ball-modeling2"
