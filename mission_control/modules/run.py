@@ -1,0 +1,67 @@
+"""Run modules without a mission: connected by name and type, in one unit of this process."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Clock
+from mission_control.modules.graph import Graph, Member
+from mission_control.modules.module import Module, default_name
+from mission_control.modules.unit_schedule import Trigger
+from mission_control.modules.units_together import Listener, UnitsTogether
+
+UNIT = "unit"  # the name of the only one
+
+
+def connected(
+    *modules: Module, frequency_hz: float = 0.0, given: Mapping[str, str] | None = None, start_s: float = 0.0
+) -> UnitsTogether:
+    """Return the modules in one unit, each under the name of its class.
+
+    Args:
+        modules: Each of another class.
+        frequency_hz: Rounds a second; 0: only when something is fed.
+        given: Key → type of what is fed.
+        start_s: Time of the first round.
+
+    Raises:
+        GraphRefused: They cannot be connected; it says everything at once.
+    """
+    members = [Member(default_name(type(module)), module.ports()) for module in modules]
+    by_name = {member.name: module for member, module in zip(members, modules, strict=True)}
+    return UnitsTogether(Graph({UNIT: members}, given), by_name, {UNIT: Trigger(frequency_hz)}, start_s)
+
+
+def run(
+    *modules: Module,
+    frequency_hz: float = 10.0,
+    for_s: float = math.inf,
+    listen: Mapping[str, Listener] | None = None,
+) -> UnitsTogether:
+    """Run the modules in this process; return them when the time is over.
+
+    Args:
+        modules: Each of another class.
+        frequency_hz: Rounds a second, above 0.
+        for_s: Seconds; left out: until the process is interrupted.
+        listen: Key → function that is called with each of its values.
+
+    Raises:
+        GraphRefused: They cannot be connected; it says everything at once.
+    """
+    clock = MissionClock.started_now()
+    units = connected(*modules, frequency_hz=frequency_hz, start_s=clock.now_s())
+    for key, listener in (listen or {}).items():
+        units.listen(key, listener)
+    asyncio.run(run_units(units, clock, clock.now_s() + for_s))
+    return units
+
+
+async def run_units(units: UnitsTogether, clock: Clock, until_s: float = math.inf) -> None:
+    """Run the rounds of all frequencies when they are due; return when the next one is not before ``until_s``."""
+    while (next_s := units.next_s) < until_s:
+        await clock.sleep_until_s(next_s)
+        units.tick(clock.now_s())
