@@ -31,6 +31,7 @@ class Conversation(StrEnum):
     POSES = "poses"  # where a localizer believes robots to be
     SIGHTINGS = "sightings"  # landmarks that behaviors see in robots' pictures
     FRAMES = "frames"  # pictures
+    OUTPUTS = "outputs"  # values that an execution unit's modules produce for others
     VIEWS = "views"  # debug views of a behavior, during a look
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from backbone.errors import Refusal
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module
 from mission_control.modules.ports import Port
@@ -24,6 +25,13 @@ from mission_control.modules.unit_schedule import Trigger, UnitSchedule
 
 Stopwatch = Callable[[], float]
 """Returns seconds from any origin: to measure how long modules run."""
+
+
+class NeverRuns(Refusal):
+    """A unit that could never have a round."""
+
+    code = "module.never"
+    remedy = "Give the unit a frequency."
 
 
 class Produced(NamedTuple):
@@ -132,6 +140,9 @@ class ExecutionUnit:
         trigger: When it has rounds.
         start_s: Time of its first tick.
         stopwatch: Measures how long each module runs.
+
+    Raises:
+        NeverRuns: It has neither a frequency nor an input that begins a round.
     """
 
     def __init__(
@@ -147,7 +158,9 @@ class ExecutionUnit:
         self._slots: dict[str, _Slot] = {}
         members = {member.name: member for member in graph.units[name]}
         self._seats = [self._seat(members[one], modules[one]) for one in graph.order[name]]
-        self._into = frozenset(graph.into(name))
+        self._into, self._awaited = frozenset(graph.into(name)), graph.awaited(name)
+        if not (trigger.frequency_hz or self._awaited):
+            raise NeverRuns(f"unit {name} has no frequency, and no fresh input from outside begins a round")
         self._fresh: dict[str, list[_Input]] = {key: [] for key in self._into}
         for seat, member in ((seat, members[seat.name]) for seat in self._seats):
             for (key, port), one in zip(member.keyed_inputs, seat.inputs, strict=True):
@@ -156,10 +169,7 @@ class ExecutionUnit:
         self._begin(start_s)
 
     def _begin(self, start_s: float) -> None:
-        awaited = {key for key, inputs in self._fresh.items() if any(one.port.is_required for one in inputs)}
-        self._schedule = UnitSchedule(
-            self._trigger, awaited or {key for key, inputs in self._fresh.items() if inputs}, start_s
-        )
+        self._schedule = UnitSchedule(self._trigger, self._awaited, start_s)
         self._overwritten: dict[str, int] = {}
 
     def _seat(self, member: Member, module: Module) -> _Seat:

@@ -163,6 +163,17 @@ class Graph:
         """Return key → producing unit of all that comes into a unit."""
         return {one.key: one.producer for one in self.connections if one.consumer == unit}
 
+    def awaited(self, unit: str) -> frozenset[str]:
+        """Return the keys from outside the unit whose values begin a round: of required fresh inputs, else of all."""
+        into = self.into(unit)
+        fresh = [
+            (key, port.is_required)
+            for member in self.units[unit]
+            for key, port in member.keyed_inputs
+            if key in into and not port.is_latest
+        ]
+        return frozenset(key for key, is_required in fresh if is_required) or frozenset(key for key, _ in fresh)
+
     def out_of(self, unit: str) -> list[str]:
         """Return the keys that a unit produces for other units."""
         return sorted({one.key for one in self.connections if one.producer == unit})

@@ -1,0 +1,110 @@
+"""Orders: what a mission file says of modules and units, as plain data, and the modules that are made of it."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+
+import msgspec
+
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from mission_control.modules.graph import Member
+from mission_control.modules.module import Module
+from mission_control.modules.unit_schedule import Trigger
+
+
+class WrongModule(Refusal):
+    """A class path leads to no module, or the module refuses its parameters."""
+
+    code = "module.class"
+    remedy = "Write the class as package.module:Class, derived from mission_control.modules.module:Module."
+
+
+class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A module of a unit.
+
+    Attributes:
+        name: Its name, unique in the mission.
+        class_path: ``package.module:Class``.
+        parameters: Values for its ``Parameters``.
+        inputs: Input → key, where it is another than the class declares.
+        outputs: Output → key, likewise.
+    """
+
+    name: str
+    class_path: str
+    parameters: Mapping[str, object] = {}
+    inputs: dict[str, str] = {}
+    outputs: dict[str, str] = {}
+
+    def load(self) -> Module:
+        """Return the module.
+
+        Raises:
+            WrongModule: There is none, or not with these parameters.
+        """
+        kind = load_module_class(self.class_path)
+        try:
+            return kind(msgspec.convert(dict(self.parameters), kind.Parameters))
+        except msgspec.ValidationError as error:
+            raise WrongModule(
+                f"{self.name} ({self.class_path}) refuses its parameters: {error}",
+                remedy="Write parameters of these names and types.",
+            ) from None
+
+    def member(self, module: Module | type[Module]) -> Member:
+        """Return its place in a graph."""
+        return Member(self.name, module.ports(), self.inputs, self.outputs)
+
+
+class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the values of a key are published.
+
+    Attributes:
+        address: ``<subsystem>/<component>``, and the key of an output.
+        conversation: Of the publications.
+    """
+
+    address: str
+    conversation: Conversation = Conversation.OUTPUTS
+
+
+class UnitParameters(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Parameters of the component that runs a unit.
+
+    Attributes:
+        modules: What it runs.
+        sources: Key → where its values come from, for what the unit does not produce itself.
+        published: Keys of the outputs that others get.
+    """
+
+    modules: list[ModuleOrder]
+    sources: dict[str, Source] = {}
+    published: list[str] = []
+
+
+def output_address(unit: str, key: str) -> str:
+    """Return the address under which a unit publishes an output.
+
+    Example:
+        >>> output_address("mission_control/vision", "ball")
+        'mission_control/vision/ball'
+    """
+    return f"{unit}/{key}"
+
+
+def load_module_class(class_path: str) -> type[Module]:
+    """Return the module class at ``package.module:Class``; imports its file.
+
+    Raises:
+        WrongModule: No module class has this path.
+    """
+    file, _, name = class_path.partition(":")
+    try:
+        found = getattr(importlib.import_module(file), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise WrongModule(f"{class_path}: {error}", class_path=class_path) from error
+    if not (isinstance(found, type) and issubclass(found, Module)):
+        raise WrongModule(f"{class_path} is no Module", class_path=class_path)
+    return found

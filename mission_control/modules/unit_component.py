@@ -1,0 +1,169 @@
+"""The component that runs one execution unit on the bus: a thin loop around ``ExecutionUnit``.
+
+* another unit, or anybody → it: the values of its inputs, published under the addresses that its parameters name.
+* it → everybody: the outputs that its parameters name, published under ``output_address`` (conversation ``outputs``).
+
+Only the newest value of a key waits for delivery, so a slow unit never works on old ones; the values that it did not
+get to are counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import Component, WrongParameter
+from backbone.component.launch import Launch
+from backbone.debug_views import ListViews, LookAt
+from backbone.keys import Conversation
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
+from mission_control.debug_views import DebugViews
+from mission_control.modules.execution_unit import ExecutionUnit
+from mission_control.modules.graph import Graph
+from mission_control.modules.orders import UnitParameters, WrongModule, output_address
+from mission_control.modules.ports import kinds_of_ports, type_name
+from mission_control.modules.unit_schedule import Trigger
+
+if TYPE_CHECKING:  # most modules see no pictures and stay without NumPy
+    import numpy as np
+    from numpy.typing import NDArray
+
+_TABLES = ("overwritten", "modules")  # of the statistics: each of their entries gets a name of its own
+REPORT_EVERY_S = 1.0  # chosen: a person reads no faster; seconds of the mission
+
+
+class UnitComponent(Component[UnitParameters]):
+    """Runs the modules of one unit in the component's event loop."""
+
+    parameters_type = UnitParameters
+    given_elsewhere: ClassVar[frozenset[str]] = frozenset(UnitParameters.__struct_fields__)
+    accepts: ClassVar[Accepts | None] = ListViews | LookAt
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        given = self.parameters
+        self._modules = {one.name: one.load() for one in given.modules}
+        members = [one.member(self._modules[one.name]) for one in given.modules]
+        inside = {key for member in members for key, _port in member.keyed_outputs}
+        into = {
+            key: kinds_of_ports(self._modules[member.name].Inputs)[port.name]
+            for member in members
+            for key, port in member.keyed_inputs
+            if key in given.sources and key not in inside
+        }
+        out = {
+            key: kinds_of_ports(self._modules[member.name].Outputs)[port.name]
+            for member in members
+            for key, port in member.keyed_outputs
+        }
+        self._graph = Graph({self.name: members}, {key: type_name(kind) for key, kind in into.items()})
+        self._into = {key: _message_kind(key, kind) for key, kind in into.items()}
+        self._published = {key: _message_kind(key, out.get(key)) for key in given.published}
+        self._views = DebugViews(bus, clock)
+        for name, module in self._modules.items():
+            module.debug = ViewsOfModule(name, self._views)
+        self._unit: ExecutionUnit = self._new_unit()
+        self._missed, self._report_again_s = 0, -math.inf
+
+    def _new_unit(self) -> ExecutionUnit:
+        trigger = Trigger(self.parameters.frequency_hz, self.parameters.on_input)
+        return ExecutionUnit(self.name, self._graph, self._modules, trigger, self.clock.now_s())
+
+    async def connect(self) -> None:
+        """Listen to the sources."""
+        self._unit = self._new_unit()
+        for key, kind in self._into.items():
+            source = self.parameters.sources[key]
+            self.bus.subscribe(source.address, source.conversation, kind, self._listener(key), latest=True)
+
+    async def serve(self) -> None:
+        """Have the rounds of the frequency; those of inputs begin when these arrive."""
+        while self._unit.due_s < math.inf:
+            await self.clock.sleep_until_s(self._unit.due_s)
+            now_s = self.clock.now_s()
+            if self._unit.tick(now_s):
+                self._run(now_s)
+
+    async def answer(self, asked: Envelope[Message]) -> Message:
+        """Answer who looks at debug views."""
+        match asked.body:
+            case ListViews():
+                return self._views.listed()
+            case LookAt() as look:
+                return self._views.look(look)
+            case _:
+                raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
+
+    def parameters_changed(self) -> None:
+        """Refuse: modules and connections are those of the start."""
+        raise WrongParameter(
+            f"{self.name} runs the modules it was started with", remedy="Change the mission file and start it again."
+        )
+
+    def statistics(self) -> dict[str, float]:
+        """Return rates, lateness and misses of the unit, and the times of each module."""
+        told = self._unit.statistics()
+        own = {name: float(getattr(told, name)) for name in told.__struct_fields__ if name not in _TABLES}
+        missed = {f"overwritten_{key}": float(count) for key, count in told.overwritten.items()}
+        times = {
+            f"{module}_{name}": float(getattr(one, name))
+            for module, one in told.modules.items()
+            for name in one.__struct_fields__
+        }
+        return {**own, **missed, **times}
+
+    def _listener(self, key: str) -> Callable[[Envelope[Message]], None]:
+        def heard(envelope: Envelope[Message]) -> None:
+            if self._unit.put(key, envelope.body):
+                self._run(self.clock.now_s())
+
+        return heard
+
+    def _run(self, now_s: float) -> None:
+        for key, value in self._unit.run(now_s):
+            if key in self._published:
+                assert isinstance(value, Message)  # noqa: S101  its class was checked at the start
+                self.bus.publish(output_address(self.address, key), Conversation.OUTPUTS, value)
+        if now_s >= self._report_again_s:
+            self._report_misses(now_s)
+
+    def _report_misses(self, now_s: float) -> None:
+        told = self._unit.statistics()
+        missed = told.missed + sum(told.overwritten.values())
+        if missed > self._missed:
+            self._missed, self._report_again_s = missed, now_s + REPORT_EVERY_S
+            ticks = [f"{told.missed} rounds missed, the latest {told.most_late_s:.3f} s late"] if told.missed else []
+            values = [f"{count} values of {key} came too early" for key, count in told.overwritten.items()]
+            self.report("; ".join([*ticks, *values]))
+
+
+class ViewsOfModule:
+    """The debug views of one module among those of its unit; see ``module.Debug``."""
+
+    def __init__(self, module: str, views: DebugViews) -> None:
+        self._module, self._views = module, views
+
+    def picture(self, view: str, make: Callable[[], NDArray[np.generic]]) -> None:
+        """Show a picture, named ``<module>-<view>``."""
+        self._views.picture(f"{self._module}-{view}", make)
+
+    def value(self, view: str, value: float | bool | str) -> None:
+        """Show a value, named ``<module>-<view>``."""
+        self._views.value(f"{self._module}-{view}", value)
+
+
+def _message_kind(key: str, kind: object) -> type[Message]:
+    """Return the class of a key's values, which cross the bus.
+
+    Raises:
+        WrongModule: It is no message.
+    """
+    if isinstance(kind, type) and issubclass(kind, Message):
+        return kind
+    made = "no module produces it" if kind is None else f"{type_name(kind)} is no message"
+    raise WrongModule(
+        f"{key} cannot go to another unit: {made}",
+        remedy="Derive its class from backbone.wire:Message, or put both modules into one unit.",
+    )

@@ -1,0 +1,228 @@
+"""A unit on the bus: rounds by frequency and by input, three arrangements, statistics, debug views."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Any
+
+import msgspec
+import pytest
+from sample_modules import Number
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.interface import Bus
+from backbone.bus.local_bus import LocalNetwork
+from backbone.component.component import WrongParameter
+from backbone.component.launch import Launch
+from backbone.component.messages import AskStatistics, ComponentState, SetParameter, Statistics
+from backbone.debug_views import ListViews, Views
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from backbone.wire import Message
+from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
+from mission_control.modules.execution_unit import NeverRuns
+from mission_control.modules.graph import GraphRefused
+from mission_control.modules.module import Module
+from mission_control.modules.orders import ModuleOrder, Source, UnitParameters, WrongModule
+from mission_control.modules.unit_component import UnitComponent
+
+TESTER = "ui_console/tester"
+NUMBERS = {"number": GivenKey("sample_modules:Number", Source(TESTER, Conversation.EVENTS))}
+MODULES = {
+    name: ModuleOrder(name, f"sample_modules:{name.capitalize()}") for name in ("doubler", "summing", "follower")
+}
+ARRANGEMENTS = [
+    {"all": ["follower", "doubler", "summing"]},
+    {"first": ["doubler"], "rest": ["summing", "follower"]},
+    {"c": ["follower"], "b": ["summing"], "a": ["doubler"]},
+]
+
+
+def orders(units: Mapping[str, Sequence[str]]) -> list[UnitOrder]:
+    return [UnitOrder(name=name, modules=[MODULES[one] for one in of]) for name, of in units.items()]
+
+
+def launch_of(name: str, parameters: UnitParameters) -> Launch:
+    class_path = "mission_control.modules.unit_component:UnitComponent"
+    given = msgspec.to_builtins(parameters)
+    return Launch("local", Subsystem.MISSION_CONTROL, name, "execution_unit", class_path, "local", "", 0.0, 1.0, given)
+
+
+def unit_on(network: LocalNetwork, name: str, parameters: UnitParameters) -> UnitComponent:
+    launch, clock = launch_of(name, parameters), VirtualClock()
+    return UnitComponent(launch, network.join(launch.address, clock), clock)
+
+
+def play(
+    local_mission: Any,
+    beside: Any,
+    units: Mapping[str, UnitParameters],
+    scene: Callable[[Bus, dict[str, UnitComponent]], Awaitable[None]],
+) -> None:
+    """Run the scene beside these units, on virtual time."""
+
+    @asynccontextmanager
+    async def running() -> AsyncIterator[tuple[Bus, dict[str, UnitComponent]]]:
+        async with AsyncExitStack() as stack:
+            network = await stack.enter_async_context(local_mission())
+            started = {name: unit_on(network, name, one) for name, one in units.items()}
+            for unit in started.values():
+                await stack.enter_async_context(beside(unit))
+            bus = network.join(TESTER, VirtualClock())
+            stack.push_async_callback(bus.close)
+            yield bus, started
+
+    async def main() -> None:
+        async with running() as (bus, started):
+            await scene(bus, started)
+
+    run_virtual(main())
+
+
+def listen(bus: Bus, address: str, kind: type[Message], heard: list[Any]) -> None:
+    bus.subscribe(address, Conversation.OUTPUTS, kind, lambda envelope: heard.append(envelope.body))
+
+
+def test_the_same_modules_say_the_same_in_every_arrangement_on_the_bus(local_mission: Any, beside: Any) -> None:
+    said: list[bytes] = []
+    for units in ARRANGEMENTS:
+
+        async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+            places: list[Number] = []
+            listen(bus, "mission_control/*/place", Number, places)
+            for value in range(20):
+                bus.publish(TESTER, Conversation.EVENTS, Number(value / 7))
+                await VirtualClock().sleep_s(0.01)
+            assert len(places) == 10
+            said.append(msgspec.msgpack.encode(places))
+
+        play(local_mission, beside, arranged(orders(units), NUMBERS), scene)
+    assert said[0] == said[1] == said[2]
+
+
+def test_only_what_another_unit_or_no_other_module_takes_is_published(local_mission: Any, beside: Any) -> None:
+    units = arranged(orders(ARRANGEMENTS[1]), NUMBERS)
+    assert {name: (list(one.sources), one.published) for name, one in units.items()} == {
+        "first": (["number"], ["twice"]),
+        "rest": (["twice"], ["place"]),
+    }
+    alone = arranged(orders({"one": ["doubler", "summing"]}), NUMBERS)["one"]
+    assert alone.published == ["sum"]
+
+
+def test_between_neighbors_of_one_process_the_message_itself_is_handed_over(local_mission: Any, beside: Any) -> None:
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        heard: list[Any] = []
+        listen(bus, "mission_control/one/same", Number, heard)
+        sent = Number(1.0)
+        bus.publish(TESTER, Conversation.EVENTS, sent)
+        await VirtualClock().sleep_s(0.01)
+        assert heard[0] is sent
+
+    order = UnitOrder(name="one", modules=[ModuleOrder("passing", f"{__name__}:Passing")])
+    play(local_mission, beside, arranged([order], NUMBERS), scene)
+
+
+class Passing(Module):
+    class Inputs(Module.Inputs):
+        number: Number
+
+    class Outputs(Module.Outputs):
+        same: Number
+
+    def update(self, inputs: Inputs) -> Outputs:
+        return self.Outputs(inputs.number)
+
+
+def test_a_frequency_is_kept_and_counted(local_mission: Any, beside: Any) -> None:
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        heard: list[Any] = []
+        listen(bus, "mission_control/one/number", Number, heard)
+        await VirtualClock().sleep_s(2.0)
+        told = (await bus.ask("mission_control/one", AskStatistics(), Statistics, within_s=1.0)).values
+        assert told["missed"] == 0
+        assert told["rate_hz"] == pytest.approx(20.0)
+        assert told["rounds"] == told["ticks"] == told["counter_runs"] == pytest.approx(40, abs=1)
+        assert len(heard) == pytest.approx(40, abs=1)
+        assert (heard[1].value - heard[0].value) == 3.0
+
+    counter = ModuleOrder("counter", "sample_modules:Counter", {"step": 3.0})
+    play(local_mission, beside, arranged([UnitOrder(name="one", frequency_hz=20.0, modules=[counter])], {}), scene)
+
+
+def test_misses_are_named_in_status_and_statistics(local_mission: Any, beside: Any) -> None:
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        states: list[ComponentState] = []
+        bus.subscribe("mission_control/one", Conversation.STATUS, ComponentState, lambda e: states.append(e.body))
+        for value in range(5):  # between two rounds of the unit
+            bus.publish(TESTER, Conversation.EVENTS, Number(value))
+            await VirtualClock().sleep_s(0.01)
+        await VirtualClock().sleep_s(1.0)
+        told = (await bus.ask("mission_control/one", AskStatistics(), Statistics, within_s=1.0)).values
+        assert told["overwritten_number"] == 4
+        assert states[-1].feedback == "4 values of number came too early"
+
+    order = msgspec.convert(
+        {"name": "one", "frequency_hz": 2.0, "on_input": "none", "modules": [msgspec.to_builtins(MODULES["doubler"])]},
+        UnitOrder,
+    )
+    play(local_mission, beside, arranged([order], NUMBERS), scene)
+
+
+def test_the_debug_views_of_modules_are_those_of_the_unit(local_mission: Any, beside: Any) -> None:
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        bus.publish(TESTER, Conversation.EVENTS, Number(1.0))
+        await VirtualClock().sleep_s(0.01)
+        listed = await bus.ask("mission_control/all", ListViews(), Views, within_s=1.0)
+        assert [(one.view, one.value) for one in listed.views] == [("doubler-factor", 2.0)]
+
+    play(local_mission, beside, arranged(orders(ARRANGEMENTS[0]), NUMBERS), scene)
+
+
+def test_a_running_unit_keeps_its_modules(local_mission: Any, beside: Any) -> None:
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        with pytest.raises(WrongParameter, match="started with"):
+            await bus.ask("mission_control/all", SetParameter("frequency_hz", 3.0), Message, within_s=1.0)
+
+    play(local_mission, beside, arranged(orders(ARRANGEMENTS[0]), NUMBERS), scene)
+
+
+class Plain(Module):
+    class Outputs(Module.Outputs):
+        thing: int
+
+    def update(self, inputs: Module.Inputs) -> Outputs:
+        return self.Outputs(1)
+
+
+def unit(*modules: ModuleOrder, published: Sequence[str] = (), frequency_hz: float = 1.0) -> UnitParameters:
+    return UnitParameters(frequency_hz=frequency_hz, modules=list(modules), published=list(published))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "refusal", "says"),
+    [
+        (
+            unit(ModuleOrder("plain", f"{__name__}:Plain"), published=["thing"]),
+            WrongModule,
+            "builtins:int is no message",
+        ),
+        (unit(ModuleOrder("plain", f"{__name__}:Plain"), published=["other"]), WrongModule, "no module produces it"),
+        (unit(ModuleOrder("gone", "sample_modules:Gone")), WrongModule, "Gone"),
+        (unit(ModuleOrder("number", "sample_modules:Number")), WrongModule, "is no Module"),
+        (unit(ModuleOrder("counter", "sample_modules:Counter", {"stp": 1})), WrongModule, "counter .* `stp`"),
+        (unit(ModuleOrder("doubler", "sample_modules:Doubler")), GraphRefused, "doubler needs number"),
+        (unit(ModuleOrder("counter", "sample_modules:Counter"), frequency_hz=0.0), NeverRuns, "no frequency"),
+    ],
+)
+def test_what_a_unit_cannot_run_is_refused_with_the_reason(
+    parameters: UnitParameters, refusal: type[Exception], says: str
+) -> None:
+    async def main() -> None:
+        await asyncio.sleep(0)
+        with pytest.raises(refusal, match=says):
+            unit_on(LocalNetwork(), "one", parameters)
+
+    run_virtual(main())
