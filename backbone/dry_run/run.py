@@ -183,6 +183,8 @@ def placements(description: MissionDescription) -> list[Placed]:
         start(component.type, component.name, component.host)
     for resource in description.resources:
         start(resource.type, resource.name, resource.host)
+    for unit in description.units:
+        start(unit.type, unit.name, unit.host)
     for behavior in description.behaviors:
         start_branch(behavior)
     return found

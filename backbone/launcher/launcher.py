@@ -253,6 +253,11 @@ class Launcher(Component[NoParameters]):
             "simulated world and resource controllers" if description.components else "resource controllers"
         ):
             await self._start_all(hardware)
+        if description.units:
+            async with self._step("execution units"):
+                await self._start_all(
+                    [Start(u.type, u.name, u.parameters, u.host, process=u.process) for u in description.units]
+                )
         async with self._step("behaviors"):
             await self._start_all(behavior_orders(description))
 

@@ -8,7 +8,7 @@ from backbone.mission.document import Element
 from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.reading_checks import check_readings
 from backbone.mission.report import Report, listed
-from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
+from backbone.mission.tables import EXECUTION_UNIT, Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
 from backbone.spoken import counted
 
@@ -18,7 +18,11 @@ TRIES_AT_MOST = 100_000  # chosen: a third of a second; a set that fits is found
 def check_behaviors(tables: Tables, report: Report) -> None:
     """Report what does not fit in the behavior tree."""
     of_one: dict[str, Element] = {}
-    behavior_types = [known for known in tables.types if tables.belongs_to(known, Subsystem.MISSION_CONTROL)]
+    behavior_types = [
+        known
+        for known in tables.types
+        if tables.belongs_to(known, Subsystem.MISSION_CONTROL) and known != EXECUTION_UNIT
+    ]
     for behavior in tables.behaviors:
         kind, name = behavior.text("type"), behavior.text("name")
         if kind in tables.types and kind not in behavior_types:

@@ -18,6 +18,7 @@ from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH
 from backbone.mission.declaration.elements import is_loopback
 from backbone.mission.document import Element
+from backbone.mission.module_checks import check_modules
 from backbone.mission.parameter_checks import (
     check_class_parameters,
     check_class_path,
@@ -64,6 +65,7 @@ def check(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> N
     _check_types(tables, report)
     check_world(tables, report)
     _check_resources(tables, report)
+    check_modules(tables, report)
     check_behaviors(tables, report)
     _check_component_names(tables, report)
     check_processes(tables, _reserved(tables), report)
@@ -356,7 +358,7 @@ def _check_network_id(resource: Element, ids: dict[int, Element], report: Report
 
 # ---------------------------------------------------------------------- names
 def _check_component_names(tables: Tables, report: Report) -> None:
-    """Report names that two components would have: RCs, world, behaviors, their ARCs, core services."""
+    """Report names that two components would have: RCs, world, units, behaviors, their ARCs, core services."""
     reserved = _reserved(tables)
     first: dict[str, tuple[str, Place]] = {}
     for name, what, place in sorted(_components(tables), key=lambda component: component[2]):
@@ -389,6 +391,8 @@ def _components(tables: Tables) -> Iterator[tuple[str, str, Place]]:
         yield resource.text("name"), "resource", resource.place_of("name")
     if tables.world is not None:
         yield tables.world.text("name"), "world", tables.world.place_of("name")
+    for unit in tables.units:
+        yield unit.text("name"), "unit", unit.place_of("name")
     for behavior in tables.behaviors:
         yield behavior.text("name"), "behavior", behavior.place_of("name")
     for behavior, arc in tables.claims():

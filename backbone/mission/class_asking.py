@@ -13,12 +13,14 @@ from collections.abc import Sequence
 
 import msgspec
 
+from backbone.mission.arranged import Arranged, UnitFault, UnitsQuestion
 from backbone.mission.class_facts import ClassFacts, Question
 
 WITHIN_S = 30.0  # chosen: ten times the import of OpenCV and MuJoCo on a loaded machine
 
 _known: dict[str, ClassFacts] = {}
 _judged: dict[str, str] = {}
+_arranged: dict[str, Arranged] = {}
 
 
 def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
@@ -51,6 +53,22 @@ def judge(questions: Sequence[Question]) -> list[str]:
         printed, _reason = _printed("judge", left)
         _judged.update(zip(left, map(msgspec.json.decode, printed), strict=False))
     return [_judged.get(text, "") for text in texts]
+
+
+def arrange(question: UnitsQuestion) -> Arranged:
+    """Return how the units are connected, or everything that does not fit; the same units are asked about once.
+
+    Args:
+        question: About classes that can be imported; their modules are run.
+    """
+    text = msgspec.json.encode(question, order="sorted").decode()
+    if text not in _arranged:
+        printed, reason = _printed("arrange", [text])
+        if not printed:
+            remedy = "Mend the class of a module, so that its file can be imported"
+            return Arranged(faults=(UnitFault(f"the modules' classes tell nothing: {reason}", remedy),))
+        _arranged[text] = msgspec.json.decode(printed[0], type=Arranged)
+    return _arranged[text]
 
 
 def _asked(class_paths: Sequence[str]) -> tuple[dict[str, ClassFacts], str]:

@@ -12,6 +12,7 @@ import msgspec
 
 from backbone.component.component import Component
 from backbone.component.field_docs import field_docs
+from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
 
 
@@ -55,12 +56,26 @@ def refusal(question: Question) -> str:
     return ""
 
 
+def arranged(question: UnitsQuestion) -> Arranged:
+    """Return what the class that runs execution units says of these units."""
+    module, _, name = question.class_path.partition(":")
+    answer: Arranged = getattr(importlib.import_module(module), name).arrange(question)
+    return answer
+
+
 def _answer(what: str, about: Sequence[str]) -> None:
     """Print one answer a line, as soon as it is known; what the modules print goes nowhere."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     for one in about:
-        answer = facts_of(one) if what == "facts" else refusal(msgspec.json.decode(one, type=Question))
+        answer: object
+        match what:
+            case "facts":
+                answer = facts_of(one)
+            case "arrange":
+                answer = arranged(msgspec.json.decode(one, type=UnitsQuestion))
+            case _:
+                answer = refusal(msgspec.json.decode(one, type=Question))
         answers.write(msgspec.json.encode(answer) + b"\n")
         answers.flush()
 

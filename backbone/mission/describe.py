@@ -30,21 +30,37 @@ from backbone.mission.model import (
     MissionDescription,
 )
 from backbone.mission.room_files import floor_plan_text, room_text
-from backbone.mission.tables import CORE_SERVICES, FLOOR_PLAN, NETWORK_ID, ROOM, SIMULATED, WORLD, parameter_value
+from backbone.mission.tables import (
+    CORE_SERVICES,
+    EXECUTION_UNIT,
+    FLOOR_PLAN,
+    NETWORK_ID,
+    ROOM,
+    SIMULATED,
+    WORLD,
+    parameter_value,
+)
 
 NOTHING_KNOWN = ClassFacts()
 
 
-def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFacts]) -> MissionDescription:
+def describe(
+    mission: MissionElement,
+    source: str,
+    classes: Mapping[str, ClassFacts],
+    arranged: Mapping[str, Mapping[str, object]],
+) -> MissionDescription:
     """Return the description of a mission without faults.
 
     Args:
         classes: Class path → what is known of the class.
+        arranged: Execution unit → parameters of its component.
     """
     hosts = () if mission.hosts is None else mission.hosts.host
     world, tree = mission.world, mission.behaviors or BehaviorsElement()
     resources = () if mission.resources is None else mission.resources.resource
-    members = (*resources, *(() if world is None else (world,)))
+    units = () if mission.modules is None else mission.modules.unit
+    members = (*resources, *(() if world is None else (world,)), *units)
     host_of_process = {one.process: one.host for one in members if one.process and one.host}
     types = () if mission.types is None else tuple(_component_type(one, classes) for one in mission.types.type)
     robots = {one.name for one in types if one.abilities.is_robot}
@@ -57,6 +73,16 @@ def describe(mission: MissionElement, source: str, classes: Mapping[str, ClassFa
         types=types,
         resources=tuple(_resource(one, world, host_of_process, robots, in_rooms, source) for one in resources),
         components=() if world is None else (_world(world, resources, source, host_of_process, types),),
+        units=tuple(
+            ComponentDescription(
+                type=EXECUTION_UNIT,
+                name=unit.name,
+                host=unit.host or host_of_process.get(unit.process, ""),
+                parameters=dict(arranged.get(unit.name, {})),
+                process=unit.process,
+            )
+            for unit in units
+        ),
         behaviors=tuple(map(_behavior, tree.behavior)),
         source=source,
         last=(

@@ -38,7 +38,7 @@ class CoreServiceDescription(_Part):
 
 
 class ComponentDescription(_Part):
-    """A component the mission starts at its beginning, besides RCs and behaviors (the simulated world).
+    """A component the mission starts at its beginning, besides RCs and behaviors: the world, an execution unit.
 
     Attributes:
         host: Where; empty: the placer decides.
@@ -101,6 +101,7 @@ class MissionDescription(_Part):
         core: Core services in the papers' order of start.
         types: Component types.
         components: Further components to start, in this order, before the behaviors.
+        units: Execution units, started after the hardware and before the behaviors.
         behaviors: Roots of the behavior tree, children of the mission's own node.
         source: Path of the file.
         last: The branch that runs at the end, instead of the other behaviors; None: none.
@@ -116,6 +117,7 @@ class MissionDescription(_Part):
     behaviors: tuple[BehaviorDescription, ...]
     source: str
     last: LastBranchDescription | None = None
+    units: tuple[ComponentDescription, ...] = ()
 
     @property
     def other_hosts(self) -> tuple[Host, ...]:

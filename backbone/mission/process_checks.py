@@ -18,7 +18,7 @@ def check_processes(tables: Tables, core: Collection[str], report: Report) -> No
     Args:
         core: Names of the components that every mission has.
     """
-    components = [*section(tables.root, "resources"), *tables.behaviors]
+    components = [*section(tables.root, "resources"), *tables.units, *tables.behaviors]
     if tables.world is not None:
         components.append(tables.world)
     components.sort(key=lambda component: component.place)

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from backbone.mission.arranged import Arranged
 from backbone.mission.checks import check
-from backbone.mission.class_asking import ask_classes, judge
+from backbone.mission.class_asking import arrange, ask_classes, judge
 from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.completion import complete
 from backbone.mission.describe import describe
 from backbone.mission.document import Element, parse, read_bytes
 from backbone.mission.model import MissionDescription
+from backbone.mission.module_checks import report_units, units_question
 from backbone.mission.parameter_checks import open_questions, report_refusal
 from backbone.mission.report import Fault, MissionInvalid, Report
 from backbone.mission.tables import Tables, section
@@ -50,7 +52,8 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
     Args:
         data: What the file holds or would hold.
         source: Its path; faults name it, and files that the mission names are looked for beside it.
-        classes: What is known of classes besides the shipped ones; None: those that the mission names are asked.
+        classes: What is known of classes besides the shipped ones; None: those that the mission names are asked, those
+            of modules, too. Otherwise the connections of modules are not worked out.
 
     Raises:
         MissionInvalid: With every fault, in the order of the file.
@@ -58,6 +61,7 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
     report = Report(source)
     root, mission = parse(data, report), None
     known: Mapping[str, ClassFacts] = {}
+    arranged = Arranged()
     if root is not None and repair(root, report):
         complete(root)
         mission = validated(root, report)
@@ -66,10 +70,11 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
         check(root, known, report)
         if classes is None:
             _check_rules(root, known, report)
+            arranged = _arranged(root, report) if mission is not None else arranged
     faults = report.faults()
     if faults or mission is None:
         raise MissionInvalid(faults)
-    return describe(mission, source, known)
+    return describe(mission, source, known, arranged.parameters)
 
 
 def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:
@@ -79,6 +84,15 @@ def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Repor
     for (element, _), refusal in zip(opened, judge([question for _, question in opened]), strict=True):
         if refusal:
             report_refusal(element, refusal, tables, report)
+
+
+def _arranged(root: Element, report: Report) -> Arranged:
+    """Report modules that cannot be connected; return how they are."""
+    tables = Tables.of(root)
+    question = units_question(tables)
+    answer = Arranged() if question is None else arrange(question)
+    report_units(tables, answer.faults, report)
+    return answer
 
 
 def known_classes(root: Element) -> dict[str, ClassFacts]:

@@ -16,6 +16,7 @@ CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "depen
 """In their order of start. Source: RAM 2002, "Backbone"."""
 
 SIMULATED = "simulated"  # the driver whose hardware is played by the mission's world
+EXECUTION_UNIT = "execution_unit"  # the shipped type that runs modules
 SIMULATED_WORLD = "simulated_world"  # the shipped type that plays it
 WORLD = "world"  # the parameter that names it, and the world's own
 ROOM = "room"  # the parameter with the room, for classes that have it
@@ -59,6 +60,12 @@ class Tables:
             [] if behaviors is None else [element for element in behaviors if element.tag == "behavior"],
             classes or {},
         )
+
+    @property
+    def units(self) -> list[Element]:
+        """The execution units, in the order of the file."""
+        modules = self.root.first("modules")
+        return [] if modules is None else modules.all("unit")
 
     def facts_of(self, kind: str) -> ClassFacts | None:
         """Return what is known of the class of this type; None: nothing."""

@@ -5,14 +5,27 @@ The same modules in other units are another arrangement, and nothing else change
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 
+from backbone.errors import Refusal
+from backbone.mission.arranged import CLASS, Arranged, UnitFault, UnitsQuestion
 from backbone.naming import Subsystem, address
-from mission_control.modules.graph import Graph
-from mission_control.modules.orders import ModuleOrder, Source, UnitParameters, load_module_class, output_address
+from mission_control.modules.graph import OUTSIDE, Fault, Graph, GraphRefused
+from mission_control.modules.orders import (
+    ModuleOrder,
+    Source,
+    UnitParameters,
+    is_message,
+    load_at,
+    output_address,
+)
+from mission_control.modules.ports import kinds_of_ports, type_name
 from mission_control.modules.unit_schedule import Trigger
+
+_NAMED = re.compile(r"`(?:\$\.)?(\w+)`")  # the parameter that msgspec speaks of
 
 
 class UnitOrder(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -39,38 +52,121 @@ class GivenKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     source: Source
 
 
+class NoMessage(Fault):
+    """Values that would cross the bus are no messages."""
+
+
+class NoRounds(Fault):
+    """A unit never has a round; ``modules`` are all that it has."""
+
+
 def arranged(units: Sequence[UnitOrder], given: Mapping[str, GivenKey]) -> dict[str, UnitParameters]:
     """Return unit → parameters of the component that runs it.
 
-    What another unit takes is published, and what no other module takes: it is there for others.
+    What another unit takes is published, and what no other module takes, if it is a message: it is there for others.
 
     Raises:
         WrongModule: A class path leads to no module.
         GraphRefused: The modules cannot be connected; it says everything at once.
     """
-    members = {unit.name: [one.member(load_module_class(one.class_path)) for one in unit.modules] for unit in units}
-    graph = Graph(members, {key: one.type for key, one in given.items()})
-    every = [member for of in members.values() for member in of]
-    found = {}
-    for unit in units:
-        final = {
-            key
-            for member in members[unit.name]
-            for key, _port in member.keyed_outputs
-            if not any(key == taken for other in every if other is not member for taken, _ in other.keyed_inputs)
-        }
-        sources = {
-            key: Source(output_address(address(Subsystem.MISSION_CONTROL, producer), key))
-            if producer
-            else given[key].source
+    loaded = {unit.name: [(one, one.load()) for one in unit.modules] for unit in units}
+    members = {unit: [one.member(module) for one, module in of] for unit, of in loaded.items()}
+    kinds = {key: load_at(one.type) for key, one in given.items()}
+    graph = Graph(members, {key: type_name(kind) for key, kind in kinds.items()})
+    for unit, of in loaded.items():
+        for member, (_order, module) in zip(members[unit], of, strict=True):
+            declared = kinds_of_ports(module.Outputs)
+            kinds |= {key: declared[port.name] for key, port in member.keyed_outputs}
+    if found := [*_no_messages(graph, kinds), *_no_rounds(graph, units)]:
+        raise GraphRefused(found)
+    return {unit.name: _parameters(unit, graph, kinds, given) for unit in units}
+
+
+def _parameters(
+    unit: UnitOrder, graph: Graph, kinds: Mapping[str, object], given: Mapping[str, GivenKey]
+) -> UnitParameters:
+    every = [member for of in graph.units.values() for member in of]
+    final = [
+        key
+        for member in graph.units[unit.name]
+        for key, _port in member.keyed_outputs
+        if is_message(kinds[key])
+        and not any(key == taken for other in every if other is not member for taken, _ in other.keyed_inputs)
+    ]
+    return UnitParameters(
+        frequency_hz=unit.frequency_hz,
+        on_input=unit.on_input,
+        modules=unit.modules,
+        sources={
+            key: given[key].source
+            if producer == OUTSIDE
+            else Source(output_address(address(Subsystem.MISSION_CONTROL, producer), key))
             for key, producer in graph.into(unit.name).items()
-        }
-        published = sorted({*graph.out_of(unit.name), *final})
-        found[unit.name] = UnitParameters(
-            frequency_hz=unit.frequency_hz,
-            on_input=unit.on_input,
-            modules=unit.modules,
-            sources=sources,
-            published=published,
-        )
-    return found
+        },
+        published=sorted({*graph.out_of(unit.name), *final}),
+    )
+
+
+def _no_messages(graph: Graph, kinds: Mapping[str, object]) -> Iterator[Fault]:
+    """Yield what cannot go from one unit to another, at the module that takes it."""
+    for one in graph.connections:
+        if not is_message(kinds[one.key]):
+            [taker, *_] = [m for m in graph.units[one.consumer] if one.key in dict(m.keyed_inputs)]
+            port = dict(taker.keyed_inputs)[one.key].name
+            detail = f"{taker.name} takes {one.key} from another unit, and its class {one.type} is no message"
+            remedy = "Derive the class from backbone.wire:Message, or put both modules into one unit"
+            yield NoMessage((taker.name,), port, detail, remedy)
+
+
+def _no_rounds(graph: Graph, units: Sequence[UnitOrder]) -> Iterator[Fault]:
+    for unit in units:
+        if not unit.frequency_hz and not graph.awaited(unit.name):
+            detail = f"unit {unit.name} never runs: it has no frequency, and no fresh input from outside"
+            yield NoRounds(tuple(one.name for one in unit.modules), "", detail, 'Write frequency-hz="…"')
+
+
+# ---------------------------------------------------------------------- for mission files
+def judged(question: UnitsQuestion) -> Arranged:
+    """Return parameters of all units, or everything that does not fit."""
+    units: list[UnitOrder] = []
+    found: list[UnitFault] = []
+    for declared in question.units:
+        try:
+            units.append(msgspec.convert(declared, UnitOrder))
+        except msgspec.ValidationError as error:
+            found.append(UnitFault(str(error), "Give the unit a frequency or an input", unit=str(declared["name"])))
+    given = {key: msgspec.convert(one, GivenKey) for key, one in question.given.items()}
+    found += [fault for unit in units for order in unit.modules for fault in _of_class(order)]
+    found += [fault for key, one in given.items() for fault in _of_given(key, one)]
+    if found:
+        return Arranged(faults=tuple(found))
+    try:
+        parameters = arranged(units, given)
+    except GraphRefused as refused:
+        return Arranged(faults=tuple(_of_graph(fault, units) for fault in refused.faults))
+    return Arranged({unit: msgspec.to_builtins(one) for unit, one in parameters.items()})
+
+
+def _of_class(order: ModuleOrder) -> Iterator[UnitFault]:
+    try:
+        order.load().ports()
+    except Refusal as refusal:
+        about = next((name for name in _NAMED.findall(refusal.detail) if name in order.parameters), CLASS)
+        yield UnitFault(refusal.detail, refusal.remedy, module=order.name, port=about)
+
+
+def _of_given(key: str, declared: GivenKey) -> Iterator[UnitFault]:
+    try:
+        if not is_message(load_at(declared.type)):
+            remedy = "Name a class that derives from backbone.wire:Message"
+            yield UnitFault(f"{declared.type}, the class of {key}, is no message", remedy, given=key)
+    except Refusal as refusal:
+        yield UnitFault(refusal.detail, "Write the class as package.module:Class", given=key)
+
+
+def _of_graph(fault: Fault, units: Sequence[UnitOrder]) -> UnitFault:
+    about, *_ = (*fault.modules, "")
+    if isinstance(fault, NoRounds):
+        unit = next(unit.name for unit in units if [one.name for one in unit.modules] == list(fault.modules))
+        return UnitFault(fault.detail, fault.remedy, unit=unit)
+    return UnitFault(fault.detail, fault.remedy, module=about, port=fault.port)

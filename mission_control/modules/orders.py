@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from typing import TypeGuard
 
 import msgspec
 
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.ranges import Values
+from backbone.wire import Message
 from mission_control.modules.graph import Member
 from mission_control.modules.module import Module
 from mission_control.modules.unit_schedule import Trigger
@@ -34,7 +36,7 @@ class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     name: str
     class_path: str
-    parameters: Mapping[str, object] = {}
+    parameters: Values = {}
     inputs: dict[str, str] = {}
     outputs: dict[str, str] = {}
 
@@ -46,7 +48,7 @@ class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """
         kind = load_module_class(self.class_path)
         try:
-            return kind(msgspec.convert(dict(self.parameters), kind.Parameters))
+            return kind(msgspec.convert(self.parameters, kind.Parameters))
         except msgspec.ValidationError as error:
             raise WrongModule(
                 f"{self.name} ({self.class_path}) refuses its parameters: {error}",
@@ -94,17 +96,31 @@ def output_address(unit: str, key: str) -> str:
     return f"{unit}/{key}"
 
 
+def is_message(kind: object) -> TypeGuard[type[Message]]:
+    """Return whether values of this class can cross the bus."""
+    return isinstance(kind, type) and issubclass(kind, Message)
+
+
+def load_at(class_path: str) -> object:
+    """Return what stands at ``package.module:Class``; imports its file.
+
+    Raises:
+        WrongModule: Nothing does, or the file cannot be imported.
+    """
+    file, _, name = class_path.partition(":")
+    try:
+        return getattr(importlib.import_module(file), name)
+    except Exception as error:  # a file that is being written raises anything
+        raise WrongModule(f"{class_path}: {type(error).__name__}: {error}", class_path=class_path) from error
+
+
 def load_module_class(class_path: str) -> type[Module]:
     """Return the module class at ``package.module:Class``; imports its file.
 
     Raises:
         WrongModule: No module class has this path.
     """
-    file, _, name = class_path.partition(":")
-    try:
-        found = getattr(importlib.import_module(file), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise WrongModule(f"{class_path}: {error}", class_path=class_path) from error
+    found = load_at(class_path)
     if not (isinstance(found, type) and issubclass(found, Module)):
-        raise WrongModule(f"{class_path} is no Module", class_path=class_path)
+        raise WrongModule(f"{class_path} is no module", class_path=class_path)
     return found

@@ -18,11 +18,13 @@ from backbone.component.component import Component, WrongParameter
 from backbone.component.launch import Launch
 from backbone.debug_views import ListViews, LookAt
 from backbone.keys import Conversation
+from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.debug_views import DebugViews
+from mission_control.modules.arrangement import judged
 from mission_control.modules.execution_unit import ExecutionUnit
 from mission_control.modules.graph import Graph
-from mission_control.modules.orders import UnitParameters, WrongModule, output_address
+from mission_control.modules.orders import UnitParameters, WrongModule, is_message, output_address
 from mission_control.modules.ports import kinds_of_ports, type_name
 from mission_control.modules.unit_schedule import Trigger
 
@@ -40,6 +42,11 @@ class UnitComponent(Component[UnitParameters]):
     parameters_type = UnitParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(UnitParameters.__struct_fields__)
     accepts: ClassVar[Accepts | None] = ListViews | LookAt
+
+    @classmethod
+    def arrange(cls, question: UnitsQuestion) -> Arranged:
+        """Return how the units of a mission file are connected, or everything that does not fit."""
+        return judged(question)
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -160,7 +167,7 @@ def _message_kind(key: str, kind: object) -> type[Message]:
     Raises:
         WrongModule: It is no message.
     """
-    if isinstance(kind, type) and issubclass(kind, Message):
+    if is_message(kind):
         return kind
     made = "no module produces it" if kind is None else f"{type_name(kind)} is no message"
     raise WrongModule(

@@ -15,6 +15,7 @@ from importlib import resources
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Element, outline
 from backbone.mission.shipped_types import shipped_text
+from backbone.mission.tables import EXECUTION_UNIT
 from backbone.naming import Subsystem
 
 
@@ -147,7 +148,7 @@ def _entry(declared: Element, world_type: str, *, is_stock: bool, is_declared: b
 def _role(declared: Element, needs: Mapping[str, str], world_type: str) -> Role:
     match declared.text("subsystem"):
         case Subsystem.MISSION_CONTROL:
-            return Role.BEHAVIOR
+            return Role.SERVICE if declared.text("name") == EXECUTION_UNIT else Role.BEHAVIOR
         case Subsystem.UI_CONSOLE:
             return Role.CONSOLE
         case Subsystem.BACKBONE:

@@ -7,6 +7,7 @@ import ipaddress
 from pydantic import Field
 
 from backbone.component_database.messages import Multiplicity as MultiplicityWord
+from backbone.mission.declaration.module_elements import ModulesElement
 from backbone.mission.declaration.parts import Declared, ParameterElement
 from backbone.mission.declaration.values import (
     Address,
@@ -258,7 +259,7 @@ class BehaviorsElement(Declared):
 
 
 class MissionElement(Declared):
-    """A whole mission: machines, core services, component types, hardware, world and behaviors."""
+    """A whole mission: machines, core services, component types, hardware, world, modules and behaviors."""
 
     name: Name = Field(description="Name of the mission; missions with different names can run side by side.")
     priority: Priority = Field(
@@ -269,4 +270,5 @@ class MissionElement(Declared):
     types: TypesElement | None = None
     resources: ResourcesElement | None = None
     world: WorldElement | None = None
+    modules: ModulesElement | None = None
     behaviors: BehaviorsElement | None = None

@@ -16,6 +16,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import BeforeValidator, Field, JsonValue
 
 from backbone.component_database.messages import Multiplicity as MultiplicityWord
+from backbone.keys import Conversation as ConversationWord
 from backbone.naming import Subsystem as SubsystemWord
 
 T = TypeVar("T")
@@ -109,6 +110,14 @@ Address = Annotated[
     str,
     Field(pattern=r"^[A-Za-z0-9:]([A-Za-z0-9.:\-]{0,251}[A-Za-z0-9])?$", json_schema_extra=_kind("address")),
 ]
+SourceAddress = Annotated[
+    str,
+    Field(
+        pattern=rf"^[a-z_]+(/{_NAME})+$",
+        max_length=255,
+        json_schema_extra=_kind("source-address", "A subsystem and a component, as in ui_console/joystick."),
+    ),
+]
 File = Annotated[
     str,
     Field(
@@ -122,6 +131,8 @@ Flag = Annotated[bool, BeforeValidator(_read_flag), Field(json_schema_extra=_kin
 
 Subsystem = Annotated[SubsystemWord, Field(json_schema_extra=_kind("subsystem"))]
 Multiplicity = Annotated[MultiplicityWord, Field(json_schema_extra=_kind("multiplicity"))]
+Conversation = Annotated[ConversationWord, Field(json_schema_extra=_kind("conversation"))]
+OnInput = Annotated[Literal["any", "all", "none"], Field(json_schema_extra=_kind("on-input"))]
 Shape = Annotated[Literal["pioneer", "person", "carrier"], Field(json_schema_extra=_kind("shape"))]
 FurnitureShape = Annotated[Literal["box", "table"], Field(json_schema_extra=_kind("furniture-shape"))]
 
@@ -130,6 +141,7 @@ Seed = Annotated[int, Field(ge=0, le=MOST_WHOLE, json_schema_extra=_kind("seed")
 Port = Annotated[int, Field(ge=1, le=65535, json_schema_extra=_kind("port")), _WHOLE_TEXT]
 
 Capacity = Annotated[float, Field(gt=0, le=1, json_schema_extra=_kind("capacity")), _DECIMAL_TEXT]
+Frequency = Annotated[float, Field(ge=0, le=1000, json_schema_extra=_kind("frequency")), _DECIMAL_TEXT]
 Seconds = Annotated[float, Field(ge=0, le=86400, json_schema_extra=_kind("seconds")), _DECIMAL_TEXT]
 Duration = Annotated[float, Field(gt=0, le=86400, json_schema_extra=_kind("duration")), _DECIMAL_TEXT]
 Scale = Annotated[float, Field(ge=0, le=10, json_schema_extra=_kind("scale")), _DECIMAL_TEXT]

@@ -211,7 +211,7 @@ def unit(*modules: ModuleOrder, published: Sequence[str] = (), frequency_hz: flo
         ),
         (unit(ModuleOrder("plain", f"{__name__}:Plain"), published=["other"]), WrongModule, "no module produces it"),
         (unit(ModuleOrder("gone", "sample_modules:Gone")), WrongModule, "Gone"),
-        (unit(ModuleOrder("number", "sample_modules:Number")), WrongModule, "is no Module"),
+        (unit(ModuleOrder("number", "sample_modules:Number")), WrongModule, "is no module"),
         (unit(ModuleOrder("counter", "sample_modules:Counter", {"stp": 1})), WrongModule, "counter .* `stp`"),
         (unit(ModuleOrder("doubler", "sample_modules:Doubler")), GraphRefused, "doubler needs number"),
         (unit(ModuleOrder("counter", "sample_modules:Counter"), frequency_hz=0.0), NeverRuns, "no frequency"),

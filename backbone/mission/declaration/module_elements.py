@@ -1,0 +1,78 @@
+"""The elements of modules and execution units."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from backbone.keys import Conversation as ConversationWord
+from backbone.mission.declaration.parts import Declared, ParameterElement
+from backbone.mission.declaration.values import ClassPath, Conversation, Frequency, Name, OnInput, SourceAddress
+
+
+class InputElement(Declared):
+    """An input of a module that is connected by another key than its class declares."""
+
+    name: Name = Field(description="Name of the input in the module's class.")
+    key: Name = Field(description="Key of the output, or of what is given from outside, whose values it takes.")
+
+
+class OutputElement(Declared):
+    """An output of a module that has another key than its class declares."""
+
+    name: Name = Field(description="Name of the output in the module's class.")
+    key: Name = Field(description="Its key, unique in the mission.")
+
+
+class ModuleElement(Declared):
+    """An algorithm with declared inputs and outputs; who takes what follows from keys and classes."""
+
+    name: Name = Field(description="Name of the module, unique in the mission.")
+    class_path: ClassPath = Field(
+        alias="class", description="Its Python class, written package.module:Class, importable where the file is read."
+    )
+    parameter: tuple[ParameterElement, ...] = ()
+    input: tuple[InputElement, ...] = ()
+    output: tuple[OutputElement, ...] = ()
+
+
+class UnitElement(Declared):
+    """An execution unit: a component whose modules run one after the other, in rounds.
+
+    Where their connections leave the order open, the modules run in the order of the file.
+    """
+
+    name: Name = Field(description="Name of the unit, unique in the mission.")
+    frequency_hz: Frequency = Field(
+        default=0.0, description="Rounds a second, 0 to 1000; 0: it runs only when an input comes."
+    )
+    on_input: OnInput = Field(
+        default="any",
+        description=(
+            "When an input from outside the unit begins a round: any of them, all of them since they last did, or none."
+        ),
+    )
+    host: Name = Field(default="", description="The host it runs on; left out: any.")
+    process: Name = Field(
+        default="",
+        description="Name of the process it shares with all others of that name; all are on the host that any of them "
+        "names; left out: a process of its own.",
+    )
+    module: tuple[ModuleElement, ...] = ()
+
+
+class GivenElement(Declared):
+    """Values that no module of the mission produces, but another component publishes."""
+
+    key: Name = Field(description="The key by which modules take them.")
+    class_path: ClassPath = Field(alias="class", description="Class of the values, written package.module:Class.")
+    address: SourceAddress = Field(description="Address under which they are published, as subsystem/component.")
+    conversation: Conversation = Field(
+        default=ConversationWord.OUTPUTS, description="The last part of the key under which they are published."
+    )
+
+
+class ModulesElement(Declared):
+    """The execution units with their modules, and what comes to them from outside."""
+
+    given: tuple[GivenElement, ...] = ()
+    unit: tuple[UnitElement, ...] = ()

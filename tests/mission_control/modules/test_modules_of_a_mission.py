@@ -1,0 +1,152 @@
+"""Modules of a mission file: every fault at its place, and the same modules in other units are another file."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from backbone.mission.class_facts import ClassFacts
+from backbone.mission.model import MissionDescription
+from backbone.mission.reader import MissionInvalid, read_mission, read_mission_bytes
+
+pytestmark = [pytest.mark.processes]
+
+TOP = Path(__file__).parents[3]
+GIVEN = '<given key="number" class="sample_modules:Number" address="ui_console/tester" conversation="events"/>'
+
+
+def mission(*units: str, given: str = GIVEN, hosts: str = "") -> str:
+    inside = "\n".join(units)
+    return f'<mission name="m" priority="1">\n{hosts}<modules>\n{given}\n{inside}\n</modules>\n</mission>\n'
+
+
+def unit(name: str, *modules: str, attributes: str = "") -> str:
+    return f'<unit name="{name}"{attributes}>\n' + "\n".join(modules) + "\n</unit>"
+
+
+def module(name: str, kind: str, inside: str = "") -> str:
+    return f'<module name="{name}" class="{kind}">{inside}</module>'
+
+
+def read(tmp_path: Path, text: str) -> MissionDescription:
+    file = tmp_path / "m.xml"
+    file.write_text(text)
+    return read_mission(file)
+
+
+def faults(tmp_path: Path, text: str) -> list[str]:
+    with pytest.raises(MissionInvalid) as invalid:
+        read(tmp_path, text)
+    assert all(fault.remedy for fault in invalid.value.faults)
+    return [f"{fault.line}:{fault.column} {fault.message}" for fault in invalid.value.faults]
+
+
+DOUBLER, SUMMING = module("doubler", "sample_modules:Doubler"), module("summing", "sample_modules:Summing")
+
+
+def test_units_are_described_with_their_connections(tmp_path: Path) -> None:
+    late = unit("late", SUMMING, attributes=' frequency-hz="5" on-input="none" process="p"')
+    described = read(tmp_path, mission(unit("early", DOUBLER), late))
+    early, then = described.units
+    assert (early.type, early.name, then.process) == ("execution_unit", "early", "p")
+    assert early.parameters["sources"] == {"number": {"address": "ui_console/tester", "conversation": "events"}}
+    assert early.parameters["published"] == ["twice"]
+    assert then.parameters["sources"] == {
+        "twice": {"address": "mission_control/early/twice", "conversation": "outputs"}
+    }
+    assert (then.parameters["frequency_hz"], then.parameters["on_input"]) == (5.0, "none")
+    assert then.parameters["published"] == ["sum"]
+
+
+def test_who_must_not_import_anything_reads_the_file_without_connections() -> None:
+    classes: dict[str, ClassFacts] = {}
+    described = read_mission_bytes(mission(unit("early", DOUBLER)).encode(), "m.xml", classes)
+    assert [(one.name, one.parameters) for one in described.units] == [("early", {})]
+
+
+NO_KEY = '<input name="summand" key="nowhere"/>'
+STEP = '<parameter name="step" value="fast"/>'
+HOST = '<hosts><host name="base" address="127.0.0.1"/></hosts>'
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            mission(unit("one", module("summing", "sample_modules:Summing", NO_KEY))),
+            ["5:77 summing needs nowhere (sample_modules:Number), and no module produces it"],
+        ),
+        (
+            mission(unit("one", DOUBLER, module("other", "sample_modules:Doubler"))),
+            ["6:9 other produces twice, and so does doubler"],
+        ),
+        (
+            mission(unit("one", DOUBLER), given=GIVEN.replace(":Number", ":Sum")),
+            ["5:9 doubler takes sample_modules:Number as number, but from outside comes sample_modules:Sum"],
+        ),
+        (
+            mission(
+                unit("one", module("doubler", "sample_modules:Doubler", '<input name="number" key="twice"/>')),
+            ),
+            ["5:9 doubler waits for itself"],
+        ),
+        (
+            mission(unit("one", DOUBLER, module("counter", "sample_modules:Counter", STEP)), unit("empty")),
+            ["6:78 counter (sample_modules:Counter) refuses its parameters: Expected `float`, got `str` - at `$.step`"],
+        ),
+        (mission(unit("one", module("gone", "sample_modules:Gone"))), ["5:21 sample_modules:Gone: no class Gone"]),
+        (mission(unit("one", module("no", "sample_modules:Number"))), ["5:19 sample_modules:Number is no module"]),
+        (mission(unit("one", module("plain", "test_unit_component:Plain"))), ["4:7 unit one never runs"]),
+        (
+            mission(unit("one", DOUBLER), given=GIVEN.replace("sample_modules:Number", "sample_modules:Counter")),
+            ["3:21 sample_modules:Counter, the class of number, is no message"],
+        ),
+        (
+            mission(unit("one", DOUBLER, DOUBLER, attributes=' host="nowhere" on-input="some"')),
+            [
+                "4:18 no host is named 'nowhere'",
+                "4:33 on-input='some' in <unit> is illegal",
+                "6:9 a second module 'doubler'; the first is in line 5",
+            ],
+        ),
+        (
+            mission(unit("world", DOUBLER), unit("world", SUMMING), unit("empty")),
+            ["7:7 a second unit 'world'; the first is in line 4", "10:1 unit empty has no module"],
+        ),
+    ],
+)
+def test_every_fault_has_its_place(tmp_path: Path, text: str, told: list[str]) -> None:
+    found = faults(tmp_path, text)
+    for expected in told:
+        assert any(line.startswith(expected) for line in found), found
+
+
+def test_a_module_that_cannot_be_imported_is_a_fault_at_its_class(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "broken_module.py").write_text("raise RuntimeError('being written')\nclass Broken: ...\n")
+    (tmp_path / "dying_module.py").write_text("import os\nos._exit(3)\nclass Dying: ...\n")
+    [broken] = faults(tmp_path, mission(unit("one", module("broken", "broken_module:Broken"))))
+    assert broken == "5:23 broken_module:Broken: RuntimeError: being written"
+    [dying] = faults(tmp_path, mission(unit("one", module("dying", "dying_module:Dying"))))
+    assert "the modules' classes tell nothing" in dying
+
+
+def test_an_execution_unit_is_no_behavior(tmp_path: Path) -> None:
+    text = '<mission name="m" priority="1">\n<behaviors>\n<behavior type="execution_unit" name="b" priority="1"/>\n'
+    assert "3:11 type execution_unit is no behavior" in faults(tmp_path, f"{text}</behaviors></mission>")
+
+
+def test_the_guide_shows_the_example() -> None:
+    [shown] = re.findall(r"```xml\n(.*?)```", (TOP / "docs/how-to/write-a-module.md").read_text(), re.DOTALL)
+    assert textwrap.indent(shown, "  ") in (TOP / "docs/examples/pair.xml").read_text()
+
+
+def test_the_example_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(TOP / "docs/examples")
+    [waves] = read_mission(TOP / "docs/examples/pair.xml").units
+    assert waves.parameters["published"] == ["smooth"]

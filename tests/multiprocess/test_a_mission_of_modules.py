@@ -1,0 +1,89 @@
+"""The same two modules in one unit, in two units of one process, and in two processes: only the file is another."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+
+import msgspec
+import pytest
+from running_mission import mission_up
+
+from backbone.component.messages import AskStatistics, Statistics
+from backbone.debug_views import ListViews, Views
+from backbone.keys import Conversation
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
+
+WITHIN_S = 20.0
+TESTER = "ui_console/tester"
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+FIRST = '<module name="first" class="pair:Smoothing"/>'
+SECOND = """<module name="second" class="pair:Smoothing">
+  <parameter name="weight" value="0.5"/>
+  <input name="wave" key="smooth"/>
+  <output name="smooth" key="smoother"/>
+</module>"""
+ARRANGEMENTS = {
+    "one unit": f'<unit name="late">{SECOND}{FIRST}</unit>',
+    "two units": f'<unit name="late" process="p">{SECOND}</unit><unit name="early" process="p">{FIRST}</unit>',
+    "two processes": f'<unit name="late">{SECOND}</unit><unit name="early">{FIRST}</unit>',
+}
+MISSION = f"""<mission name="m" priority="1"><modules>
+<given key="wave" class="pair:Height" address="{TESTER}" conversation="events"/>
+{{units}}
+</modules></mission>"""
+
+
+@pytest.fixture(autouse=True)
+def _the_pair_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(EXAMPLES))
+    monkeypatch.syspath_prepend(EXAMPLES)
+
+
+@pytest.mark.parametrize("units", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
+async def test_an_arrangement_says_what_the_modules_say_by_hand(units: str, tmp_path: Path) -> None:
+    import pair
+
+    file = tmp_path / "m.xml"
+    file.write_text(MISSION.format(units=units))
+    waves = [pair.Height(float(number * number % 7)) for number in range(40)]
+    heard: asyncio.Queue[pair.Height] = asyncio.Queue()
+    said: list[pair.Height] = []
+    with mission_up(mission_xml=file) as mission:
+        async with mission.bus(TESTER) as bus:
+            at = "mission_control/late/smoother"
+            bus.subscribe(at, Conversation.OUTPUTS, pair.Height, lambda one: heard.put_nowait(one.body))
+            for wave in waves:
+                bus.publish(TESTER, Conversation.EVENTS, wave)
+                async with asyncio.timeout(WITHIN_S):
+                    said.append(await heard.get())
+            told = (await bus.ask("mission_control/late", AskStatistics(), Statistics, within_s=WITHIN_S)).values
+            assert told["second_runs"] == len(waves)
+        pids = {one["pid"] for one in mission.status()["components"] if one["name"] in ("early", "late")}
+        assert len(pids) == (2 if units is ARRANGEMENTS["two processes"] else 1)
+    first, then = pair.Smoothing(), pair.Smoothing(pair.Smoothing.Parameters(weight=0.5))
+    expected = [then.update(then.Inputs(first.update(first.Inputs(wave)).smooth)).smooth for wave in waves]
+    assert msgspec.msgpack.encode(said) == msgspec.msgpack.encode(expected)
+
+
+async def test_the_example_goes_into_a_mission_unchanged() -> None:
+    with mission_up(mission_xml=EXAMPLES / "pair.xml") as mission:
+        async with mission.bus(TESTER) as bus:
+            import pair
+
+            heard: asyncio.Queue[pair.Height] = asyncio.Queue()
+            at = "mission_control/waves/smooth"
+            bus.subscribe(at, Conversation.OUTPUTS, pair.Height, lambda one: heard.put_nowait(one.body))
+            async with asyncio.timeout(WITHIN_S):
+                for _ in range(5):
+                    await heard.get()
+            told = (await bus.ask("mission_control/waves", AskStatistics(), Statistics, within_s=WITHIN_S)).values
+            assert told["wave_runs"] == told["smoothing_runs"] >= 5
+            assert (await bus.ask("mission_control/waves", ListViews(), Views, within_s=WITHIN_S)).views == []
+        done = mission.command("scout-backbone", "check", str(EXAMPLES / "pair.xml"), "--dry-run", "--for", "1")
+        assert done.returncode == 0, done.stderr
+        assert "waves" in done.stdout
+        tree = mission.command("scout-backbone", "tree", "--json", "--mission", mission.name)
+        assert json.loads(tree.stdout)["tree"] == []
