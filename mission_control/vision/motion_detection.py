@@ -183,75 +183,120 @@ def largest_blob(changed: NDArray[np.bool_], *, drop_streaks: bool = True) -> Bl
     return best
 
 
-class MotionDetector:
-    """Looks at one camera's pictures, one after the other; keeps the average when its robot is swapped out.
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """What a picture shows against an average.
 
-    Args:
-        filters_rows: False leaves out the second filter, of whole rows and their pieces: to measure what it is for.
+    Attributes:
+        stages: The pictures on the way.
+        sound: Rows that may change the average, as a mask of the picture's shape; None: it is no picture of the scene.
+        blob: The largest region that changed.
     """
 
-    def __init__(self, *, filters_rows: bool = True) -> None:
-        self._filters_rows = filters_rows
-        self.stages: Stages | None = None
-        """The pictures on the way to the last judgment; None: the last picture was one of the first after a swap."""
+    stages: Stages
+    sound: NDArray[np.bool_] | None
+    blob: Blob | None
+
+
+def prepared(frame: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return the picture as it is compared: at half its size, blurred.
+
+    Args:
+        frame: Grey levels 0 to 255, shape (height, width), row 0 on top.
+
+    Raises:
+        ValueError: It is no grey picture of at least 2 × 2 pixels.
+    """
+    if frame.ndim != 2 or min(frame.shape) < 2:
+        raise ValueError(f"a grey picture has shape (height, width), not {frame.shape}")
+    return np.asarray(cv2.blur(halve(frame), (3, 3)), np.float32)
+
+
+def judge(picture: NDArray[np.float32], average: NDArray[np.float32], *, filters_rows: bool = True) -> Judged:
+    """Return what a picture shows against an average of the same shape.
+
+    Args:
+        picture: A prepared one.
+        average: Of prepared ones.
+        filters_rows: False leaves out the filter of whole rows and their pieces.
+    """
+    difference = np.asarray(cv2.absdiff(picture, average), np.float32)
+    bar = noise_bar(difference)
+    changed = np.asarray(difference > bar, np.bool_)
+    torn = torn_rows(changed) if filters_rows else np.zeros(len(changed), np.bool_)
+    stages = Stages(picture, average, difference, bar, changed, np.zeros_like(changed))
+    if torn.mean() > ROWS_SHARE or (filters_rows and edges_moved(average, picture) > EDGES_SHARE):
+        return Judged(stages, None, None)
+    sound = np.repeat(~torn[:, np.newaxis], picture.shape[1], axis=1)
+    stages = replace(stages, kept=changed & sound)
+    return Judged(stages, sound, largest_blob(stages.kept, drop_streaks=filters_rows))
+
+
+class Vote:
+    """Decides by the last ``VOTERS`` pictures whether a region is more than link noise.
+
+    Attributes:
+        last: Whether each of them had a region, newest last.
+    """
+
+    def __init__(self) -> None:
+        self.last: deque[bool] = deque(maxlen=VOTERS)
+
+    def count(self, blob: Blob | None) -> Blob | None:
+        """Return the region of a further picture, if ``VOTES`` of the last ``VOTERS`` pictures had one."""
+        self.last.append(blob is not None)
+        return blob if sum(self.last) >= VOTES else None
+
+
+class Background:
+    """The running average of one camera's prepared pictures; it is kept when its robot is swapped out.
+
+    Attributes:
+        times_begun: How often it began to adapt fast; what was seen before then counts no more.
+    """
+
+    def __init__(self) -> None:
         self._average: NDArray[np.float32] | None = None
         self._fresh: list[NDArray[np.float32]] = []
         self._is_settling = True
         self._rejected_in_turn = 0
-        self._votes: deque[bool] = deque(maxlen=VOTERS)
-        self.frames = self.rejected = 0
+        self.times_begun = 0
 
-    def swapped_in(self) -> None:
-        """Adapt fast to what changed meanwhile: the next ``FAST_FRAMES`` pictures detect nothing."""
+    def begin(self) -> None:
+        """Adapt fast to what changed meanwhile: the next ``FAST_FRAMES`` pictures are compared with nothing."""
         self._fresh.clear()
         self._is_settling, self._rejected_in_turn = True, 0
-        self._votes.clear()
+        self.times_begun += 1
 
-    @property
-    def votes(self) -> Sequence[bool]:
-        """Whether each of the last ``VOTERS`` judged pictures since the swap had a region, newest last."""
-        return self._votes
-
-    def look(self, frame: NDArray[np.uint8]) -> Blob | None:
-        """Return where something moves, or None.
+    def to_compare(self, picture: NDArray[np.float32]) -> NDArray[np.float32] | None:
+        """Return the average to compare the next picture with; None: it is one of the first, and part of the average.
 
         Args:
-            frame: Grey levels 0 to 255, shape (height, width), row 0 on top; a new shape starts afresh.
-
-        Returns:
-            The largest region of this picture, if ``VOTES`` of the last ``VOTERS`` pictures had one.
-
-        Raises:
-            ValueError: It is no grey picture of at least 2 × 2 pixels.
+            picture: A new shape begins anew.
         """
-        if frame.ndim != 2 or min(frame.shape) < 2:
-            raise ValueError(f"a grey picture has shape (height, width), not {frame.shape}")
-        self.frames, self.stages = self.frames + 1, None
-        picture = np.asarray(cv2.blur(halve(frame), (3, 3)), np.float32)
-        if self._average is not None and self._average.shape != picture.shape:
+        known = self._fresh[0] if self._fresh else self._average
+        if known is not None and known.shape != picture.shape:
             self._average = None
-            self.swapped_in()
+            self.begin()
         if self._is_settling or self._average is None:
             self._settle(picture)
             return None
-        difference = np.asarray(cv2.absdiff(picture, self._average), np.float32)
-        bar = noise_bar(difference)
-        changed = np.asarray(difference > bar, np.bool_)
-        torn = torn_rows(changed) if self._filters_rows else np.zeros(len(changed), np.bool_)
-        self.stages = Stages(picture, self._average, difference, bar, changed, np.zeros_like(changed))
-        if torn.mean() > ROWS_SHARE or (self._filters_rows and edges_moved(self._average, picture) > EDGES_SHARE):
-            self.rejected += 1
+        return self._average
+
+    def learn(self, picture: NDArray[np.float32], sound: NDArray[np.bool_] | None) -> None:
+        """Move the average towards the picture that was compared with it; many rejected ones in a row are a new view.
+
+        Args:
+            sound: As in ``Judged``.
+        """
+        if sound is None:
             self._rejected_in_turn += 1
             if self._rejected_in_turn > REJECTED_IN_TURN:
-                self.swapped_in()
-            return None
+                self.begin()
+            return
         self._rejected_in_turn = 0
-        sound = np.repeat(~torn[:, np.newaxis], picture.shape[1], axis=1)
-        self.stages = replace(self.stages, kept=changed & sound)
+        assert self._average is not None  # noqa: S101  the picture was compared with it
         cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT, mask=sound.astype(np.uint8))
-        blob = largest_blob(self.stages.kept, drop_streaks=self._filters_rows)
-        self._votes.append(blob is not None)
-        return blob if sum(self._votes) >= VOTES else None
 
     def _settle(self, picture: NDArray[np.float32]) -> None:
         """Take one of the first pictures after a swap; after the last of them there is an average again.
@@ -281,3 +326,61 @@ class MotionDetector:
             self._average = median
         self._fresh.clear()
         self._is_settling = False
+
+
+class MotionDetector:
+    """Looks at one camera's pictures, one after the other; keeps the average when its robot is swapped out.
+
+    Args:
+        filters_rows: False leaves out the second filter, of whole rows and their pieces: to measure what it is for.
+    """
+
+    def __init__(self, *, filters_rows: bool = True) -> None:
+        self._filters_rows = filters_rows
+        self.stages: Stages | None = None
+        """The pictures on the way to the last judgment; None: the last picture was one of the first after a swap."""
+        self._background, self._vote = Background(), Vote()
+        self._times_begun = 0
+        self.frames = self.rejected = 0
+
+    def swapped_in(self) -> None:
+        """Adapt fast to what changed meanwhile: the next ``FAST_FRAMES`` pictures detect nothing."""
+        self._background.begin()
+        self._forget_what_was_before()
+
+    @property
+    def votes(self) -> Sequence[bool]:
+        """Whether each of the last ``VOTERS`` judged pictures since the swap had a region, newest last."""
+        return self._vote.last
+
+    def look(self, frame: NDArray[np.uint8]) -> Blob | None:
+        """Return where something moves, or None.
+
+        Args:
+            frame: Grey levels 0 to 255, shape (height, width), row 0 on top; a new shape starts afresh.
+
+        Returns:
+            The largest region of this picture, if ``VOTES`` of the last ``VOTERS`` pictures had one.
+
+        Raises:
+            ValueError: It is no grey picture of at least 2 × 2 pixels.
+        """
+        picture, found = prepared(frame), None
+        self.frames, self.stages = self.frames + 1, None
+        average = self._background.to_compare(picture)
+        if average is not None:
+            judged = judge(picture, average, filters_rows=self._filters_rows)
+            self.stages = judged.stages
+            self._background.learn(picture, judged.sound)
+            if judged.sound is None:
+                self.rejected += 1
+            else:
+                found = self._vote.count(judged.blob)
+        self._forget_what_was_before()
+        return found
+
+    def _forget_what_was_before(self) -> None:
+        """Forget the votes of the time before the background began anew, if it has."""
+        if self._times_begun != self._background.times_begun:
+            self._times_begun = self._background.times_begun
+            self._vote.last.clear()

@@ -215,3 +215,12 @@ def test_a_streak_is_no_body() -> None:
     assert largest_blob(changed) is None
     changed[20:30, 20:28] = True
     assert largest_blob(changed) == Blob(40, 40, 16, 20, 320)
+
+
+@pytest.mark.parametrize("first", [1, FAST_FRAMES - 1, FAST_FRAMES, FAST_FRAMES + 3])
+def test_a_new_shape_begins_anew_also_among_the_first_pictures(first: int) -> None:
+    detector = MotionDetector()
+    look_at([room()] * first, detector)
+    lower = [room()[: HEIGHT_PX // 2]] * 30
+    assert not any(look_at(lower, detector))
+    assert any(look_at([with_block(lower[0], x, y_px=40) for x in range(0, 200, 10)], detector))
