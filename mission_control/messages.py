@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from backbone.mission.behavior_reports import BehaviorStatus, BreakOff, BrokenOff, ChildReport, ReportNoted
-from backbone.ranges import MANY, Count, Instant, Mention, PixelCount, PixelPlace, Text, Values
+from backbone.ranges import MANY, Count, Instant, Mention, PixelCount, PixelPlace, Pixels, Text, Values
 from backbone.wire import Message
 
 __all__ = [
@@ -15,9 +15,11 @@ __all__ = [
     "BreakOff",
     "BrokenOff",
     "ChildReport",
+    "GreyPicture",
     "MotionSeen",
     "Region",
     "ReportNoted",
+    "SwappedIn",
     "WaypointReached",
 ]
 
@@ -54,8 +56,40 @@ class Region(Message, frozen=True):
     height_px: PixelCount
 
 
+class GreyPicture(Message, frozen=True):
+    """A picture of one robot's camera, for modules.
+
+    Attributes:
+        robot: The robot of the camera.
+        captured_s: Mission time of the capture.
+        width_px: Columns.
+        height_px: Rows.
+        pixels: Grey levels, row by row from the top; ``width_px`` times ``height_px`` of them.
+    """
+
+    robot: Mention
+    captured_s: Instant
+    width_px: PixelCount
+    height_px: PixelCount
+    pixels: Pixels
+
+    def __post_init__(self) -> None:
+        if self.width_px * self.height_px != len(self.pixels):
+            raise ValueError(f"{len(self.pixels)} pixels for {self.width_px} x {self.height_px}")
+
+
+class SwappedIn(Message, frozen=True):
+    """A robot's pictures come again after a swap, and may show another view.
+
+    Attributes:
+        at_s: Mission time of the grant.
+    """
+
+    at_s: Instant
+
+
 class MotionSeen(Message, frozen=True):
-    """Motion in a picture, published as an event by a watching behavior.
+    """Motion in a picture, published as an event by a watching behavior, and as an output by a module.
 
     Attributes:
         at_s: Mission time of the picture.

@@ -22,6 +22,7 @@ PACKAGES = ("backbone", "resource_pool", "mission_control", "ui_console", "scout
 A_MEGABYTE = 1_000_000
 TIED = {
     ("Frame", "pixels"),
+    ("GreyPicture", "pixels"),
     ("ViewPicture", "pixels"),
 }  # as many as rows and columns have: no value of one field alone is at its limit
 

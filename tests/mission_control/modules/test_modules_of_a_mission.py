@@ -150,3 +150,13 @@ def test_the_example_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(TOP / "docs/examples")
     [waves] = read_mission(TOP / "docs/examples/pair.xml").units
     assert waves.parameters["published"] == ["smooth"]
+
+
+def test_two_algorithms_stand_side_by_side_as_the_explanation_of_the_vision_shows(tmp_path: Path) -> None:
+    [shown] = re.findall(r"```xml\n(.*?)```", (TOP / "docs/explanation/vision.md").read_text(), re.DOTALL)
+    given = "".join(
+        f'<given key="{key}" class="mission_control.messages:{kind}" address="ui_console/camera"/>'
+        for key, kind in (("picture", "GreyPicture"), ("swapped_in", "SwappedIn"))
+    )
+    [vision] = read(tmp_path, mission(shown, given=given)).units
+    assert vision.parameters["published"] == ["motion", "motion-by-difference"]
