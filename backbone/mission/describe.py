@@ -19,6 +19,7 @@ from backbone.mission.declaration.elements import (
     ResourceElement,
     TypeElement,
 )
+from backbone.mission.declaration.module_elements import UnitElement
 from backbone.mission.declaration.parts import Declared, ParameterElement
 from backbone.mission.declaration.world_elements import AirElement, TargetElement, WorldElement
 from backbone.mission.model import (
@@ -73,16 +74,7 @@ def describe(
         types=types,
         resources=tuple(_resource(one, world, host_of_process, robots, in_rooms, source) for one in resources),
         components=() if world is None else (_world(world, resources, source, host_of_process, types),),
-        units=tuple(
-            ComponentDescription(
-                type=EXECUTION_UNIT,
-                name=unit.name,
-                host=unit.host or host_of_process.get(unit.process, ""),
-                parameters=dict(arranged.get(unit.name, {})),
-                process=unit.process,
-            )
-            for unit in units
-        ),
+        units=tuple(_unit(one, host_of_process, arranged.get(one.name, {})) for one in units),
         behaviors=tuple(map(_behavior, tree.behavior)),
         source=source,
         last=(
@@ -146,6 +138,18 @@ def _resource(
         parameters={**played_by, **room, **given},
         links=links,
         is_robot=declared.type in robots,
+    )
+
+
+def _unit(
+    declared: UnitElement, host_of_process: Mapping[str, str], parameters: Mapping[str, object]
+) -> ComponentDescription:
+    return ComponentDescription(
+        type=EXECUTION_UNIT,
+        name=declared.name,
+        host=declared.host or host_of_process.get(declared.process, ""),
+        parameters=dict(parameters),
+        process=declared.process,
     )
 
 

@@ -53,21 +53,15 @@ class UnitComponent(Component[UnitParameters]):
         given = self.parameters
         self._modules = {one.name: one.load() for one in given.modules}
         members = [one.member(self._modules[one.name]) for one in given.modules]
-        inside = {key for member in members for key, _port in member.keyed_outputs}
-        into = {
-            key: kinds_of_ports(self._modules[member.name].Inputs)[port.name]
-            for member in members
-            for key, port in member.keyed_inputs
-            if key in given.sources and key not in inside
-        }
-        out = {
-            key: kinds_of_ports(self._modules[member.name].Outputs)[port.name]
-            for member in members
-            for key, port in member.keyed_outputs
-        }
+        taken, made = dict[str, object](), dict[str, object]()
+        for member in members:
+            module = self._modules[member.name]
+            taken |= {key: kinds_of_ports(module.Inputs)[port.name] for key, port in member.keyed_inputs}
+            made |= {key: kinds_of_ports(module.Outputs)[port.name] for key, port in member.keyed_outputs}
+        into = {key: kind for key, kind in taken.items() if key in given.sources and key not in made}
         self._graph = Graph({self.name: members}, {key: type_name(kind) for key, kind in into.items()})
         self._into = {key: _message_kind(key, kind) for key, kind in into.items()}
-        self._published = {key: _message_kind(key, out.get(key)) for key in given.published}
+        self._published = {key: _message_kind(key, made.get(key)) for key in given.published}
         self._views = DebugViews(bus, clock)
         for name, module in self._modules.items():
             module.debug = ViewsOfModule(name, self._views)

@@ -230,7 +230,8 @@ async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[...
             raise MissionFell(f"{name} ended before it was ready")
     hardware = [Start(part.type, part.name, part.parameters) for part in mission.components]
     hardware += [Start(part.type, part.name, part.rc_parameters()) for part in mission.resources]
-    for orders in (hardware, behavior_orders(mission)):
+    units = [Start(part.type, part.name, part.parameters) for part in mission.units]
+    for orders in (hardware, units, behavior_orders(mission)):
         await asyncio.gather(*(running.start(order) for order in orders))
 
 

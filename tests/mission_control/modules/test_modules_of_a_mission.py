@@ -8,9 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from backbone.bus.clock import run_virtual
+from backbone.keys import Conversation
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import MissionInvalid, read_mission, read_mission_bytes
+from mission_control.laboratory.simulation.whole_mission import mission_in_one_process
 
 pytestmark = [pytest.mark.processes]
 
@@ -150,6 +153,25 @@ def test_the_example_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(TOP / "docs/examples")
     [waves] = read_mission(TOP / "docs/examples/pair.xml").units
     assert waves.parameters["published"] == ["smooth"]
+
+
+def test_a_mission_of_modules_runs_in_one_process_on_virtual_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(TOP / "docs/examples")
+    import pair
+
+    heights: list[pair.Height] = []
+
+    async def main() -> dict[str, float]:
+        async with mission_in_one_process(read_mission(TOP / "docs/examples/pair.xml")) as running:
+            at = "mission_control/waves/smooth"
+            running.bus.subscribe(at, Conversation.OUTPUTS, pair.Height, lambda one: heights.append(one.body))
+            await running.clock.sleep_s(60.0)
+            return await running.statistics("waves")
+
+    told = run_virtual(main())
+    assert told["rate_hz"] == pytest.approx(20.0)
+    assert told["missed"] == 0
+    assert len(heights) == pytest.approx(1200, abs=2)
 
 
 def test_two_algorithms_stand_side_by_side_as_the_explanation_of_the_vision_shows(tmp_path: Path) -> None:
