@@ -63,6 +63,7 @@ def run(folder: Path, *options: str, suite: str = SUITE) -> str:
     return done.stdout
 
 
+@pytest.mark.thorough
 def test_a_run_that_is_ended_has_named_each_failure_before(tmp_path: Path) -> None:
     printed = run(tmp_path)
     for name in ALONE:

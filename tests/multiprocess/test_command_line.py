@@ -104,6 +104,7 @@ def test_a_parameter_of_a_running_behavior_is_set(mission: RunningMission) -> No
     assert "again_after_s" in wrong.stderr
 
 
+@pytest.mark.thorough
 def test_what_a_behavior_asks_for_is_shown_and_changed(mission: RunningMission) -> None:
     def set_(*words: str) -> subprocess.CompletedProcess[str]:
         return mission.command("scout-backbone", "set", "--mission", mission.name, *words)
@@ -143,6 +144,7 @@ def test_an_rc_started_by_hand_comes_up_as_the_mission_file_says(mission: Runnin
     assert mission.component("scout2")["pid"] == mission.component("scout1")["pid"]
 
 
+@pytest.mark.thorough
 def test_a_machine_that_is_offered_takes_components_and_leaves_nothing_when_it_is_withdrawn(
     mission: RunningMission,
 ) -> None:

@@ -108,6 +108,7 @@ def lift(screen: Terminal, robot: str) -> None:
         time.sleep(0.7)  # what came of it is on the screen by then
 
 
+@pytest.mark.thorough
 def test_from_attach_to_release_key_by_key(mission: RunningMission, tmp_path: Path) -> None:
     with terminal(mission, tmp_path) as screen:
         screen.open("scout-console", "attach", "scout3", "--user", "anna", "--mission", mission.name)
@@ -139,6 +140,7 @@ def test_from_attach_to_release_key_by_key(mission: RunningMission, tmp_path: Pa
         assert line in told, mission.story()
 
 
+@pytest.mark.thorough
 def test_a_monitor_holds_nothing_asks_for_nothing_and_can_still_stop_all_robots(
     mission: RunningMission, tmp_path: Path
 ) -> None:
@@ -240,6 +242,7 @@ def test_no_key_pressed_twice_ends_a_console_in_any_terminal(
         ended_well(screen, 0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("variables", TERMINALS)
 def test_a_console_is_drawn_in_any_terminal_and_ctrl_c_ends_it(
     mission: RunningMission, tmp_path: Path, variables: str
@@ -286,6 +289,7 @@ def test_a_console_that_crashes_gives_its_robot_back_and_the_terminal_and_says_s
         assert re.search(r"^echo$", shown, re.MULTILINE), shown
 
 
+@pytest.mark.thorough
 def test_a_recording_is_played_and_asked_key_by_key(mission: RunningMission, tmp_path: Path) -> None:
     file = tmp_path / "night.mcap"
     done = mission.command("scout-backbone", "record", "--to", str(file), "--for", "8", "--mission", mission.name)

@@ -71,6 +71,7 @@ FAILS = {"</hosts>": GRABBER, '<parameter name="frame_rate_hz" value="15"/>': ""
 NO_HUB = {'name="iros2001"': f'name="{"m" * 63}"'}  # no socket has so long a path
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("exit_code", "change"), [(0, {}), (6, FAILS), (4, NO_HUB)], ids=["comes up", "fails", "has no hub"]
 )

@@ -22,6 +22,7 @@ LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its s
 FEW_BYTES = 10_000  # the big ones are for a test of their own; here it is many that counts
 
 
+@pytest.mark.thorough
 def test_of_every_process_of_a_mission_there_is_a_footprint() -> None:
     with mission_up() as mission:
         pids = {c["pid"] for c in mission.status()["components"] if "cli-" not in c["name"]}

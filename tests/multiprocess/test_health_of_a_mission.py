@@ -62,6 +62,8 @@ def test_a_whole_mission_is_ok(mission: RunningMission) -> None:
     assert text.splitlines()[0].endswith("health ok")
 
 
+@pytest.mark.thorough
+@pytest.mark.alone  # what is asked while it hangs must be answered before the launcher replaces it
 def test_a_core_service_that_hangs_is_absent_in_status_why_and_up_until_it_answers(mission: RunningMission) -> None:
     with paused(mission.component("dependency_database")["pid"], mission.component("rc_manager")["pid"]):
         found = wait_for(mission, lambda _, found: found["health"] != "ok", "the RC manager is missed")
@@ -78,6 +80,7 @@ def test_a_core_service_that_hangs_is_absent_in_status_why_and_up_until_it_answe
     mission.wait_for_line("health ok", 10.0)
 
 
+@pytest.mark.thorough
 def test_a_nameserver_that_hangs_is_replaced(mission: RunningMission) -> None:
     hung = mission.component("nameserver")["pid"]
     with paused(hung):
@@ -96,6 +99,7 @@ def test_a_mission_whose_nameserver_and_launcher_hang_has_a_status_all_the_same(
     wait_for(mission, lambda code, found: (code, found["health"]) == (0, "ok"), "health ok again")
 
 
+@pytest.mark.thorough
 def test_a_standing_emergency_stop_is_in_status_and_why_until_it_is_lifted(mission: RunningMission) -> None:
     async def stop(reason: str) -> None:
         async with mission.bus() as bus:
@@ -120,6 +124,7 @@ def test_a_standing_emergency_stop_is_in_status_and_why_until_it_is_lifted(missi
     assert "STOPPED" not in mission.command("scout-backbone", "why", "scout1", "--mission", mission.name).stdout
 
 
+@pytest.mark.thorough
 def test_a_stranger_on_the_bus_writes_no_escape_to_any_terminal(mission: RunningMission) -> None:
     hostile = "\x1b]0;owned\x07\x1b[2J\rall is well [/red]"
 
@@ -146,6 +151,7 @@ def test_a_stranger_on_the_bus_writes_no_escape_to_any_terminal(mission: Running
         assert text.replace("\n", "").isprintable()
 
 
+@pytest.mark.thorough
 def test_a_cause_in_a_story_can_be_asked_about(mission: RunningMission) -> None:
     told = mission.command("scout-backbone", "story", "scout1", "--mission", mission.name).stdout
     causes = [line.rpartition("because of ")[2] for line in told.splitlines() if "because of backbone/" in line]
@@ -162,6 +168,7 @@ def test_a_cause_in_a_story_can_be_asked_about(mission: RunningMission) -> None:
     assert all(line.endswith(f"because of {cause}") for line in asked.splitlines())
 
 
+@pytest.mark.thorough
 def test_the_launcher_says_every_second_how_its_mission_is(mission: RunningMission) -> None:
     async def main() -> list[str]:
         heard: list[str] = []

@@ -84,6 +84,7 @@ def test_it_gets_the_robot_that_a_person_holds() -> None:
             console.communicate()
 
 
+@pytest.mark.thorough
 def test_a_second_down_ends_it_at_once() -> None:
     with mission_up(mission_xml=HOME_AT_THE_END) as mission:
         patrols(mission)
@@ -95,6 +96,7 @@ def test_a_second_down_ends_it_at_once() -> None:
         assert mission.launcher.wait(30) == 0, mission.story()
 
 
+@pytest.mark.thorough
 def test_down_now_does_without_it() -> None:
     with mission_up(mission_xml=HOME_AT_THE_END) as mission:
         patrols(mission)
@@ -104,6 +106,7 @@ def test_down_now_does_without_it() -> None:
         assert not any("drive-home" in line for line in mission.lines)
 
 
+@pytest.mark.thorough
 def test_sigterm_runs_it_and_a_second_one_ends_it() -> None:
     with mission_up(mission_xml=HOME_AT_THE_END) as mission:
         patrols(mission)
@@ -114,6 +117,7 @@ def test_sigterm_runs_it_and_a_second_one_ends_it() -> None:
         mission.wait_for_line("last branch end-of-day: ended by a second order", 1.0)
 
 
+@pytest.mark.thorough
 def test_a_launcher_that_is_killed_meanwhile_leaves_nothing() -> None:
     with mission_up(mission_xml=HOME_AT_THE_END) as mission:
         patrols(mission)
@@ -123,6 +127,7 @@ def test_a_launcher_that_is_killed_meanwhile_leaves_nothing() -> None:
         mission.launcher.wait(10)
 
 
+@pytest.mark.thorough
 async def test_a_robot_that_is_stopped_holds_the_end_up_for_the_branchs_time_only() -> None:
     with mission_up(mission_xml=HOME_AT_THE_END, change={'within-s="60"': 'within-s="3"'}) as mission:
         patrols(mission)
@@ -134,6 +139,7 @@ async def test_a_robot_that_is_stopped_holds_the_end_up_for_the_branchs_time_onl
         assert mission.launcher.wait(30) == 0, mission.story()
 
 
+@pytest.mark.thorough
 def test_a_branch_that_cannot_start_holds_nothing_up(tmp_path: Path) -> None:
     text, plain = HOME_AT_THE_END.read_text(), "backbone.component.component:Component"
     kind = f'<types><type name="no-behavior" class="{plain}" subsystem="mission_control"/></types><resources>'

@@ -38,6 +38,7 @@ async def choose(page: Any, words: str, key: str) -> None:
     await page.locator("#bus-keys").get_by_role("button", name=key, exact=True).first.click()
 
 
+@pytest.mark.thorough
 async def test_any_key_is_viewed_and_afterwards_nobody_makes_copies(served: Served) -> None:
     address = f"http://127.0.0.1:{served.port}/#token={served.token}"
     async with served.mission.bus() as bus, page_at("desktop", address, shows=".robot[data-robot=scout1]") as page:

@@ -46,6 +46,7 @@ async def shown_at(address: str) -> dict[str, Any]:
     return view
 
 
+@pytest.mark.thorough
 async def test_each_of_two_missions_has_its_page_and_one_may_end() -> None:
     with mission_up() as day, mission_up(beside=day) as night, serving_all(day, night) as addresses:
         for mission in (day, night):

@@ -203,6 +203,7 @@ def test_a_recorder_that_is_killed_is_absent_until_the_recording_goes_on(tmp_pat
     assert messages(path.with_stem("it-2"))
 
 
+@pytest.mark.thorough
 async def test_the_recorder_of_a_host_writes_its_copies_alone_and_ends_with_the_process_that_started_it(
     mission: RunningMission, tmp_path: Path
 ) -> None:

@@ -135,6 +135,7 @@ def before_their_causes(messages: list[Recorded] | Iterator[Recorded]) -> list[s
     return [one.id for number, one in enumerate(listed) if place.get(one.cause, -1) > number]
 
 
+@pytest.mark.thorough
 @pytest.mark.alone
 def test_what_a_host_says_while_its_link_is_cut_is_recorded_and_afterwards_it_goes_on_in_a_further_file(
     short_path: Path,

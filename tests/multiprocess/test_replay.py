@@ -23,14 +23,14 @@ EVENTS = [f"event {number}" for number in range(200)]
 
 
 @pytest.fixture
-def recording(tmp_path: Path) -> Path:
+def recording(short_path: Path) -> Path:
     """Return a recording with an event of one robot after the other, many of them at one time."""
     said = [
         Said(number // 4 / 10, where, Conversation.LOG, StoryEvent(0.0, where, what, "x", "", LogLevel.INFO), where)
         for number, what in enumerate(EVENTS)
         for where in [(SCOUT, "resource_pool/scout2")[number % 2]]
     ]
-    path = tmp_path / "it.mcap"
+    path = short_path / "it.mcap"
     path.write_bytes(recorded(said).getvalue())
     return path
 

@@ -249,6 +249,7 @@ async def test_at_a_desk_a_person_watches_drives_by_keys_and_releases(served: Se
         await wait_until(lambda: holds(bus, "watch-scout1"), "the behavior went on")
 
 
+@pytest.mark.thorough
 async def test_on_a_tablet_a_finger_on_the_pad_drives_and_a_lifted_one_stops(served: Served) -> None:
     async with served.mission.bus() as bus, page_at("tablet", served.port, served.token) as page:
         await take(page)

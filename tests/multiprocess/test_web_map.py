@@ -76,6 +76,7 @@ async def test_robots_go_where_a_person_taps_on_the_map_and_one_goes_on_while_th
         await web_browser.keep_picture(page, "web-map")
 
 
+@pytest.mark.thorough
 async def test_a_robot_goes_to_the_place_that_was_tapped_in_its_picture_and_the_stick_takes_it_back(
     served: Served,
 ) -> None:

@@ -56,6 +56,7 @@ def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
     assert hub_endpoint(right) == right
 
 
+@pytest.mark.thorough
 def test_a_hub_that_is_not_there_is_one_sentence_without_anything_inner() -> None:
     words = ["status", "--mission", "m", "--connect", "unixsock-stream//nowhere/hub"]
     done = CliRunner().invoke(app, words)

@@ -71,6 +71,7 @@ def test_the_comparison_takes_place():
     assert bench.manager.compared > 20
 
 
+@pytest.mark.thorough
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32), rules=st.sampled_from(RULES), until_s=st.floats(0.0, END_S))
 def test_a_copy_gives_the_same_reasons(seed: int, rules: dict[str, Any], until_s: float):

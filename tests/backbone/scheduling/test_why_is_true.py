@@ -105,6 +105,7 @@ def test_without_those_that_why_names_each_of_a_thousand_is_granted(rules: dict[
     assert len(untrue(1000, rules)) <= (1 if "grid_s" in rules else 0)
 
 
+@pytest.mark.thorough
 def test_with_aging_why_is_nearly_always_enough() -> None:
     """An ARC that leaves takes the levels along by which it had raised its parents, so the order may change."""
     assert len(untrue(100, {"aging_s": 7.0})) <= 10
@@ -126,6 +127,7 @@ def needless(seed: int, then: Moment) -> list[str]:
     return found
 
 
+@pytest.mark.thorough
 def test_few_names_are_needless() -> None:
     """One too many is named rather than one too few; and some waits are nearly over anyway."""
     count = 80

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from behaviors_at_work import EXAMPLES, Person, at_work, driving, hear
 
 from backbone.bus.clock import run_virtual
@@ -26,6 +27,7 @@ async def _end(running: RunningMission) -> BehaviorState:
     return state
 
 
+@pytest.mark.thorough
 def test_it_patrols_and_comes_home_though_a_person_has_the_robot_for_longer_than_the_patrol_may_take() -> None:
     person = Person()
 

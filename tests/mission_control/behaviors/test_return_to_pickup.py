@@ -69,6 +69,7 @@ def test_what_was_looked_for_in_vain_is_remembered_over_a_suspension() -> None:
     assert route.stage is PickupStage.FAILED
 
 
+@pytest.mark.thorough
 def test_in_the_world_a_robot_that_was_driven_away_meanwhile_returns_to_its_mark() -> None:
     async def scene() -> None:
         person = Person()

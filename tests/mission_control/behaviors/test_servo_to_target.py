@@ -69,6 +69,7 @@ def play(disturbances: Disturbances) -> None:
     run_virtual(scene())
 
 
+@pytest.mark.thorough
 @FEW_MOMENTS
 @given(take_overs)
 def test_taken_over_and_turned_away_at_any_moment_it_still_arrives(

@@ -19,6 +19,7 @@ ROOT = Path(__file__).parents[3]
 TUTORIAL = ROOT / "docs" / "tutorial" / "design-a-mission.md"
 
 
+@pytest.mark.thorough
 def test_what_the_tutorial_builds_is_checked_and_brought_up() -> None:
     """The browser tests do the tutorial's steps and save these bytes."""
     with tempfile.TemporaryDirectory(prefix="scout-design-") as name:

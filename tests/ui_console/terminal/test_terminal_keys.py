@@ -100,6 +100,7 @@ async def test_without_a_row_enter_chooses_nothing() -> None:
         assert session.wanted == ["list"]
 
 
+@pytest.mark.thorough
 async def test_the_field_under_the_cursor_is_plotted_and_a_text_is_not() -> None:
     session = WrittenSession()
     session.listed, session.heard = [[READINGS]], readings()

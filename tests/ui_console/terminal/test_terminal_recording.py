@@ -98,6 +98,7 @@ async def test_it_is_played_and_stands_still_and_steps() -> None:
     await shown.run(pilot=at_the_keys, size=SIZE)
 
 
+@pytest.mark.thorough
 async def test_keys_and_mouse_go_to_any_time_and_the_screen_is_of_that_time() -> None:
     shown = session()
 
@@ -174,6 +175,7 @@ async def test_what_was_said_is_listed_and_one_key_is_shown_with_its_past() -> N
     await shown.run(pilot=at_the_keys, size=SIZE)
 
 
+@pytest.mark.thorough
 async def test_a_picture_follows_the_time_also_back() -> None:
     shown = session()
     frames = next(row for row in rows_of(shown) if row.schema == "Frame/1")

@@ -146,6 +146,7 @@ async def test_what_no_page_says_is_a_violation(stage: Stage, hostile: dict[str,
         assert stage.network.overhearers == []
 
 
+@pytest.mark.thorough
 async def test_thousands_of_views_of_keys_that_nobody_speaks_at_leave_one_and_then_none(stage: Stage) -> None:
     async with stage.browser() as anna:
         for number in range(1000):

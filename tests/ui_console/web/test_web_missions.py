@@ -96,6 +96,7 @@ def test_missions_that_cannot_be_served_together_are_refused(words: list[str]) -
     assert CliRunner().invoke(app, ["serve", *words]).exit_code == 2
 
 
+@pytest.mark.thorough
 @pytest.mark.processes
 @pytest.mark.timeout(120)
 @pytest.mark.parametrize(("size", "theme"), [("desktop", "light"), ("phone", "dark")])

@@ -35,6 +35,7 @@ async def wait_points(page: Any, count: int) -> None:
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("size", "theme"), [("desktop", "light"), ("phone", "dark")])
 async def test_a_key_is_found_viewed_and_plotted_and_a_closed_panel_costs_nothing(
     stage: Stage, size: str, theme: str
@@ -66,6 +67,7 @@ async def test_a_key_is_found_viewed_and_plotted_and_a_closed_panel_costs_nothin
         await wait_until(lambda: not stage.network.overhearers, "nothing is heard")
 
 
+@pytest.mark.thorough
 async def test_a_picture_is_shown_as_one_and_comes_back_with_the_connection(stage: Stage) -> None:
     async with speaker(stage), page_at(stage) as page:
         await open_list(page)

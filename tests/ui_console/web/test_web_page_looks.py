@@ -171,6 +171,7 @@ async def test_all_that_can_be_pressed_is_reached_by_tab_alone_and_seen_to_have_
         assert set(pressable) - reached == set()
 
 
+@pytest.mark.thorough
 async def test_by_keyboard_alone_a_robot_is_taken_stopped_lifted_and_released(stage: Stage) -> None:
     async with page_at(stage) as page:
         keyboard = page.keyboard

@@ -108,6 +108,7 @@ async def test_another_stop_that_comes_while_lift_is_held_is_not_lifted(stage: S
         assert stage.robots["scout1"].is_stopped
 
 
+@pytest.mark.thorough
 async def test_who_lifts_anothers_stop_reads_whose_it_is_and_that_one_is_asked(stage: Stage) -> None:
     async with page_at(stage) as page, stage.browser(LOW) as ben:
         await ben.say(do="stop_robot", robot="scout1")

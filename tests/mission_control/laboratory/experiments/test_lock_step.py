@@ -33,6 +33,7 @@ def test_another_seed_is_another_trial() -> None:
     assert run_trial(condition, 1, 2).digest != run_trial(condition, 2, 2).digest
 
 
+@pytest.mark.thorough
 @pytest.mark.processes
 def test_other_processes_come_to_the_same() -> None:
     orders = [TrialOrder(Condition(noise=0.0), 1, number) for number in range(2)]

@@ -53,6 +53,7 @@ def test_missions_are_busy() -> None:
         assert word in words, f"no mission in which anybody is told: {word}"
 
 
+@pytest.mark.thorough
 @pytest.mark.processes
 def test_a_seed_means_one_run_to_the_byte_in_every_process() -> None:
     found = set()
@@ -78,6 +79,7 @@ def test_without_chaos_nothing_is_lost_and_nobody_is_killed() -> None:
     assert not words & {"killed", "cut off", "gives up", "fails"}
 
 
+@pytest.mark.thorough
 def test_a_campaign_counts_what_it_saw(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(campaign, "BATCH", 2)
     told: list[str] = []

@@ -109,6 +109,7 @@ def test_hostile_numbers_do_not_get_past_the_decoder() -> None:
     assert passed <= {"Extend"}
 
 
+@pytest.mark.thorough
 @pytest.mark.processes
 def test_a_seed_means_one_supervised_run_to_the_byte_in_every_process() -> None:
     found = set()
