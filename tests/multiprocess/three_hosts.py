@@ -101,7 +101,8 @@ class ThreeHosts:
         began_s = time.monotonic()
         while not holds():
             if time.monotonic() > began_s + within_s:
-                pytest.fail(f"not within {within_s} s: {what}; not ready: {self.lacks()}\n{self.story()}")
+                there = f"not ready: {self.lacks()}; on the machines: {self.left()}"
+                pytest.fail(f"not within {within_s} s: {what}; {there}\n{self.story()}")
             time.sleep(SAMPLE_EACH_S)
         return time.monotonic() - began_s
 

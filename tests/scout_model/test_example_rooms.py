@@ -12,7 +12,8 @@ from scout_model.description import WorldDescription
 from scout_model.world import World
 
 PROJECT = Path(__file__).parents[2]
-MISSIONS = [PROJECT / "mission.xml", *sorted((PROJECT / "docs" / "examples").glob("*.xml"))]
+EXAMPLES = sorted((PROJECT / "docs" / "examples").glob("*.xml"))
+MISSIONS = [path for path in (PROJECT / "mission.xml", *EXAMPLES) if "<world" in path.read_text()]
 
 
 def world_of(mission: Path) -> World:

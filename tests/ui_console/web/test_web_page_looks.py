@@ -151,7 +151,18 @@ async def test_all_that_can_be_pressed_is_reached_by_tab_alone_and_seen_to_have_
         await page.evaluate("() => document.activeElement.blur()")
         name_of = "const nameOf = (one) => one.dataset.key ?? one.ariaLabel ?? (one.id || one.textContent);"
         reached, unseen = set(), set()
-        for _ in range(80):
+
+        async def not_reached() -> set[str]:
+            pressable = await page.evaluate(f"""() => {{
+              {name_of}
+              const all = [...document.querySelectorAll("button, input, select, [tabindex='0']")];
+              return all.filter((one) => one.checkVisibility() && !one.disabled).map(nameOf);
+            }}""")
+            return set(pressable) - reached
+
+        for number in range(240):  # three times around: an alarm that comes meanwhile has a button, too
+            if number >= 80 and number % 20 == 0 and not await not_reached():
+                break
             await page.keyboard.press("Tab")
             name, is_seen = await page.evaluate(f"""() => {{
               {name_of}
@@ -163,12 +174,7 @@ async def test_all_that_can_be_pressed_is_reached_by_tab_alone_and_seen_to_have_
             if not is_seen:
                 unseen.add(name)
         assert unseen == set()
-        pressable = await page.evaluate(f"""() => {{
-          {name_of}
-          const all = [...document.querySelectorAll("button, input, select, [tabindex='0']")];
-          return all.filter((one) => one.checkVisibility() && !one.disabled).map(nameOf);
-        }}""")
-        assert set(pressable) - reached == set()
+        assert await not_reached() == set()
 
 
 @pytest.mark.thorough
