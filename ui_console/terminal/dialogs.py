@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Generic, TypeVar
 
 from rich.text import Text
-from textual.app import ComposeResult
+from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen
@@ -45,6 +45,16 @@ READ_S = 0.5  # chosen: people need longer to read a line
 FIELD_REMARK = "x and X stop robots here too; ctrl+x types an x"
 
 
+def can_stop(app: App[object]) -> bool:
+    """Return whether this screen stops robots; in a recording there is nothing to stop."""
+    return bool(app.check_action("stop_all", ()))
+
+
+def field_remark(app: App[object]) -> str:
+    """Return what a person must know before typing; empty: each key is text."""
+    return FIELD_REMARK if can_stop(app) else ""
+
+
 class Dialog(ModalScreen[T]):
     """Base of all; escape closes it and changes nothing."""
 
@@ -66,13 +76,14 @@ class Dialog(ModalScreen[T]):
 
 
 class Field(Input):
-    """One line to type in; the keys of the emergency stop are never typed."""
+    """One line to type in; the keys of the emergency stop are never typed where they stop robots."""
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+x", "type_x", "type an x", show=False)]
 
     def check_consume_key(self, key: str, character: str | None) -> bool:
-        """Return whether the key is text; the keys of the emergency stop never are."""
-        return key not in STOP_KEYS and super().check_consume_key(key, character)
+        """Return whether the key is text; the keys of the emergency stop are not, where they stop robots."""
+        is_stop = key in STOP_KEYS and can_stop(self.app)
+        return not is_stop and super().check_consume_key(key, character)
 
     def action_type_x(self) -> None:
         """Type an x."""
@@ -147,7 +158,7 @@ class LineQuestion(Dialog[str]):
             field = Field(self._value, select_on_focus=True)
             field.cursor_blink = False
             yield field
-            remarks = [line for line in (self._remark, FIELD_REMARK) if line]
+            remarks = [line for line in (self._remark, field_remark(self.app)) if line]
             yield Static(Text("\n".join(remarks)), classes="remark")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
@@ -212,7 +223,7 @@ class ChoiceDialog(Dialog[T]):
             field = Field(text, select_on_focus=True)
             field.cursor_blink = False
             await box.mount(Static(Text(label)), field)
-        await box.mount(Static(Text(FIELD_REMARK), classes="remark", id="fault"))
+        await box.mount(Static(Text(field_remark(self.app)), classes="remark", id="fault"))
         self.query(Field).first().focus()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:

@@ -21,7 +21,7 @@ from backbone.spoken import counted
 from ui_console.model.key_table import KeyRow, with_words
 from ui_console.model.key_view import KeyView
 from ui_console.model.message_views import Picture
-from ui_console.terminal.dialogs import FIELD_REMARK, Dialog, Field
+from ui_console.terminal.dialogs import Dialog, Field, field_remark
 from ui_console.terminal.widgets import Video
 
 REDRAW_EACH_S = 0.3  # chosen: people read no faster
@@ -119,7 +119,8 @@ class KeyPicker(Dialog[KeyRow]):
             _return_to(table, here)
         count = counted(len(rows), "row")
         told = f"{len(shown)} of {count}" if len(shown) < len(rows) else count
-        self.query_one("#trouble", Static).update(f"{told}; {FIELD_REMARK}" if rows else "nothing was heard yet")
+        remark = "; ".join(filter(None, (told, field_remark(self.app)))) if rows else "nothing was heard yet"
+        self.query_one("#trouble", Static).update(remark)
 
     def _here(self) -> RowKey | None:
         """Return the key of the row under the cursor; None: there is no row."""

@@ -25,7 +25,7 @@ from ui_console.session.recorded_play import NOT_NOW
 from ui_console.session.verbs import Session
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.dialogs import Dialog, LineQuestion, Reading
-from ui_console.terminal.keys import Hint, help_lines
+from ui_console.terminal.keys import STOPS, Hint, help_lines
 from ui_console.terminal.recorded_keys import PLAYS, looking_keys, recorded_hints, refused_keys
 
 MARKS = {
@@ -169,8 +169,9 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
 
     # ------------------------------------------------------------------ keys that play
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Have all keys of this screen, apart from those that it shares with no recording."""
-        return True if action in {"end", "begin", "not_now"} else super().check_action(action, parameters)
+        """Have all keys of this screen, apart from those that it shares with no recording; none stops a robot."""
+        is_own = action in {"end", "begin", "not_now"}
+        return is_own or (action not in STOPS and super().check_action(action, parameters))
 
     def action_play(self) -> None:
         """Play, or stand still."""

@@ -24,6 +24,7 @@ from backbone.scheduling.views import RcView, Schedule
 from resource_pool.arc_client import Frame
 from ui_console.model.key_table import KeyRow, KeyTable
 from ui_console.session.recorded_play import NOT_NOW
+from ui_console.terminal.dialogs import Field
 from ui_console.terminal.keys import KEYS
 from ui_console.terminal.recorded_app import RecordedApp
 from ui_console.terminal.recorded_keys import PLAYS, refused_keys
@@ -215,6 +216,26 @@ async def test_a_key_that_would_command_says_why_it_does_not(key: str) -> None:
         assert [note.message for note in pilot.app._notifications] == [NOT_NOW]  # noqa: SLF001
         assert len(pilot.app.screen_stack) == 1
         await pilot.press("q")
+
+    await shown.run(pilot=at_the_keys, size=SIZE)
+
+
+@pytest.mark.parametrize("opens", ["slash", "g", "B"])
+async def test_a_field_takes_every_letter_for_nothing_can_be_stopped(opens: str) -> None:
+    shown = session()
+
+    async def at_the_keys(pilot: Pilot[Any]) -> None:
+        await arrived(shown, pilot)
+        await pilot.press(opens)
+        await pilot.pause(2.0)
+        field = pilot.app.screen.query_one(Field)
+        field.value = ""
+        await pilot.press(*"xXn")
+        await pilot.pause()
+        assert field.value == "xXn"
+        assert "stop robots" not in screen_text(pilot.app)
+        assert not pilot.app._notifications  # noqa: SLF001
+        await pilot.press("escape", "q")
 
     await shown.run(pilot=at_the_keys, size=SIZE)
 
