@@ -11,11 +11,12 @@ from collections.abc import Callable, Mapping
 from itertools import islice
 
 from backbone.bus.interface import Bus, Clock
-from backbone.command_line.watching import overhearing
+from backbone.command_line.watching import MOST_WAITING_BYTES, overhearing
 from backbone.keys import address_of
+from backbone.recording.hearing import to_overhear, unfolded
 from backbone.recording.playback import Playback
 from backbone.recording.reader import Recording, heard_now
-from backbone.recording.translation import Translated
+from backbone.recording.translation import Translated, heading_of
 from backbone.waiting import first_to_end
 from backbone.wire import Message
 from ui_console.model.key_table import PART_S, PARTS, KeyRow, KeyTable
@@ -30,15 +31,24 @@ ShowRows = Callable[[list[KeyRow]], None]
 
 
 # ---------------------------------------------------------------------- live
-async def keep_listing(bus: Bus, clock: Clock, classes: Classes, show: ShowRows) -> None:
-    """Call ``show`` each second with all keys at which something was said by now, until cancelled."""
+async def keep_listing(bus: Bus, clock: Clock, show: ShowRows) -> None:
+    """Call ``show`` each second with all keys at which something was said by now, until cancelled.
+
+    Only the begins of messages are read, so it needs no message classes.
+    """
     table = KeyTable(clock.now_s())
 
-    def heard(key: str, message: Translated, at_s: float) -> None:
-        table.add(key, message.source, message.schema, message.size_bytes, at_s)
+    def came(key: str, raw: bytes) -> None:
+        for said_at, envelope in unfolded(key, raw):
+            head = heading_of(envelope)
+            table.add(said_at, head.source, head.schema, len(envelope), clock.now_s())
 
-    async with overhearing(bus, clock, (), heard, classes):
+    subscribed = [bus.overhear(one, came, MOST_WAITING_BYTES) for one in to_overhear(())]
+    try:
         await _keep_showing(clock, lambda: show(table.rows(clock.now_s(), clock.rate)))
+    finally:
+        for one in subscribed:
+            one.close()
 
 
 async def keep_hearing(bus: Bus, clock: Clock, classes: Classes, row: KeyRow, view: KeyView) -> None:

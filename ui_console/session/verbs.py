@@ -218,7 +218,7 @@ class Session:
     async def keep_listing(self, show: Callable[[list[KeyRow]], None]) -> None:
         """Call ``show`` each second with the keys at which something is said, until cancelled."""
         console = self._ready_console()
-        await keep_listing(console.bus, console.clock, await self._known_classes(), show)
+        await keep_listing(console.bus, console.clock, show)
 
     async def keep_hearing(self, row: KeyRow, begin: Callable[[KeyView], None]) -> None:
         """Call ``begin`` with a view of a key, then show in it what is said there, until cancelled."""

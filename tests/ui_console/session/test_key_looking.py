@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import io
 from collections.abc import Coroutine
+from types import SimpleNamespace
+from typing import cast
 
+import pytest
 from small_recordings import CLASSES, MISSION, SCOUT, Said, recorded
 
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -15,10 +18,14 @@ from backbone.keys import Conversation
 from backbone.recording.playback import Playback
 from backbone.recording.reader import Recording
 from backbone.waiting import end_tasks
-from backbone.wire import schema_of
+from backbone.wire import Message, schema_of
+from ui_console.model.console import ConsoleModel
 from ui_console.model.key_table import KeyRow
 from ui_console.model.key_view import KeyView
+from ui_console.model.team import TeamModel
 from ui_console.session.key_looking import keep_hearing, keep_listing, keep_listing_recorded, keep_reading
+from ui_console.session.observer import AnyObserver
+from ui_console.session.verbs import Session
 
 LOG = KeyRow(f"{SCOUT}/log", SCOUT, schema_of(StoryEvent))
 STATUS = KeyRow(f"{SCOUT}/status", SCOUT, schema_of(ComponentState))
@@ -54,7 +61,7 @@ def test_what_is_said_live_is_listed_and_shown_only_while_somebody_looks() -> No
         assert (network.overhearers, scout.told) == ([], 0)
 
         lists: list[list[KeyRow]] = []
-        await looked(keep_listing(console, clock, CLASSES, lists.append), 8.5)
+        await looked(keep_listing(console, clock, lists.append), 8.5)
         assert lists[0] == []
         assert [row.id for row in lists[-1]] == [LOG.id, STATUS.id]
         assert all(9.0 < row.messages_per_s < 11.0 and row.mean_bytes > 10.0 for row in lists[-1])
@@ -70,6 +77,25 @@ def test_what_is_said_live_is_listed_and_shown_only_while_somebody_looks() -> No
         assert told < scout.told <= told + 21, "copies are made for one of the two looks only"
         await end_tasks(speaking)
 
+    run_virtual(scene())
+
+
+def test_the_list_imports_no_message_classes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Red before: the first list of a console imported the modules of all component types of its mission."""
+
+    async def imported(*_given: object) -> dict[str, type[Message]]:
+        raise AssertionError("message classes were imported")
+
+    async def scene() -> None:
+        network, clock = LocalNetwork(MISSION), VirtualClock()
+        scout, session = network.join(SCOUT, clock), Session(ConsoleModel("anna", "anna", TeamModel(MISSION, "")))
+        session._console = cast(AnyObserver, SimpleNamespace(bus=network.join("ui_console/anna", clock), clock=clock))  # noqa: SLF001
+        lists: list[list[KeyRow]] = []
+        asyncio.get_running_loop().call_later(0.5, scout.publish, SCOUT, Conversation.LOG, event(1))
+        await looked(session.keep_listing(lists.append), 2.5)
+        assert [row.id for row in lists[-1]] == [LOG.id]
+
+    monkeypatch.setattr("ui_console.session.verbs.mission_classes", imported)
     run_virtual(scene())
 
 
