@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import IO, Generic, Protocol, TypeVar
 
@@ -104,8 +104,8 @@ class RecordedPlay(Generic[Console]):
         self, opened: Callable[[], IO[bytes]], machine: Clock, name: str, new_console: NewConsole[Console]
     ) -> None:
         self._opened, self._machine, self._name, self._new_console = opened, machine, name, new_console
-        self.moved: Callable[[Console], None] = lambda _console: None
-        """Called with what shows the time of now, when a jump has made another one."""
+        self.moved: Callable[[Console], Awaitable[None]] | None = None
+        """Awaited with what shows the time of now, when a jump has made another one."""
         self.classes = message_classes()
         """Known message classes by schema."""
         self._recording = Recording(opened())
@@ -183,7 +183,8 @@ class RecordedPlay(Generic[Console]):
                 await performance.begin()
                 if not self._is_elsewhere.is_set():
                     self._performance = performance
-                    self.moved(performance.console)
+                    if self.moved is not None:
+                        await self.moved(performance.console)
 
     def _new_performance(self) -> Performance[Console]:
         playback, kind = self.playback, "ui_console.session.observer:Observer"

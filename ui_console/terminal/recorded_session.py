@@ -69,7 +69,7 @@ class RecordedSession(Session):
         self._user = user
         self.play = RecordedPlay(opened, machine, f"console-{os.getpid()}", self._new_console)
         super().__init__(self.play.console.model)
-        self._moved(self.play.console)
+        self._console = self.play.console.observer
         self.play.moved = self._moved
         playback = self.play.playback
         self.time_line = TimeLine(playback.begin_s, playback.end_s, self.play.markers)
@@ -144,7 +144,7 @@ class RecordedSession(Session):
         )
         return HearingConsole(observer, model)
 
-    def _moved(self, console: HearingConsole) -> None:
+    async def _moved(self, console: HearingConsole) -> None:
         self.model, self._console = console.model, console.observer
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO
 
 from backbone.bus.clock import MissionClock
-from backbone.command_line.unusable_file import FileUnusable
 from backbone.launcher.endings import ExitCode
 from ui_console.session.joining import end_server_on_signals
+from ui_console.session.recorded_play import opener
 from ui_console.web.login import Authenticator, TokenRights
 from ui_console.web.page_files import PageFiles
 from ui_console.web.page_server import PageServer, port_of
@@ -30,18 +29,10 @@ async def serve_recording(path: Path, rights: Mapping[str, TokenRights], options
     Raises:
         Refusal: ``CannotListen``, ``NoCertificate``, ``FileUnusable``, ``NoRecording`` or ``OtherForm``.
     """
-    encryption = options.encryption
-
-    def opened() -> IO[bytes]:
-        try:
-            return path.open("rb")
-        except OSError as error:
-            raise FileUnusable(f"{path} cannot be read: {error.strerror}") from error
-
-    room = RecordingRoom(opened, MissionClock.started_now())
+    room = RecordingRoom(opener(path), MissionClock.started_now())
     interrupted = end_server_on_signals(room.end)
     server: PageServer[Viewer, Intent | Playing] = PageServer(room, Authenticator(rights), PageFiles(), understand)
-    async with server.open(options.host, options.port, encryption) as listening:
+    async with server.open(options.host, options.port, options.encryption) as listening:
         options.opened(port_of(listening), None, rights)
         await room.run()
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE

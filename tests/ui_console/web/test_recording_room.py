@@ -25,9 +25,12 @@ from backbone.scheduling.requests import Holder
 from backbone.scheduling.views import RcView, Schedule
 from backbone.wire import Message, schema_of
 from resource_pool.arc_client import Frame
+from ui_console.session.recorded_play import NOT_NOW
 from ui_console.web import playing, protocol
+from ui_console.web.hub import WebHub
 from ui_console.web.login import Welcome
-from ui_console.web.recording_room import NOT_NOW, RecordingRoom, Viewer
+from ui_console.web.operator import Operator
+from ui_console.web.recording_room import RecordingRoom, Viewer
 
 ARC = "watch-capture"
 FIRST_S, LAST_S = 1.0, 60.0
@@ -136,7 +139,7 @@ def test_a_time_shows_the_same_however_one_got_there(times: list[float]):
         for at_s in times:
             await page.does(playing.ShowTime(at_s))
             assert await page.round() == round_at(at_s)
-            assert room.playback.now_s() == at_s
+            assert room.play.playback.now_s() == at_s
             assert page.view["playback"]["at_s"] == pytest.approx(at_s, abs=1e-3)
 
     on_a_page(scene)
@@ -153,12 +156,12 @@ def test_it_is_played_paused_and_stops_at_the_end():
         await page.does(playing.PlayOn(2.0))
         await page.looks(10.0)
         await page.does(playing.StandStill())
-        assert await page.round() == round_at(room.playback.now_s()) == "round 3"
+        assert await page.round() == round_at(room.play.playback.now_s()) == "round 3"
         await page.does(playing.PlayOn(10.0))
         view = await page.looks(10.0)
         assert (view["playback"]["at_s"], view["playback"]["is_playing"]) == (LAST_S, False)
         await page.does(playing.PlayOn(10.0))
-        assert room.playback.now_s() == FIRST_S, "from the begin again"
+        assert room.play.playback.now_s() == FIRST_S, "from the begin again"
 
     on_a_page(scene)
 
@@ -168,12 +171,12 @@ def test_a_step_goes_to_the_next_picture_or_event():
         await page.does(playing.ShowTime(12.5))
         await page.looks()
         await page.does(playing.StepOn())
-        assert room.playback.now_s() == 17.0
+        assert room.play.playback.now_s() == 17.0
         assert await page.round() == "round 3"
         await page.does(playing.ShowTime(LAST_S))
         await page.looks()
         await page.does(playing.StepOn())
-        assert room.playback.now_s() == LAST_S
+        assert room.play.playback.now_s() == LAST_S
 
     on_a_page(scene)
 
@@ -241,5 +244,22 @@ def test_pages_see_the_same_time_and_one_may_leave():
         await page.does(playing.ShowTime(7.0))
         assert await page.round() == "round 1"
         assert len(room.clients) == 1
+
+    on_a_page(scene)
+
+
+def test_a_page_may_leave_while_all_go_to_another_time(monkeypatch: pytest.MonkeyPatch):
+    async def scene(room: RecordingRoom, page: Page) -> None:
+        others, leave = [Page(room), Page(room)], WebHub.leave
+
+        async def another_leaves(hub: WebHub, operator: Operator, reason: str) -> None:
+            if others:
+                await room.leave(others.pop().viewer, "has gone away")
+            await leave(hub, operator, reason)
+
+        monkeypatch.setattr(WebHub, "leave", another_leaves)
+        await page.does(playing.ShowTime(47.0))
+        assert await page.round() == "round 9"
+        assert (len(room.clients), len(room.play.console.clients)) == (1, 1)
 
     on_a_page(scene)
