@@ -50,7 +50,6 @@ class _Counts:
     messages: int = 0
     size_bytes: int = 0
     heard_s: float = -1.0
-    said: tuple[float, int] | None = None
     parts: deque[tuple[int, int, int]] = field(default_factory=lambda: deque(maxlen=PARTS))
 
 
@@ -68,9 +67,7 @@ class KeyTable:
             (short_key(key), source, schema): _Counts(since_s) for key, source, schema in list(known)[:MOST_KEYS]
         }
 
-    def add(
-        self, key: str, source: str, schema: str, size_bytes: int, at_s: float, said: tuple[float, int] | None = None
-    ) -> None:
+    def add(self, key: str, source: str, schema: str, size_bytes: int, at_s: float) -> None:
         """Count one message.
 
         Args:
@@ -79,21 +76,17 @@ class KeyTable:
             schema: Of the message.
             size_bytes: Its length.
             at_s: Mission time when it was heard.
-            said: Mission time of its sending, and number among those of its sender: a player says the last message of
-                a row again, which is not counted; None: it is new.
         """
         name = (short_key(key), source, schema)
         counts = self._rows.get(name)
         if counts is None:
             self._make_room()
             counts = self._rows[name] = _Counts(self._since_s)
-        if said is not None and said == counts.said:
-            return
         number = int(at_s / PART_S)
         _last, messages, size = counts.parts.pop() if _is_last(counts, number) else (number, 0, 0)
         counts.parts.append((number, messages + 1, size + size_bytes))
         counts.messages, counts.size_bytes = counts.messages + 1, counts.size_bytes + size_bytes
-        counts.heard_s, counts.said = at_s, said
+        counts.heard_s = at_s
 
     def rows(self, now_s: float, rate: float = 1.0) -> list[KeyRow]:
         """Return all rows in the order of keys.

@@ -7,7 +7,7 @@ recorded is read from the recording, so it has its past, too.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from itertools import islice
 
 from backbone.bus.interface import Bus, Clock
@@ -15,7 +15,7 @@ from backbone.command_line.watching import MOST_WAITING_BYTES, overhearing
 from backbone.keys import address_of
 from backbone.recording.hearing import to_overhear, unfolded
 from backbone.recording.playback import Playback
-from backbone.recording.reader import Recording, heard_now
+from backbone.recording.reader import Recorded, Recording, heard_now
 from backbone.recording.translation import Translated, heading_of
 from backbone.waiting import first_to_end
 from backbone.wire import Message
@@ -90,16 +90,30 @@ async def keep_reading(recording: Recording, playback: Playback, row: KeyRow, vi
     Raises:
         NoRecording: The recording is damaged from here on.
     """
-    since_s = max(playback.begin_s, playback.now_s() - SPAN_S)
-    before = recording.messages((row.key,), until_s=since_s, source=row.source, newest_first=True)
-    of_row = (one for one in islice(before, MOST_BEFORE) if one.schema == row.schema)
+    async for said, _size_bytes in said_at(recording, playback, row, SPAN_S):
+        view.take(said.body, said.at_s, said.sequence)
+    await asyncio.Event().wait()
+
+
+async def said_at(
+    recording: Recording, playback: Playback, row: KeyRow, past_s: float = 0.0
+) -> AsyncIterator[tuple[Recorded, int]]:
+    """Yield the messages of one row, with their lengths, each not before its time.
+
+    The first is the last one before ``past_s`` seconds ago.
+
+    Raises:
+        NoRecording: The recording is damaged from here on.
+    """
+    since_s = max(playback.begin_s, playback.now_s() - past_s)
+    before = recording.records((row.key,), until_s=since_s, source=row.source, newest_first=True)
+    of_row = ((one, len(record.data)) for *_, record, one in islice(before, MOST_BEFORE) if one.schema == row.schema)
     if (last := await asyncio.to_thread(next, of_row, None)) is not None:
-        view.take(last.body, last.at_s, last.sequence)
-    for one in recording.messages((row.key,), since_s, source=row.source):
+        yield last
+    for *_, record, one in recording.records((row.key,), since_s, source=row.source):
         await playback.sleep_until_s(one.at_s)
         if one.schema == row.schema:
-            view.take(one.body, one.at_s, one.sequence)
-    await asyncio.Event().wait()
+            yield one, len(record.data)
 
 
 async def _keep_showing(clock: Clock, show: Callable[[], None]) -> None:

@@ -32,6 +32,8 @@ from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.observer import AnyObserver, Observer
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.web.floor import FloorSection
+from ui_console.web.key_ears import BusEar
+from ui_console.web.key_sight import NO_MESSAGES
 from ui_console.web.key_watch import KeyWatch
 from ui_console.web.login import ProtocolViolation, ViolationKind, Welcome
 from ui_console.web.operator import Operator
@@ -61,7 +63,6 @@ class WebHub:
         join: Opens a bus for one more component of this process.
         kind: Component type of the ARCs that operators claim; empty: one for the robot, with pictures.
         away_after_s: A console gives its robot back after so long without a touch of its operator; 0: never.
-        is_played: True: the mission is a recording.
     """
 
     def __init__(
@@ -73,7 +74,6 @@ class WebHub:
         *,
         kind: str = "",
         away_after_s: float = 0.0,
-        is_played: bool = False,
     ) -> None:
         self.clock = clock
         self.team = TeamModel(launch.mission, LIFT_REMEDY)
@@ -88,6 +88,8 @@ class WebHub:
             has_map=True,
         )
         self.mission = launch.mission
+        self.hidden = NO_MESSAGES
+        """Conversations that pages do not view."""
         self.served = [launch.mission]
         """Names of all missions of the same server."""
         self.clients: dict[Operator, None] = {}
@@ -100,7 +102,7 @@ class WebHub:
         self._numbers: dict[str, int] = {}
         self.sights = Sights(bus, clock, lambda: self.clients, self.observer.start_task)
         """The debug views that its operators look at."""
-        self.keys = KeyWatch(bus, clock, lambda: self.clients, self.observer.start_task, is_played=is_played)
+        self.keys = KeyWatch(BusEar(bus, clock), clock, lambda: self.clients, self.observer.start_task)
         """The messages on the bus that its operators look at."""
         self._consoles = itertools.count(1)
         self._has_operators = asyncio.Event()

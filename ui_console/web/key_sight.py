@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from typing import NamedTuple
 
 from backbone.errors import Refusal
@@ -12,7 +13,10 @@ from ui_console.web.protocol import ListKeys, ViewKey
 
 LIST_STREAM = "/keys"
 """Streams of a page's outbox beside those of robots, whose names have no slash."""
-_HIDDEN = (Conversation.ALIVE, Conversation.TOLD)  # tokens are no messages, and copies are shown at their own keys
+COPIES = frozenset({Conversation.TOLD})
+"""Copies are shown at the keys of what they copy."""
+NO_MESSAGES = COPIES | {Conversation.ALIVE}
+"""Tokens of a mission that is up are no messages; a recording has one for each rise and fall."""
 
 
 class NoSuchKey(Refusal):
@@ -64,8 +68,12 @@ class KeySight(NamedTuple):
         listed = {LIST_STREAM} if self.is_listed else set[str]()
         return frozenset(listed | ({self.fields_stream, self.picture_stream} if self.key else set()))
 
-    def after(self, intent: ListKeys | ViewKey) -> KeySight:
+    def after(self, intent: ListKeys | ViewKey, hidden: Set[Conversation] = NO_MESSAGES) -> KeySight:
         """Return what the page looks at then.
+
+        Args:
+            intent: The page's.
+            hidden: Conversations that it cannot view.
 
         Raises:
             NoSuchKey: No message can be sent at that key.
@@ -75,30 +83,29 @@ class KeySight(NamedTuple):
                 return self._replace(is_listed=is_open, words=words, order=order)
             case ViewKey(number, key, source, schema):
                 if key:
-                    conversation_of(key)
+                    conversation_of(key, hidden)
                 return self._replace(number=number, key=key, source=source, schema=schema)
 
 
-def conversation_of(key: str) -> Conversation:
-    """Return the conversation of a key.
+def conversation_of(key: str, hidden: Set[Conversation] = NO_MESSAGES) -> Conversation:
+    """Return the conversation of a key, which is none of the hidden ones.
 
     Raises:
         NoSuchKey: It has none that can be heard.
     """
-    known = {one.value: one for one in Conversation if one not in _HIDDEN}
+    known = {one.value: one for one in Conversation if one not in hidden}
     address, _, name = key.rpartition("/")
     if name not in known or "/" not in address:
         raise NoSuchKey(f"no message is sent at {key}{did_you_mean(name, known)}")
     return known[name]
 
 
-def where_heard(key: str, source: str, *, is_played: bool) -> tuple[Conversation, str]:
+def where_heard(key: str, source: str) -> tuple[Conversation, str]:
     """Return which conversation to overhear for a key, and of whom, so that no other component makes copies.
 
     Args:
         key: Without ``scout/<mission>/``.
         source: Sender of the messages.
-        is_played: True: a player says them, so that no sender can be delayed.
 
     Raises:
         NoSuchKey: No message can be sent at that key.
@@ -106,6 +113,6 @@ def where_heard(key: str, source: str, *, is_played: bool) -> tuple[Conversation
     address, conversation = key.rpartition("/")[0], conversation_of(key)
     if conversation is Conversation.ASK:
         return Conversation.TOLD, address  # the one who answers copies questions too
-    if conversation in NEVER_DROPPED and not is_played:
+    if conversation in NEVER_DROPPED:
         return Conversation.TOLD, source or address
     return conversation, address

@@ -12,6 +12,7 @@ import msgspec
 
 from backbone.bus.interface import Clock
 from backbone.errors import LinkError, Refusal, code_of
+from backbone.keys import Conversation
 from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
@@ -59,6 +60,7 @@ class OperatorServices(Protocol):
     observer: AnyObserver
     team: TeamModel
     clock: Clock
+    hidden: frozenset[Conversation]
 
     async def new_console(self, operator: Operator, robot: str, orders: Sequence[Order] = ()) -> Teleoperation:
         """Return a console of this operator that claims the robot, or gives the orders, as soon as it runs."""
@@ -268,7 +270,7 @@ class Operator:
 
     def _watch_keys(self, intent: protocol.ListKeys | protocol.ViewKey) -> None:
         try:
-            self.key_sight = self.key_sight.after(intent)
+            self.key_sight = self.key_sight.after(intent, self._services.hidden)
         except NoSuchKey as refusal:
             self._answer({"refused": f"{refusal.detail}. {refusal.remedy}"})
             return

@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import IO
 
 import msgspec
@@ -16,10 +17,14 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.launch import Launch
 from backbone.recording.playback import Playback
+from backbone.recording.reader import Recording
 from backbone.waiting import first_to_end
 from ui_console.model.playback import PlaybackView
 from ui_console.session.recorded_play import NOT_NOW, RecordedPlay
 from ui_console.web.hub import WebHub
+from ui_console.web.key_ears import RecordingEar
+from ui_console.web.key_sight import COPIES
+from ui_console.web.key_watch import KeyWatch
 from ui_console.web.login import ProtocolViolation, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
@@ -30,7 +35,25 @@ TOLD_EVERY_S = 0.1  # chosen: the slider moves smoothly; machine seconds
 
 
 class RecordedHub(WebHub):
-    """A hub that hears a recording from one time on."""
+    """A hub that hears a recording from one time on.
+
+    Args:
+        launch: See ``WebHub``.
+        network: On which the recording is played.
+        playback: Its time.
+        reopened: Opens the recording once more.
+    """
+
+    def __init__(
+        self, launch: Launch, network: LocalNetwork, playback: Playback, reopened: Callable[[], Recording]
+    ) -> None:
+        async def join(launch: Launch) -> Bus:
+            return network.join(launch.address, playback)
+
+        super().__init__(launch, network.join(launch.address, playback), playback, join)
+        ear = RecordingEar(reopened, playback, self.observer.start_task)
+        self.keys = KeyWatch(ear, playback, lambda: self.clients, self.observer.start_task)
+        self.hidden = COPIES
 
     async def run(self) -> None:
         """Hear it, and keep the pages fresh; until cancelled.
@@ -86,7 +109,8 @@ class RecordingRoom:
 
     def __init__(self, opened: Callable[[], IO[bytes]], machine: Clock) -> None:
         self._machine = machine
-        self.play = RecordedPlay(opened, machine, f"web-{os.getpid()}", _new_hub)
+        new_hub = partial(RecordedHub, reopened=lambda: Recording(opened()))
+        self.play: RecordedPlay[RecordedHub] = RecordedPlay(opened, machine, f"web-{os.getpid()}", new_hub)
         self.play.moved = self._take_along
         self._hub = self.play.console
         self._markers = msgspec.json.encode(self.play.markers)
@@ -170,10 +194,3 @@ class RecordingRoom:
         for viewer in viewers:
             viewer.outbox.put_section("playback", body)
             viewer.news.set()
-
-
-def _new_hub(launch: Launch, network: LocalNetwork, playback: Playback) -> RecordedHub:
-    async def join(launch: Launch) -> Bus:
-        return network.join(launch.address, playback)
-
-    return RecordedHub(launch, network.join(launch.address, playback), playback, join, is_played=True)

@@ -64,15 +64,6 @@ def test_a_mission_ten_times_as_fast_says_ten_times_as_much_in_a_second_of_the_m
     assert table.rows(4.0, 10.0)[0].messages_per_s == pytest.approx(10 * table.rows(4.0)[0].messages_per_s)
 
 
-def test_a_message_that_a_player_says_again_is_not_counted_again() -> None:
-    table = KeyTable(0.0)
-    for at_s in (1.0, 2.0, 3.0):
-        table.add(KEY, SOURCE, SCHEMA, 10, at_s, said=(1.0, 7))
-    assert table.rows(3.0)[0].heard_s == 1.0
-    table.add(KEY, SOURCE, SCHEMA, 10, 4.0, said=(4.0, 8))
-    assert table.rows(4.0)[0].heard_s == 4.0
-
-
 def test_a_flood_of_keys_pushes_out_those_that_were_silent_longest() -> None:
     table = KeyTable(0.0, [("scout/night/never", "", "")])
     for number in range(MOST_KEYS + 10):

@@ -18,9 +18,10 @@ from small_recordings import SCOUT, Said, recorded
 
 from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.component.messages import ComponentState, LifeState, LogLevel, StoryEvent
+from backbone.component.messages import AskState, ComponentState, LifeState, LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.recording.presence import Presence
+from backbone.recording.reader import Recording
 from backbone.scheduling.requests import Holder
 from backbone.scheduling.views import RcView, Schedule
 from backbone.wire import Message, schema_of
@@ -98,7 +99,7 @@ class Page:
                     stream = message[1 : 1 + message[0]].decode()
                     number = int.from_bytes(message[1 + message[0] : 5 + message[0]], "big")
                     await self.does(protocol.Drawn(stream, number))
-                    if stream.startswith("/"):
+                    if stream.startswith(("/keys", "/fields")):
                         self.told[stream] = json.loads(message[13 + message[0] :])
                     else:
                         self.pictures += 1
@@ -223,6 +224,35 @@ def test_what_was_said_is_listed_and_viewed_at_any_time():
             assert fields["feedback"] == round_at(at_s)
 
     on_a_page(scene)
+
+
+def test_all_keys_of_the_recording_are_listed_and_viewed_also_those_that_say_nothing_now():
+    """Red before: tokens and questions were not listed, nor what said nothing since the page looked."""
+    anna = "ui_console/anna"
+    file = recorded([*a_minute(), Said(LAST_S, SCOUT, Conversation.ASK, AskState(), anna)]).getvalue()
+    held = Recording(io.BytesIO(file)).contents().counts
+    rows = {(one.key.split("/", 2)[2], one.source, one.schema) for one in held}
+
+    async def scene(_room: RecordingRoom, page: Page) -> None:
+        await page.does(playing.ShowTime(38.0))
+        await page.does(protocol.ListKeys(True))
+        await page.looks()
+        listed = page.told["/keys"]["rows"]
+        assert {(row["key"], row["source"], row["schema"]) for row in listed} == rows
+        rates = {row["key"]: row["messages_per_s"] for row in listed}
+        assert [0.1 < rates[f"{SCOUT}/{one}"] < 0.5 for one in ("status", "log", "ask")] == [True, True, False]
+        await page.does(protocol.ListKeys(False))
+        for number, (key, source, schema) in enumerate(sorted(rows)):
+            await page.does(protocol.ViewKey(number, key, source, schema))
+            await page.looks(0.5)
+            assert page.told.get(f"/fields/{number}", {}).get("rows") or key.endswith("/ask"), key
+        await page.does(playing.ShowTime(LAST_S))
+        await page.does(protocol.ViewKey(99, f"{SCOUT}/ask", anna, schema_of(AskState)))
+        await page.looks()
+        assert page.told["/fields/99"]["stamp_s"] == LAST_S
+        assert not page.answers
+
+    on_a_page(scene, file)
 
 
 def test_what_was_so_can_be_asked():

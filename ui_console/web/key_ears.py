@@ -1,0 +1,191 @@
+"""What hears messages for pages: on the bus of a mission that is up, or in a recording.
+
+Rules of this file:
+
+* On a bus, the list overhears every conversation, and reads only the begins of messages. A view overhears one
+  conversation of one component.
+* A recording is read from its file: no bus has its past, its questions, and its keys that say nothing now.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine, Sequence, Set
+from functools import partial
+
+from backbone.bus.interface import Bus, Clock
+from backbone.command_line.message_lines import short_key
+from backbone.command_line.watching import mission_classes
+from backbone.errors import Refusal
+from backbone.keys import ROOT
+from backbone.recording.hearing import to_overhear, unfolded
+from backbone.recording.known_messages import message_classes
+from backbone.recording.playback import Playback
+from backbone.recording.reader import Recorded, Recording, heard_now
+from backbone.recording.translation import Translator, heading_of
+from backbone.wire import Message
+from ui_console.model.key_table import KeyRow, KeyTable
+from ui_console.session.key_looking import ShowRows, keep_listing_recorded, said_at
+from ui_console.web.key_sight import where_heard
+from ui_console.web.key_watch import Newest
+
+log = logging.getLogger(__name__)
+
+MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: the pictures of a second of four robots
+ASKED_EVERY_S = 10.0  # chosen: a page that asks for messages that nobody knows costs the mission one question; machine
+
+StartTask = Callable[[Coroutine[object, None, None], str], asyncio.Task[None]]
+
+
+# ---------------------------------------------------------------------- live
+class BusEar:
+    """Hears on a bus; see ``KeyEar``.
+
+    Args:
+        bus: Of the server.
+        clock: The mission's.
+    """
+
+    def __init__(self, bus: Bus, clock: Clock) -> None:
+        self._bus, self._clock = bus, clock
+        self._known: list[tuple[str, str, str]] = []  # rows of the last list, so that the next one has them at once
+        self._schemas = frozenset[str]()
+        self._translator: Translator  # since ``know``
+        self._asked_s = -ASKED_EVERY_S
+
+    async def know(self, schemas: Set[str]) -> None:
+        """Know the classes of these messages: at first those of the installed packages."""
+        if not self._schemas:
+            self._know(await asyncio.to_thread(message_classes))
+        now_s = asyncio.get_running_loop().time()
+        if schemas - self._schemas and now_s >= self._asked_s + ASKED_EVERY_S:
+            self._asked_s = now_s
+            self._know(await mission_classes(self._bus, log.info))
+
+    def count(self) -> HeardKeys:
+        """Count what is said from now on."""
+        return HeardKeys(self._bus, self._clock, self._known)
+
+    def hear(self, name: tuple[str, str, str], came: Callable[[Newest], None]) -> Callable[[], object]:
+        """Overhear the conversation of a key."""
+
+        def said(envelope: bytes) -> tuple[Recorded, int]:
+            now_s = self._clock.now_s()
+            return heard_now(name[0], self._translator.translate(envelope, now_s), now_s), len(envelope)
+
+        def overheard(key: str, raw: bytes) -> None:
+            for at, envelope in unfolded(key, raw):
+                head = heading_of(envelope)
+                if (short_key(at), head.source, head.schema) == name:
+                    came(partial(said, envelope))
+
+        conversation, of = where_heard(name[0], name[1])
+        return self._bus.overhear(conversation, overheard, MOST_WAITING_BYTES, of).close
+
+    def _know(self, classes: dict[str, type[Message]]) -> None:
+        self._schemas, self._translator = frozenset(classes), Translator(classes)
+
+
+class HeardKeys:
+    """Counts what is overheard; see ``Listing``.
+
+    Args:
+        bus: The bus.
+        clock: The mission's.
+        known: Rows that are listed at once; when it is closed, all that it has then.
+    """
+
+    def __init__(self, bus: Bus, clock: Clock, known: list[tuple[str, str, str]]) -> None:
+        self._clock, self._known = clock, known
+        self._table = KeyTable(
+            clock.now_s(), [(f"{ROOT}/{bus.mission}/{key}", source, schema) for key, source, schema in known]
+        )
+        self._overheard = [bus.overhear(one, self._count, MOST_WAITING_BYTES) for one in to_overhear(())]
+
+    @property
+    def dropped(self) -> int:
+        """Number of messages that came too fast to be counted."""
+        return sum(one.dropped for one in self._overheard)
+
+    def rows(self) -> Sequence[KeyRow]:
+        """Return all keys with their rates."""
+        return self._table.rows(self._clock.now_s(), self._clock.rate)
+
+    def close(self) -> None:
+        """Overhear nothing more."""
+        for each in self._overheard:
+            each.close()
+        self._known[:] = [row.id for row in self.rows()]
+
+    def _count(self, key: str, raw: bytes) -> None:
+        at_s = self._clock.now_s()
+        for at, envelope in unfolded(key, raw):
+            head = heading_of(envelope)
+            self._table.add(at, head.source, head.schema, len(envelope), at_s)
+
+
+# ---------------------------------------------------------------------- recorded
+class RecordingEar:
+    """Reads a recording at the time that is shown; see ``KeyEar``.
+
+    Args:
+        reopened: Opens the recording once more.
+        playback: Its time.
+        start_task: Runs a coroutine until the server ends.
+    """
+
+    def __init__(self, reopened: Callable[[], Recording], playback: Playback, start_task: StartTask) -> None:
+        self._reopened, self._playback, self._start_task = reopened, playback, start_task
+
+    async def know(self, schemas: Set[str]) -> None:
+        """Do nothing: a recording has the names of fields."""
+
+    def count(self) -> RecordedKeys:
+        """Count what was said at the time that is shown."""
+        return RecordedKeys(
+            lambda show: self._read(lambda recording: keep_listing_recorded(recording, self._playback, show))
+        )
+
+    def hear(self, name: tuple[str, str, str], came: Callable[[Newest], None]) -> Callable[[], object]:
+        """Read the last message until the time that is shown, and those that follow as that passes."""
+
+        async def follow(recording: Recording) -> None:
+            async for said in said_at(recording, self._playback, KeyRow(*name)):
+                came(partial(tuple[Recorded, int], said))
+
+        return self._read(follow)
+
+    def _read(self, read: Callable[[Recording], Coroutine[object, None, None]]) -> Callable[[], object]:
+        async def reading() -> None:
+            try:
+                await read(await asyncio.to_thread(self._reopened))
+            except Refusal as refusal:
+                log.warning("keys of the recording are shown no more: %s", refusal)
+
+        return self._start_task(reading(), "read the recording").cancel
+
+
+class RecordedKeys:
+    """Rows that are read; see ``Listing``.
+
+    Args:
+        begin: Begins to call what it gets with the rows; returns what ends that.
+    """
+
+    dropped = 0
+
+    def __init__(self, begin: Callable[[ShowRows], Callable[[], object]]) -> None:
+        self._rows: Sequence[KeyRow] | None = None
+        self._end = begin(self._show)
+
+    def rows(self) -> Sequence[KeyRow] | None:
+        """Return all keys of the recording; None: it is not open yet."""
+        return self._rows
+
+    def close(self) -> None:
+        """Read no more."""
+        self._end()
+
+    def _show(self, rows: Sequence[KeyRow]) -> None:
+        self._rows = rows
