@@ -11,8 +11,8 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from itertools import islice
 
 from backbone.bus.interface import Bus, Clock
-from backbone.command_line.watching import MOST_WAITING_BYTES, overhearing
-from backbone.keys import address_of
+from backbone.command_line.watching import overhearing
+from backbone.keys import ROOT, address_of
 from backbone.recording.hearing import to_overhear, unfolded
 from backbone.recording.playback import Playback
 from backbone.recording.reader import Recorded, Recording, heard_now
@@ -25,30 +25,58 @@ from ui_console.model.series import SPAN_S
 
 LIST_EACH_S = 1.0  # chosen: as ``scout-backbone top``; seconds of the machine
 MOST_BEFORE = 500  # chosen: read within a second; what was said before is of another schema then
+MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: the pictures of a second of four robots
 
 Classes = Mapping[str, type[Message]]
 ShowRows = Callable[[list[KeyRow]], None]
 
 
 # ---------------------------------------------------------------------- live
-async def keep_listing(bus: Bus, clock: Clock, show: ShowRows) -> None:
-    """Call ``show`` each second with all keys at which something was said by now, until cancelled.
+class HeardKeys:
+    """Counts what is overheard, by the begins of messages alone, so it needs no message classes.
 
-    Only the begins of messages are read, so it needs no message classes.
+    Args:
+        bus: The bus.
+        clock: The mission's.
+        known: Rows that are listed at once; when it is closed, all that it has then.
     """
-    table = KeyTable(clock.now_s())
 
-    def came(key: str, raw: bytes) -> None:
-        for said_at, envelope in unfolded(key, raw):
+    def __init__(self, bus: Bus, clock: Clock, known: list[tuple[str, str, str]]) -> None:
+        self._clock, self._known = clock, known
+        self._table = KeyTable(
+            clock.now_s(), [(f"{ROOT}/{bus.mission}/{key}", source, schema) for key, source, schema in known]
+        )
+        self._overheard = [bus.overhear(one, self._count, MOST_WAITING_BYTES) for one in to_overhear(())]
+
+    @property
+    def dropped(self) -> int:
+        """Number of messages that came too fast to be counted."""
+        return sum(one.dropped for one in self._overheard)
+
+    def rows(self) -> list[KeyRow]:
+        """Return all keys with their rates."""
+        return self._table.rows(self._clock.now_s(), self._clock.rate)
+
+    def close(self) -> None:
+        """Overhear nothing more."""
+        for each in self._overheard:
+            each.close()
+        self._known[:] = [row.id for row in self.rows()]
+
+    def _count(self, key: str, raw: bytes) -> None:
+        at_s = self._clock.now_s()
+        for at, envelope in unfolded(key, raw):
             head = heading_of(envelope)
-            table.add(said_at, head.source, head.schema, len(envelope), clock.now_s())
+            self._table.add(at, head.source, head.schema, len(envelope), at_s)
 
-    subscribed = [bus.overhear(one, came, MOST_WAITING_BYTES) for one in to_overhear(())]
+
+async def keep_listing(bus: Bus, clock: Clock, show: ShowRows) -> None:
+    """Call ``show`` each second with all keys at which something was said by now, until cancelled."""
+    keys = HeardKeys(bus, clock, [])
     try:
-        await _keep_showing(clock, lambda: show(table.rows(clock.now_s(), clock.rate)))
+        await _keep_showing(clock, lambda: show(keys.rows()))
     finally:
-        for one in subscribed:
-            one.close()
+        keys.close()
 
 
 async def keep_hearing(bus: Bus, clock: Clock, classes: Classes, row: KeyRow, view: KeyView) -> None:

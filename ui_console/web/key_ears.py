@@ -18,21 +18,19 @@ from backbone.bus.interface import Bus, Clock
 from backbone.command_line.message_lines import short_key
 from backbone.command_line.watching import mission_classes
 from backbone.errors import Refusal
-from backbone.keys import ROOT
-from backbone.recording.hearing import to_overhear, unfolded
+from backbone.recording.hearing import unfolded
 from backbone.recording.known_messages import message_classes
 from backbone.recording.playback import Playback
 from backbone.recording.reader import Recorded, Recording, heard_now
 from backbone.recording.translation import Translator, heading_of
 from backbone.wire import Message
-from ui_console.model.key_table import KeyRow, KeyTable
-from ui_console.session.key_looking import ShowRows, keep_listing_recorded, said_at
+from ui_console.model.key_table import KeyRow
+from ui_console.session.key_looking import MOST_WAITING_BYTES, HeardKeys, ShowRows, keep_listing_recorded, said_at
 from ui_console.web.key_sight import where_heard
 from ui_console.web.key_watch import Newest
 
 log = logging.getLogger(__name__)
 
-MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: the pictures of a second of four robots
 ASKED_EVERY_S = 10.0  # chosen: a page that asks for messages that nobody knows costs the mission one question; machine
 
 StartTask = Callable[[Coroutine[object, None, None], str], asyncio.Task[None]]
@@ -85,44 +83,6 @@ class BusEar:
 
     def _know(self, classes: dict[str, type[Message]]) -> None:
         self._schemas, self._translator = frozenset(classes), Translator(classes)
-
-
-class HeardKeys:
-    """Counts what is overheard; see ``Listing``.
-
-    Args:
-        bus: The bus.
-        clock: The mission's.
-        known: Rows that are listed at once; when it is closed, all that it has then.
-    """
-
-    def __init__(self, bus: Bus, clock: Clock, known: list[tuple[str, str, str]]) -> None:
-        self._clock, self._known = clock, known
-        self._table = KeyTable(
-            clock.now_s(), [(f"{ROOT}/{bus.mission}/{key}", source, schema) for key, source, schema in known]
-        )
-        self._overheard = [bus.overhear(one, self._count, MOST_WAITING_BYTES) for one in to_overhear(())]
-
-    @property
-    def dropped(self) -> int:
-        """Number of messages that came too fast to be counted."""
-        return sum(one.dropped for one in self._overheard)
-
-    def rows(self) -> Sequence[KeyRow]:
-        """Return all keys with their rates."""
-        return self._table.rows(self._clock.now_s(), self._clock.rate)
-
-    def close(self) -> None:
-        """Overhear nothing more."""
-        for each in self._overheard:
-            each.close()
-        self._known[:] = [row.id for row in self.rows()]
-
-    def _count(self, key: str, raw: bytes) -> None:
-        at_s = self._clock.now_s()
-        for at, envelope in unfolded(key, raw):
-            head = heading_of(envelope)
-            self._table.add(at, head.source, head.schema, len(envelope), at_s)
 
 
 # ---------------------------------------------------------------------- recorded
