@@ -11,7 +11,7 @@ from backbone.command_line.unusable_file import FileUnusable
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.recording.comparison import Difference, KeyComparison, Named, compared
-from backbone.recording.detection import Detection, Mark, detected, read_marks, sightings, worse
+from backbone.recording.detection import DetectionRates, Mark, detected, read_marks, sightings, worse
 from backbone.spoken import counted
 
 LONGEST_VALUE = 60  # chosen: two of them fit a line of a wide terminal
@@ -49,14 +49,14 @@ def _marks(path: Path) -> list[Mark]:
         raise FileUnusable(f"{path} cannot be read: {error}") from error
 
 
-def _detection(path: Path, marks: Sequence[Mark]) -> Detection:
+def _detection(path: Path, marks: Sequence[Mark]) -> DetectionRates:
     with opened(path) as recording:
         contents = recording.contents()
         seen = sightings(recording.messages((f"*/{Conversation.EVENTS}",)))
     return detected(marks, seen, contents.end_s - contents.begin_s)
 
 
-def _detection_line(path: Path, found: Detection) -> str:
+def _detection_line(path: Path, found: DetectionRates) -> str:
     seen = found.seen_after_s
     line = f"{path}: detected {len(seen)} of {counted(len(found.delays_s), 'mark')}, missed {found.missed}"
     if found.median_delay_s is not None:
@@ -64,7 +64,7 @@ def _detection_line(path: Path, found: Detection) -> str:
     return f"{line}; {found.false_alarms_per_minute:.3g} false alarms a minute"
 
 
-def _detection_json(path: Path, found: Detection, worse_in: list[str]) -> dict[str, object]:
+def _detection_json(path: Path, found: DetectionRates, worse_in: list[str]) -> dict[str, object]:
     return {
         "recording": str(path),
         "marks": len(found.delays_s),

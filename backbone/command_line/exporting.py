@@ -23,7 +23,7 @@ DATA_SETS = "mission_control.training_data.lerobot_dataset"  # the same
 ROWS_AT_ONCE = 1000  # chosen: so many rows of each table are in memory, and in a row group of Parquet
 
 
-class Tables(Protocol):
+class TableWriter(Protocol):
     """Files of tables in a folder; ``learn`` gets all rows before ``write`` gets the first."""
 
     splits_lists: ClassVar[bool]
@@ -68,7 +68,7 @@ class CsvTables:
 
 
 async def export(
-    path: Path, folder: Path, keys: tuple[str, ...], make_tables: Callable[[Path], Tables], *, with_videos: bool
+    path: Path, folder: Path, keys: tuple[str, ...], make_tables: Callable[[Path], TableWriter], *, with_videos: bool
 ) -> ExitCode:
     """Write a file for each key and schema into a new folder, and if wanted an MP4 file for each camera."""
     with opened(path) as recording, new_folder(folder):
@@ -92,7 +92,7 @@ async def export_for_lerobot(
     return ExitCode.DONE
 
 
-def _write_tables(recording: Recording, tables: Tables, keys: tuple[str, ...]) -> tuple[int, int]:
+def _write_tables(recording: Recording, tables: TableWriter, keys: tuple[str, ...]) -> tuple[int, int]:
     split, names, count = tables.splits_lists, set(), 0
     for table, rows in _batches((one, row_of(one, splits_lists=split)) for one in recording.messages(keys)):
         tables.learn(table, rows)

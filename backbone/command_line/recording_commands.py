@@ -26,7 +26,7 @@ from backbone.command_line.options import (
 )
 
 if TYPE_CHECKING:
-    from backbone.command_line.exporting import Tables
+    from backbone.command_line.exporting import TableWriter
 
 EARLIEST_S = -86_400.0  # the range of ``ranges.Instant``, which would load msgspec
 
@@ -211,7 +211,7 @@ def export(
     from backbone.command_line.exporting import export as export_to
     from backbone.command_line.extras import needing_extras
 
-    make_tables: Callable[[Path], Tables] = CsvTables
+    make_tables: Callable[[Path], TableWriter] = CsvTables
     if table_format is TableFormat.PARQUET:
         with needing_extras():
             from backbone.recording.parquet_tables import ParquetTables

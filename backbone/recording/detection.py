@@ -65,7 +65,7 @@ class WatcherReport:
 
 
 @dataclass(frozen=True, slots=True)
-class Detection:
+class DetectionRates:
     """What was seen of some marks.
 
     Attributes:
@@ -132,15 +132,15 @@ def sightings(messages: Iterable[Recorded]) -> list[WatcherReport]:
     return [WatcherReport(body["at_s"], body["robot"]) for body in seen if {"at_s", "robot"} <= body.keys()]
 
 
-def detected(marks: Sequence[Mark], seen: Iterable[WatcherReport], lasted_s: float) -> Detection:
+def detected(marks: Sequence[Mark], seen: Iterable[WatcherReport], lasted_s: float) -> DetectionRates:
     """Return what was seen of the marks in a recording of this length."""
     ordered = sorted(seen, key=lambda sighting: sighting.at_s)
     firsts = [next((one.at_s - mark.from_s for one in ordered if mark.has(one)), None) for mark in marks]
     false_alarms = sum(not any(mark.has(one) for mark in marks) for one in ordered)
-    return Detection(tuple(firsts), false_alarms, max(lasted_s, SHORTEST_S))
+    return DetectionRates(tuple(firsts), false_alarms, max(lasted_s, SHORTEST_S))
 
 
-def worse(first: Detection, second: Detection, later_s: float = 0.0) -> list[str]:
+def worse(first: DetectionRates, second: DetectionRates, later_s: float = 0.0) -> list[str]:
     """Return for people in what the second is worse than the first, of the same marks; empty: in nothing.
 
     Args:

@@ -13,7 +13,7 @@ import msgspec
 from backbone.errors import Refusal
 from backbone.mission.arranged import CLASS, Arranged, UnitFault, UnitsQuestion
 from backbone.naming import Subsystem, address
-from mission_control.modules.graph import OUTSIDE, Fault, Graph, GraphRefused
+from mission_control.modules.graph import OUTSIDE, Graph, GraphRefused, WiringFault
 from mission_control.modules.orders import (
     ModuleOrder,
     Source,
@@ -52,11 +52,11 @@ class GivenKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     source: Source
 
 
-class NoMessage(Fault):
+class NoMessage(WiringFault):
     """Values that would cross the bus are no messages."""
 
 
-class NoRounds(Fault):
+class NoRounds(WiringFault):
     """A unit never has a round; ``modules`` are all that it has."""
 
 
@@ -107,7 +107,7 @@ def _parameters(
     )
 
 
-def _no_messages(graph: Graph, kinds: Mapping[str, object]) -> Iterator[Fault]:
+def _no_messages(graph: Graph, kinds: Mapping[str, object]) -> Iterator[WiringFault]:
     """Yield what cannot go from one unit to another, at the module that takes it."""
     for one in graph.connections:
         if not is_message(kinds[one.key]):
@@ -118,7 +118,7 @@ def _no_messages(graph: Graph, kinds: Mapping[str, object]) -> Iterator[Fault]:
             yield NoMessage((taker.name,), port, detail, remedy)
 
 
-def _no_rounds(graph: Graph, units: Sequence[UnitOrder]) -> Iterator[Fault]:
+def _no_rounds(graph: Graph, units: Sequence[UnitOrder]) -> Iterator[WiringFault]:
     for unit in units:
         if not unit.frequency_hz and not graph.awaited(unit.name):
             detail = f"unit {unit.name} never runs: it has no frequency, and no fresh input from outside"
@@ -164,7 +164,7 @@ def _of_given(key: str, declared: GivenKey) -> Iterator[UnitFault]:
         yield UnitFault(refusal.detail, "Write the class as package.module:Class", given=key)
 
 
-def _of_graph(fault: Fault, units: Sequence[UnitOrder]) -> UnitFault:
+def _of_graph(fault: WiringFault, units: Sequence[UnitOrder]) -> UnitFault:
     about, *_ = (*fault.modules, "")
     if isinstance(fault, NoRounds):
         unit = next(unit.name for unit in units if [one.name for one in unit.modules] == list(fault.modules))

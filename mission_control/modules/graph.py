@@ -69,7 +69,7 @@ class Connection:
 
 # ---------------------------------------------------------------------- faults
 @dataclass(frozen=True, slots=True)
-class Fault:
+class WiringFault:
     """Something that does not fit.
 
     Attributes:
@@ -85,27 +85,27 @@ class Fault:
     remedy: str
 
 
-class IllegalModuleName(Fault):
+class IllegalModuleName(WiringFault):
     """A module or a key has a name that cannot be part of a key, or that another module has."""
 
 
-class UnknownPort(Fault):
+class UnknownPort(WiringFault):
     """A module is given a key for a port that it does not have."""
 
 
-class SecondProducer(Fault):
+class SecondProducer(WiringFault):
     """A key has more than one producer."""
 
 
-class NoProducer(Fault):
+class NoProducer(WiringFault):
     """A required input has no producer."""
 
 
-class WrongType(Fault):
+class WrongType(WiringFault):
     """An input takes another type than its key's producer makes."""
 
 
-class Cycle(Fault):
+class Cycle(WiringFault):
     """Modules wait for each other."""
 
 
@@ -119,7 +119,7 @@ class GraphRefused(Refusal):
     code = "module.graph"
     remedy = "Mend each fault as it says."
 
-    def __init__(self, faults: Sequence[Fault]) -> None:
+    def __init__(self, faults: Sequence[WiringFault]) -> None:
         lines = (f"{type(one).__name__}: {one.detail}. {one.remedy}" for one in faults)
         super().__init__("\n".join(lines), faults=len(faults))
         self.faults = tuple(faults)
@@ -179,7 +179,7 @@ class Graph:
         return sorted({one.key for one in self.connections if one.producer == unit})
 
 
-def faults(units: Mapping[str, Sequence[Member]], given: Mapping[str, str]) -> list[Fault]:
+def faults(units: Mapping[str, Sequence[Member]], given: Mapping[str, str]) -> list[WiringFault]:
     """Return everything that does not fit, in the order of the modules."""
     members = [member for _unit, member in _all(units)]
     producers: dict[str, tuple[Member, Port]] = {}
@@ -195,7 +195,7 @@ def _all(units: Mapping[str, Sequence[Member]]) -> Iterator[tuple[str, Member]]:
     return ((unit, member) for unit, members in units.items() for member in members)
 
 
-def _of_names(members: Sequence[Member]) -> Iterator[Fault]:
+def _of_names(members: Sequence[Member]) -> Iterator[WiringFault]:
     seen: set[str] = set()
     for member in members:
         if not is_legal(member.name):
@@ -219,7 +219,9 @@ def _of_names(members: Sequence[Member]) -> Iterator[Fault]:
                     yield IllegalModuleName((member.name,), port, detail, "Write it like 'left-picture'")
 
 
-def _of_outputs(member: Member, producers: dict[str, tuple[Member, Port]], given: Mapping[str, str]) -> Iterator[Fault]:
+def _of_outputs(
+    member: Member, producers: dict[str, tuple[Member, Port]], given: Mapping[str, str]
+) -> Iterator[WiringFault]:
     for key, port in member.keyed_outputs:
         first, _port = producers.setdefault(key, (member, port))
         if key in given:
@@ -233,7 +235,7 @@ def _of_outputs(member: Member, producers: dict[str, tuple[Member, Port]], given
 
 def _of_inputs(
     member: Member, producers: Mapping[str, tuple[Member, Port]], given: Mapping[str, str]
-) -> Iterator[Fault]:
+) -> Iterator[WiringFault]:
     for key, port in member.keyed_inputs:
         producer, output = producers.get(key, (None, None))
         if key in given:
@@ -286,7 +288,7 @@ def _ordered(members: Sequence[Member]) -> Iterator[str]:
                     heapq.heappush(ready, place[other])
 
 
-def _cycles(members: Sequence[Member], producers: Mapping[str, str]) -> Iterator[Fault]:
+def _cycles(members: Sequence[Member], producers: Mapping[str, str]) -> Iterator[WiringFault]:
     """Yield one fault for each set of modules that all wait for each other."""
     before = _before(members, producers)
     reached = {name: _reachable(name, before) for name in before}

@@ -37,13 +37,13 @@ class Ports(msgspec.Struct):
     """Base of the ``Inputs`` and ``Outputs`` of a module; each field is a port."""
 
 
-class Mark(Enum):
+class InputMark(Enum):
     """How an input is fed, other than fresh."""
 
     LATEST = "latest"
 
 
-LATEST: Final = Mark.LATEST
+LATEST: Final = InputMark.LATEST
 """``Annotated[Class, LATEST]``: the input is the latest value."""
 
 

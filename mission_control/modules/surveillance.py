@@ -26,7 +26,7 @@ from mission_control.vision.motion_detection import Background, Blob, Judged, Vo
 BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is well seen
 
 
-class Comparison(msgspec.Struct, frozen=True, eq=False):
+class BackgroundComparison(msgspec.Struct, frozen=True, eq=False):
     """A picture and what to compare it with.
 
     Attributes:
@@ -49,7 +49,7 @@ class Comparison(msgspec.Struct, frozen=True, eq=False):
 class Judgment(msgspec.Struct, frozen=True, eq=False):
     """A comparison, and what it shows."""
 
-    comparison: Comparison
+    comparison: BackgroundComparison
     judged: Judged
 
 
@@ -66,7 +66,7 @@ class Averaging(Module):
     class Outputs(Module.Outputs):
         """Nothing while the first pictures of a view are learned."""
 
-        comparison: Comparison | None = None
+        comparison: BackgroundComparison | None = None
 
     def reset(self) -> None:
         """Know no view."""
@@ -88,7 +88,7 @@ class Averaging(Module):
         self._number += 1
         view = self._background.times_begun
         return self.Outputs(
-            Comparison(self._number, view, given.captured_s, given.robot, picture, average.copy())
+            BackgroundComparison(self._number, view, given.captured_s, given.robot, picture, average.copy())
         )  # a copy: the average is changed later, and what was handed over must not be
 
 
@@ -98,7 +98,7 @@ class Detection(Module):
     class Inputs(Module.Inputs):
         """What to compare."""
 
-        comparison: Comparison
+        comparison: BackgroundComparison
 
     class Outputs(Module.Outputs):
         """A judgment of each comparison."""

@@ -62,7 +62,7 @@ class Survey:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class EpisodeStep:
     """One instant of an episode.
 
     Attributes:
@@ -132,7 +132,7 @@ class Follower:
         self._action = STILL
         self._pictures: dict[str, Frame] = {}
 
-    def follow(self, messages: Iterable[Recorded]) -> Iterator[Step]:
+    def follow(self, messages: Iterable[Recorded]) -> Iterator[EpisodeStep]:
         """Yield the steps before each message, and those until the last."""
         for message in messages:
             yield from self._steps_before(message.at_s)
@@ -143,13 +143,13 @@ class Follower:
     def _is_complete(self) -> bool:
         return self._cameras <= self._pictures.keys() and all(name in self._values for name in self._reports)
 
-    def _steps_before(self, at_s: float) -> Iterator[Step]:
+    def _steps_before(self, at_s: float) -> Iterator[EpisodeStep]:
         while self._begin_s is not None and (step_s := self._begin_s + self._number / self._rate_hz) < at_s:
             if self._number == 0:
                 self.episodes += 1
             state = tuple(self._values[name] for name in self._reports)
             pictures = {name: self._pictures[name] for name in sorted(self._cameras)}
-            yield Step(self.episodes - 1, self._number, step_s, state, self._action, pictures, self._arc)
+            yield EpisodeStep(self.episodes - 1, self._number, step_s, state, self._action, pictures, self._arc)
             self._number += 1
 
     def _take(self, message: Recorded) -> None:

@@ -29,7 +29,7 @@ from pyarrow import parquet
 from backbone.errors import Refusal
 from backbone.recording.reader import Recording
 from backbone.spoken import counted
-from mission_control.training_data.episodes import ACTION, Follower, Step, Survey, keys_of, survey
+from mission_control.training_data.episodes import ACTION, EpisodeStep, Follower, Survey, keys_of, survey
 from mission_control.training_data.statistics import LEVELS, Statistics, of_levels, of_numbers
 from mission_control.vision.picture_files import png_of
 from resource_pool.arc_client import Frame
@@ -131,7 +131,7 @@ class DataSetWriter:
         self._number = 0
         self._all, self._of_episode = _Seen(), _Seen()
 
-    def add(self, step: Step) -> None:
+    def add(self, step: EpisodeStep) -> None:
         """Add a step, in the order of episodes and steps."""
         if step.episode == len(self.episodes):
             self._end_episode()
@@ -158,7 +158,7 @@ class DataSetWriter:
             self._file.close()
             self._file = None
 
-    def _row(self, step: Step) -> dict[str, object]:
+    def _row(self, step: EpisodeStep) -> dict[str, object]:
         found = self._form.found
         pictures = {
             IMAGES + name: {"bytes": png_of(_levels(frame), found.sizes_px[name]), "path": None}
@@ -177,7 +177,7 @@ class DataSetWriter:
             "task_index": self._tasks[self._form.task_of(step.arc)],
         }
 
-    def _begin_episode(self, step: Step) -> None:
+    def _begin_episode(self, step: EpisodeStep) -> None:
         task = self._form.task_of(step.arc)
         self._tasks.setdefault(task, len(self._tasks))
         place = {"chunk_index": self._number // CHUNK, "file_index": self._number % CHUNK}
@@ -251,7 +251,7 @@ class _Seen:
     levels: dict[str, NDArray[np.int64]] = field(default_factory=lambda: defaultdict(lambda: np.zeros(LEVELS, int)))
     rows: int = 0
 
-    def add(self, row: dict[str, object], step: Step) -> None:
+    def add(self, row: dict[str, object], step: EpisodeStep) -> None:
         self.rows += 1
         for column, value in row.items():
             if column != "commanded_by" and not column.startswith(IMAGES) and value != ():
@@ -308,7 +308,7 @@ class DataSet:
 
     form: Form
     follower: Follower
-    steps: Iterator[Step]
+    steps: Iterator[EpisodeStep]
 
     def write(self, folder: Path) -> str:
         """Write it into a folder; return what it has, for people."""

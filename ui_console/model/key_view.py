@@ -10,7 +10,7 @@ from ui_console.model.message_views import (
     UNREADABLE,
     FieldRow,
     MessageView,
-    Picture,
+    PixelPicture,
     Views,
     field_rows,
 )
@@ -34,7 +34,7 @@ class KeyView:
         self._newest: tuple[float, int] | None = None
         self.rows: Sequence[FieldRow] = ()
         """Of the newest message."""
-        self.picture: Picture | None = None
+        self.picture: PixelPicture | None = None
         """Of the newest message; None: it has none."""
         self.messages = 0
         """Number of messages so far."""
@@ -72,7 +72,7 @@ class KeyView:
         """Return the rows that have numbers, in their order in the newest message."""
         return [row.name for row in self.rows if row.name in self._series and row.number is not None]
 
-    def _shown(self, body: object) -> tuple[Sequence[FieldRow], Picture | None]:
+    def _shown(self, body: object) -> tuple[Sequence[FieldRow], PixelPicture | None]:
         if isinstance(body, Mapping):
             try:
                 return self._view.rows(body), self._view.picture(body)

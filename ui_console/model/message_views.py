@@ -46,7 +46,7 @@ class FieldRow(msgspec.Struct, frozen=True):
     number: float | None = None
 
 
-class Picture(msgspec.Struct, frozen=True):
+class PixelPicture(msgspec.Struct, frozen=True):
     """Pixels.
 
     Attributes:
@@ -75,7 +75,7 @@ class MessageView:
         """
         return field_rows(fields)
 
-    def picture(self, fields: Fields) -> Picture | None:  # noqa: ARG002
+    def picture(self, fields: Fields) -> PixelPicture | None:  # noqa: ARG002
         """Return the picture in the message; None: it has none."""
         return None
 
@@ -87,7 +87,7 @@ class PictureView(MessageView):
         """Return all fields but the pixels."""
         return field_rows({name: value for name, value in fields.items() if name != "pixels"})
 
-    def picture(self, fields: Fields) -> Picture | None:
+    def picture(self, fields: Fields) -> PixelPicture | None:
         """Return the picture; None: it is not as large as it says."""
         try:
             pixels = base64.b64decode(str(fields["pixels"]), validate=True)
@@ -95,7 +95,7 @@ class PictureView(MessageView):
             return None
         width, height = int(str(fields["width_px"])), int(str(fields["height_px"]))
         is_whole = width > 0 and height > 0 and len(pixels) in (width * height, 3 * width * height)
-        return Picture(width, height, pixels) if is_whole else None
+        return PixelPicture(width, height, pixels) if is_whole else None
 
 
 Views = Mapping[str, type[MessageView]]

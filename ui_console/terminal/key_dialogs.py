@@ -20,7 +20,7 @@ from backbone.printable_text import printable_lines
 from backbone.spoken import counted
 from ui_console.model.key_table import KeyRow, with_words
 from ui_console.model.key_view import KeyView
-from ui_console.model.message_views import Picture
+from ui_console.model.message_views import PixelPicture
 from ui_console.terminal.dialogs import Dialog, Field, field_remark
 from ui_console.terminal.widgets import Video
 
@@ -155,7 +155,7 @@ class KeyDialog(Dialog[None]):
         self._view: KeyView | None = None
         self._names: list[str] = []
         self._seen: tuple[KeyView | None, int] = (None, 0)
-        self._drawn: tuple[Picture | None, NDArray[np.uint8] | None] = (None, None)
+        self._drawn: tuple[PixelPicture | None, NDArray[np.uint8] | None] = (None, None)
 
     def compose(self) -> ComposeResult:
         """Lay out: a line, the picture, the plot, the fields."""
@@ -260,7 +260,7 @@ def _sender(row: KeyRow) -> str:
     return "" if row.key.startswith(f"{row.source}/") else row.source
 
 
-def _pixels_of(picture: Picture) -> NDArray[np.uint8]:
+def _pixels_of(picture: PixelPicture) -> NDArray[np.uint8]:
     shape = (picture.height_px, picture.width_px, 3) if picture.is_color else (picture.height_px, picture.width_px)
     return np.frombuffer(picture.pixels, np.uint8).reshape(shape)
 

@@ -39,7 +39,7 @@ HERE = "bold black on white"
 PLAY_ON_S = 1.0  # chosen: pressed again while it plays, the key goes to the marker before; seconds of the machine
 
 
-class Player(Protocol):
+class RecordingPlayer(Protocol):
     """What plays a recording; see ``RecordedPlay``."""
 
     playback: Playback
@@ -129,7 +129,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
     CSS = ConsoleApp.CSS + "#time-bar { height: 2; padding: 0 1; }"
     BINDINGS: ClassVar[list[BindingType]] = [*PLAYS, *looking_keys(), *refused_keys()]
 
-    def __init__(self, session: Session, play: Player, line: TimeLine, *, has_pixels: bool = False) -> None:
+    def __init__(self, session: Session, play: RecordingPlayer, line: TimeLine, *, has_pixels: bool = False) -> None:
         super().__init__(session, profile=Profile.MONITOR, has_pixels=has_pixels)
         self._play, self._line = play, line
         self._speed = 1.0

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ui_console.model.message_views import Picture
+from ui_console.model.message_views import PixelPicture
 
 COLOR_QUALITY = 90  # chosen: marks of single pixels keep their color; with a color for each pixel, not for each four
 PLAN_PX = 1024  # chosen: longest edge of the plan of a floor on a page; its JPEG is as large as some ten pictures
@@ -38,7 +38,7 @@ def jpeg(picture: NDArray[np.uint8]) -> bytes:
     return packed.tobytes()
 
 
-def pixels_in(picture: Picture) -> NDArray[np.uint8]:
+def pixels_in(picture: PixelPicture) -> NDArray[np.uint8]:
     """Return grey levels of shape (height, width), or red, green and blue of shape (height, width, 3).
 
     Raises:

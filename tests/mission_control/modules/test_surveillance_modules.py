@@ -158,5 +158,5 @@ def test_the_three_are_one_unit_of_a_mission_and_large_pictures_stay_in_it() -> 
     whole = arranged([UnitOrder(name="vision", modules=orders)], given)["vision"]
     assert whole.published == ["motion"]
     apart = [UnitOrder(name=order.name, modules=[order]) for order in orders]
-    with pytest.raises(GraphRefused, match=r"its class .*:Comparison is no message"):
+    with pytest.raises(GraphRefused, match=r"its class .*:BackgroundComparison is no message"):
         arranged(apart, given)

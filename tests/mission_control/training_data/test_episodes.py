@@ -14,7 +14,7 @@ from small_recordings import SCOUT, Said, recorded
 from backbone.keys import Conversation
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recording
-from mission_control.training_data.episodes import OWN_CAMERA, STILL, Follower, Step, Survey, keys_of, survey
+from mission_control.training_data.episodes import OWN_CAMERA, STILL, EpisodeStep, Follower, Survey, keys_of, survey
 
 RATE_HZ = 10
 WATCH, DRIVE = ARCS
@@ -32,7 +32,7 @@ happenings = st.one_of(
 nights = st.lists(st.tuples(st.floats(0.02, 0.5), happenings), max_size=25)
 
 
-def followed(said: Iterable[Said], cameras: Iterable[str] | None = None) -> tuple[Survey, Follower, list[Step]]:
+def followed(said: Iterable[Said], cameras: Iterable[str] | None = None) -> tuple[Survey, Follower, list[EpisodeStep]]:
     """Return what a robot did in a recording of these messages."""
     file = recorded([*known(0.1), *said])
     found = survey(Recording(file).messages(keys_of("scout1")), "scout1")
