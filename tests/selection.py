@@ -9,21 +9,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import pytest
 
+LONG = ("slow", "thorough")  # the longer first
 
-def left_out(expression: str, arguments: Sequence[str]) -> set[str]:
-    """Return the markers of tests that this command leaves out.
+
+def is_left_out(markers: Collection[str], expression: str, arguments: Sequence[str]) -> bool:
+    """Return whether a command leaves a test out: a slow case of a thorough test is slow.
 
     Args:
+        markers: Of the test.
         expression: Of ``-m``.
         arguments: Files, folders and tests that the command names.
     """
-    if any("::" in argument for argument in arguments):
-        return set()
-    return {"slow", "thorough"} - set(re.findall(r"\w+", expression))
+    length = next((name for name in LONG if name in markers), "")
+    is_named = any("::" in argument for argument in arguments) or length in re.findall(r"\w+", expression)
+    return bool(length) and not is_named
 
 
 class OnlyQuick:
@@ -31,9 +34,11 @@ class OnlyQuick:
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         """Deselect the long tests that nothing names."""
-        markers = left_out(str(config.option.markexpr), config.args)
-        long = [item for item in items if any(item.get_closest_marker(name) is not None for name in markers)]
-        if long:
-            config.hook.pytest_deselected(items=long)
-            gone = set(long)
+        gone = {
+            item
+            for item in items
+            if is_left_out({mark.name for mark in item.iter_markers()}, str(config.option.markexpr), config.args)
+        }
+        if gone:
+            config.hook.pytest_deselected(items=[item for item in items if item in gone])
             items[:] = [item for item in items if item not in gone]
