@@ -16,6 +16,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from backbone import __version__
 from backbone.command_line.where import Where
 from backbone.errors import BackboneError
 
@@ -79,9 +80,7 @@ def chosen(mission: str | None, endpoint: str | None, secret_file: Path | None) 
 def print_version(is_asked: bool) -> None:
     """Print the installed version and end the command; for the option ``--version``."""
     if is_asked:
-        from importlib.metadata import version
-
-        print(f"{DISTRIBUTION} {version(DISTRIBUTION)}")
+        print(f"{DISTRIBUTION} {__version__}")
         raise typer.Exit
 
 
