@@ -300,6 +300,7 @@ def test_a_console_that_crashes_gives_its_robot_back_and_the_terminal_and_says_s
 
 
 @pytest.mark.thorough
+@pytest.mark.alone  # beside other missions its jump to the end keeps the screen busy for many seconds
 def test_a_recording_is_played_and_asked_key_by_key(mission: RunningMission, tmp_path: Path) -> None:
     file = tmp_path / "night.mcap"
     done = mission.command("scout-backbone", "record", "--to", str(file), "--for", "8", "--mission", mission.name)
