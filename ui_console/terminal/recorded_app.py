@@ -37,7 +37,6 @@ MARKS = {
 TIME_EACH_S = 0.25  # chosen: where it stands moves a column at a time
 HERE = "bold black on white"
 PLAY_ON_S = 1.0  # chosen: pressed again while it plays, the key goes to the marker before; seconds of the machine
-NOTICE_S = 15.0  # chosen: a jump to a late time may keep the screen busy before the refusal is drawn
 
 
 class RecordingPlayer(Protocol):
@@ -234,7 +233,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
 
     def action_not_now(self) -> None:
         """Say why nothing is commanded."""
-        self.notify(NOT_NOW, severity="warning", timeout=NOTICE_S)
+        self.notify(NOT_NOW, severity="warning")
 
     def action_keys(self) -> None:
         """Show the keys and their actions."""
