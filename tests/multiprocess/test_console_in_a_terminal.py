@@ -49,7 +49,7 @@ class Terminal:
 
     def open(self, *command: str, size: tuple[int, int] = (COLUMNS, LINES), variables: str = "") -> None:
         """Run a command in a new terminal, which says afterwards how it ended and whether it echoes what is typed."""
-        words = " ".join(["env", variables, str(BIN / command[0]), *command[1:]])
+        words = " ".join(["env", "-u", "COLUMNS", "-u", "LINES", variables, str(BIN / command[0]), *command[1:]])
         after = "echo ENDED WITH $?; stty -a | grep -ow -- '-\\?echo'; cat"
         self.tmux("new-session", "-d", "-x", str(size[0]), "-y", str(size[1]), f"{words}; {after}")
 
