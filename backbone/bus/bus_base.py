@@ -182,7 +182,7 @@ class BusBase(ABC):
 
     @abstractmethod
     def is_overheard(self, conversation: Conversation) -> bool:
-        """Return whether anybody hears what this bus publishes in this conversation at its own address."""
+        """Return whether a component hears what this bus publishes in this conversation at its own address."""
 
     @abstractmethod
     def take_back(self) -> None:

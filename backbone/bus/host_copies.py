@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import os
 import socket
 import struct
@@ -22,7 +23,7 @@ PICTURES = frozenset({Conversation.FRAMES, Conversation.VIEWS})
 HEADER = struct.Struct("<IIH")
 """Length of the envelope, copies dropped so far (modulo 2³²), length of the key."""
 MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: a quarter of a second of four cameras in color, and no burden for an RC
-LOOK_EACH_S = 1.0  # chosen: a recorder that begins late misses so much; looking takes microseconds
+LOOK_EACH_S = 1.0  # chosen: a recorder that begins late misses so much of a process that speaks; a look takes 20 µs
 
 log = logging.getLogger(__name__)
 
@@ -41,13 +42,18 @@ class HostCopies:
         self._waiting: deque[memoryview] = deque()
         self._waiting_bytes = 0
         self._is_full = False
-        self._look: asyncio.TimerHandle | None = None
+        self._look_again_s = -math.inf
         self.dropped = 0
         """Copies for which the recorder had no time."""
         self._connect()
 
     def wants(self, conversation: Conversation) -> bool:
-        """Return whether a recorder of this host listens to this conversation."""
+        """Return whether a recorder of this host listens to this conversation; looks for one from time to time.
+
+        So a process that says nothing is not woken for it.
+        """
+        if self._socket is None and self._loop.time() >= self._look_again_s:
+            self._connect()
         return self._socket is not None and (self._only is None or conversation in self._only)
 
     def send(self, key: str, raw: bytes) -> None:
@@ -66,12 +72,11 @@ class HostCopies:
 
     def close(self) -> None:
         """Send no more. Idempotent."""
-        if self._look is not None:
-            self._look.cancel()
         self._disconnect()
+        self._look_again_s = math.inf
 
     def _connect(self) -> None:
-        self._look = None
+        self._look_again_s = self._loop.time() + LOOK_EACH_S
         for name, only in ((ALL_SOCKET, None), (PICTURES_SOCKET, PICTURES)):
             made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             made.setblocking(False)
@@ -82,7 +87,6 @@ class HostCopies:
             else:
                 self._socket, self._only = made, only
                 return
-        self._look = self._loop.call_later(LOOK_EACH_S, self._connect)
 
     def _disconnect(self) -> None:
         if self._socket is not None:
@@ -107,7 +111,6 @@ class HostCopies:
         except OSError as error:
             log.info("the recorder of this host is gone: %s", error)
             self._disconnect()
-            self._look = self._loop.call_later(LOOK_EACH_S, self._connect)
         else:
             self._become_full(False)
 

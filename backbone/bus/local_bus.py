@@ -160,7 +160,7 @@ class Neighbor(BusBase):
         return watching
 
     def is_overheard_by_neighbors(self, conversation: Conversation) -> bool:
-        """Return whether anybody in this process hears this conversation of its own address."""
+        """Return whether a component in this process hears this conversation of its own address."""
         network = self.network
         return any(overheard.hears(self.source, conversation) for overheard in network.overhearers) or any(
             _matches(listening.pattern, self.source) for listening in network.listeners[conversation]
@@ -348,7 +348,7 @@ class LocalBus(Neighbor):
         return self.overhear_neighbors(conversation, listener, most_waiting_bytes, of)
 
     def is_overheard(self, conversation: Conversation) -> bool:
-        """Return whether anybody hears this conversation of its own address."""
+        """Return whether a component hears this conversation of its own address."""
         return self.is_overheard_by_neighbors(conversation)
 
     def declare_alive(self, address: str) -> Declaration:

@@ -104,7 +104,7 @@ class SharedBus(Neighbor, ZenohBus):
         return _Both(self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest), elsewhere)
 
     def is_overheard(self, conversation: Conversation) -> bool:
-        """Return whether anybody hears this conversation of its own address, here or in another process."""
+        """Return whether a component hears this conversation of its own address, here or in another process."""
         return self.is_overheard_by_neighbors(conversation) or super().is_overheard(conversation)
 
     def overhear(

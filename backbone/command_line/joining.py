@@ -1,4 +1,4 @@
-"""The work of ``scout-backbone record join``, and how clocks that were off are told."""
+"""Carries out ``scout-backbone record join``, and prints the clocks that were off."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class Splitting:
 
 @dataclass(frozen=True)
 class OfLauncher:
-    """What a launcher or an offer tells the recorder that it starts.
+    """Settings that a launcher or an offer passes to the recorder that it starts.
 
     Attributes:
         is_described: True: the mission is described on standard input, because it cannot be asked yet.

@@ -100,7 +100,7 @@ class Playing:
     """How a recording is played.
 
     Attributes:
-        mission: Name under which it is up; None: ``replay-`` and its name, so that nobody takes it for the mission.
+        mission: Name under which it is up; None: ``replay-`` and its name, so that no command takes it for the mission.
         since_s: Mission time at which it begins; None: with its first message.
         speed: Mission seconds per second of the machine.
         is_stepped: True: message by message, each after a line from standard input.

@@ -1,6 +1,6 @@
 """The work of ``scout-backbone watch`` and ``scout-backbone top``: what is said on a live mission, now.
 
-Both overhear, as a recorder does: nobody waits for them, and copies are made for them only while they look.
+Both overhear, as a recorder does: no component waits for them, and copies are made for them only while they look.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
 async def mission_classes(bus: Bus, trouble: Callable[[str], None] = say) -> dict[str, type[Message]]:
     """Return the message classes of the installed packages and of the mission's component types, by schema.
 
-    They are imported in a thread, so that whoever asks goes on meanwhile.
+    A thread imports them, so the event loop of the caller is not blocked.
 
     Args:
         bus: The bus.

@@ -1,6 +1,6 @@
 """Bridge: what is overheard on a live mission, for viewers that speak Foxglove's websocket protocol.
 
-Nobody can say anything through it: it offers no capability beside channels to read. Foxglove's library serves the
+No viewer can publish through it: it offers no capability beside channels to read. Foxglove's library serves the
 viewers in threads of its own; of what a slow viewer does not take, the library drops the oldest.
 """
 

@@ -2,7 +2,7 @@
 
 The recording stays as it is: it pays nothing for other tools, and each new translation is for old recordings, too. In
 the copy each message stands as recorded, with its schema, so that all its numbers can be plotted; beside it stands what
-shows it, and instead of it where that has all that it has. A copy has no profile, so nobody takes it for a recording.
+shows it, and instead of it where that has all that it has. A copy has no profile, so no command takes it for one.
 """
 
 from __future__ import annotations

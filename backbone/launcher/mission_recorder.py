@@ -154,9 +154,9 @@ class MissionRecorder:
         self._process = None
 
     async def _tell_facts(self, process: Process) -> str:
-        """Tell it what it cannot ask for yet; return the first line that it says.
+        """Write the facts of the mission to the recorder; return the first line that the recorder prints.
 
-        Without facts its input stays open: its end tells the recorder that the process that started it is gone.
+        Without facts the recorder's input stays open. When this process ends, the input ends, and the recorder with it.
         """
         assert process.stdin is not None and process.stderr is not None  # noqa: S101, PT018  both are pipes
         if self._facts:

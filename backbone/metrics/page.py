@@ -39,7 +39,7 @@ class MetricsServer:
     """Serves the page until it is closed.
 
     Args:
-        read: Called in a thread of its own whenever somebody reads the page.
+        read: Called in a thread of its own for each request of the page.
 
     Raises:
         OSError: The port cannot be opened.

@@ -1,7 +1,7 @@
 """Consistency checks of modules and execution units.
 
-What the file alone can tell is checked here. How the modules are connected, the class that runs units tells, because
-inputs and outputs are declared in the modules' classes.
+This file checks names, parameters and places. The class that runs execution units checks the connections, because the
+modules' classes declare their inputs and outputs.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from backbone.mission.tables import EXECUTION_UNIT, Tables, check_host, check_pa
 
 
 def check_modules(tables: Tables, report: Report) -> None:
-    """Report units and modules that do not fit, whatever their classes declare."""
+    """Report every fault of units and modules that the mission file alone shows."""
     section = tables.root.first("modules")
     if section is None:
         return

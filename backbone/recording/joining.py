@@ -68,7 +68,7 @@ def join(recordings: Mapping[str, Recording], to: IO[bytes]) -> Joined:
     """Write all messages of these recordings, at least one, to a new one.
 
     Args:
-        recordings: By their names, which refusals tell.
+        recordings: By name; refusals name the recording.
 
     Raises:
         OtherMission: They are not of one start of one mission.
@@ -98,7 +98,7 @@ def _clocks(recordings: Mapping[str, Recording]) -> ClockOffsets:
 
 
 def _named(name: str, messages: Iterable[Read]) -> Iterator[Read]:
-    """Yield what is read; a refusal tells the name of the recording."""
+    """Yield the messages. A refusal names the recording."""
     try:
         yield from messages
     except NoRecording as error:

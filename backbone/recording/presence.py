@@ -6,6 +6,6 @@ from backbone.wire import Message
 
 
 class Presence(Message, frozen=True):
-    """A component was ready, or was gone: its liveliness token rose or fell. The recorder wrote it; nobody sent it."""
+    """A component was ready, or was gone: its liveliness token rose or fell. The recorder wrote it."""
 
     alive: bool

@@ -206,7 +206,7 @@ def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
     """Return sender → how many of its messages are missing between its first and its last, for those that lack any.
 
     Each sender numbers its messages. One is missing if it was lost, if it is of a key that was not recorded, or if it
-    is a question that nobody answered.
+    is a question without an answer.
     """
     numbers: dict[str, set[int]] = {}
     for message in messages:

@@ -1,7 +1,7 @@
 """Recorder: writes everything it overhears into a recording.
 
-It is no component: it answers nobody, so nobody asks it, and what it overhears is dropped rather than waited for. So it
-delays nobody, even if its process hangs. It ends in good order when its file can grow no more.
+It is no component: it answers no questions, and what it overhears is dropped rather than waited for. So it delays no
+component, even if its process hangs. It ends in good order when its file can grow no more.
 """
 
 from __future__ import annotations
@@ -66,8 +66,9 @@ class Recorder:
         keys: Patterns of the keys to record, without ``scout/<mission>/``; empty: all.
         mission_xml: The mission's file; empty: not known.
         user: The person who records; empty: nobody.
-        ear: Where it hears the processes of its host without the network; None: it overhears all on the bus.
-        host_only: True: it hears those alone, and asks nobody; False: of others all but pictures.
+        ear: Receives the copies that processes of this host send. None: the recorder overhears the bus alone.
+        host_only: True: the recorder writes these copies alone, and asks no component. False: it also overhears the
+            bus, but for pictures.
     """
 
     def __init__(
@@ -247,7 +248,7 @@ class Recorder:
 
     # ------------------------------------------------------------------ what was said before
     async def _ask(self) -> None:
-        """Ask for what was said before anybody overheard it; the answers come as all others do."""
+        """Ask for what was said before the recorder overheard it; the answers come as all others do."""
         if not self._host_only and Conversation.TOLD in to_overhear(self._keys):
             await asyncio.gather(self._ask_for_snapshots(), self._ask_who_appears())
 

@@ -102,7 +102,7 @@ def launch_of(recording: Recording, classes: Known, name: str) -> Launch:
 
 
 def _incarnation(recording: Recording, name: str) -> str:
-    """Return the id of the component's life, as whoever stopped it named it; empty: nobody did."""
+    """Return the id of the component's life, as the component that stopped it named it; empty: none did."""
     stops = (one for one in recording.messages((f"*/{name}/{Conversation.ASK}",)) if one.schema == schema_of(Stop))
     found = next(stops, None)
     return str(found.body["incarnation"]) if found is not None else ""
@@ -112,7 +112,7 @@ def run_again(recording: Recording, classes: Known, launch: Launch, component: C
     """Run the component on the recording, from its first to its last message on; return what it said.
 
     Args:
-        recording: Not used by anybody else meanwhile.
+        recording: Not used elsewhere meanwhile.
         classes: Known message classes, by schema.
         launch: Of the component.
         component: Its class.

@@ -29,14 +29,14 @@ class Debug(Protocol):
     """Where a module shows named pictures and values; see ``mission_control.debug_views.DebugViews``."""
 
     def picture(self, view: str, make: Callable[[], NDArray[np.generic]]) -> None:
-        """Show a picture; ``make`` is called at once if somebody looks, else never."""
+        """Show a picture; ``make`` is called at once if a console looks, else never."""
 
     def value(self, view: str, value: float | bool | str) -> None:
         """Show a value."""
 
 
 class Unseen:
-    """The debug views of a module that nobody can look at: nothing is made."""
+    """The debug views of a module outside a mission: nothing is made."""
 
     def picture(self, view: str, make: Callable[[], NDArray[np.generic]]) -> None:
         """Do nothing."""
@@ -72,7 +72,7 @@ class Module:
     def __init__(self, parameters: msgspec.Struct | None = None) -> None:
         self.parameters = self.Parameters() if parameters is None else parameters
         self.debug: Debug = UNSEEN
-        """Its debug views; they cost nothing unless somebody looks."""
+        """Its debug views; they cost nothing unless a console looks."""
         self.reset()
 
     def reset(self) -> None:

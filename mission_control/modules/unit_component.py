@@ -1,6 +1,6 @@
 """The component that runs one execution unit on the bus: a thin loop around ``ExecutionUnit``.
 
-* another unit, or anybody → it: the values of its inputs, published under the addresses that its parameters name.
+* another unit, or any component → it: the values of its inputs, published under the addresses that its parameters name.
 * it → everybody: the outputs that its parameters name, published under ``output_address`` (conversation ``outputs``).
 
 Only the newest value of a key waits for delivery, so a slow unit never works on old ones; the values that it did not

@@ -1,7 +1,7 @@
-"""Looks at keys: how often each says something, and what one of them says; only while somebody looks.
+"""Looks at keys: how often each says something, and what one of them says; only while a person looks.
 
-What is said live is overheard, so nobody waits for a console, and copies are made for it only while it looks. What was
-recorded is read from the recording, so it has its past, too.
+Live messages are overheard: no component waits for a console, or makes copies while none looks. Recorded ones are read
+from the file, so they have their past, too.
 """
 
 from __future__ import annotations

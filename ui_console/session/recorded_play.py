@@ -124,7 +124,7 @@ class RecordedPlay(Generic[Console]):
         return self._performance.console
 
     def reopened(self) -> Recording:
-        """Return the recording, for somebody else to read."""
+        """Return the recording, opened once more for another reader."""
         return Recording(self._opened())
 
     async def wait_arrived(self) -> None:

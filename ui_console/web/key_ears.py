@@ -31,7 +31,7 @@ from ui_console.web.key_watch import Newest
 
 log = logging.getLogger(__name__)
 
-ASKED_EVERY_S = 10.0  # chosen: a page that asks for messages that nobody knows costs the mission one question; machine
+ASKED_EVERY_S = 10.0  # chosen: a page that asks for unknown messages costs the mission one question; machine
 
 StartTask = Callable[[Coroutine[object, None, None], str], asyncio.Task[None]]
 

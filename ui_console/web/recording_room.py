@@ -138,7 +138,7 @@ class RecordingRoom:
         self._hub.report_violation(who, violation)
 
     async def obey(self, viewer: Viewer, intent: Intent | Playing) -> None:
-        """Play, or look; whatever would command is refused."""
+        """Play, or look; a command to the mission is refused."""
         match intent:
             case PlayOn(speed):
                 self.play.play(speed)
