@@ -1,0 +1,112 @@
+"""A behavior acts while it holds the robot and no stop stands."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from behaviors_of_a_placer import ARC, Run, node, root
+from fake_resource_pool import FakePlacer
+
+from backbone.keys import Conversation
+from resource_pool.arc_client import EmergencyStopped, StopState
+from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import AskStop
+
+
+def test_it_acts_only_while_it_holds_the_robot(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        for _ in range(3):
+            await arc.grant()
+            await placer.clock.sleep_s(1.0)
+            await arc.suspend()
+            count = len(arc.commands)
+            await placer.clock.sleep_s(1.0)
+            assert len(arc.commands) == count
+        assert {epoch for _at_s, epoch, _command in arc.commands} == {1, 2, 3}
+        assert len(arc.commands) >= 27
+
+    placer_world(scene)
+
+
+def test_a_command_that_came_too_late_ends_acting_quietly(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        driver = await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        await arc.grant()
+        arc.granted = False
+        await placer.clock.sleep_s(1.0)
+        assert placer.components["driver"] is driver
+        await arc.grant()
+        await placer.wait(lambda: arc.commands and arc.commands[-1][1] == 2)
+
+    placer_world(scene)
+
+
+def test_while_an_operators_stop_stands_it_says_so_and_acts_again_when_it_is_lifted(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        latch = StopLatch("scout1")
+        latch.stop("anna", "child in the room", 0.0)
+        robot = placer.network.join("resource_pool/scout1", placer.clock)
+
+        async def answer(_asked: Any) -> StopState:
+            return latch.state
+
+        robot.serve(robot.source, AskStop, answer)
+        robot.declare_alive(robot.source)
+        driver = await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        arc.refusal = EmergencyStopped("scout1 was stopped by anna: child in the room", rc="scout1")
+        await arc.grant()
+        await placer.clock.sleep_s(3.0)
+        assert driver.feedback == "scout1 was stopped by anna: child in the room"
+        assert not arc.commands
+        arc.refusal = None
+        latch.lift(1, "ben", placer.clock.now_s())
+        robot.publish(robot.source, Conversation.EVENTS, latch.state)
+        await placer.wait(lambda: arc.commands, within_s=0.5)
+        assert driver.feedback.startswith("holds scout scout1")
+        await robot.close()
+
+    placer_world(scene)
+
+
+def test_a_stop_it_never_heard_of_and_that_is_lifted_already_costs_it_one_command(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        latch = StopLatch("scout1")
+        latch.stop("anna", "child in the room", 0.0)
+        latch.lift(1, "anna", 1.0)
+        robot = placer.network.join("resource_pool/scout1", placer.clock)
+
+        async def answer(_asked: Any) -> StopState:
+            return latch.state
+
+        robot.serve(robot.source, AskStop, answer)
+        robot.declare_alive(robot.source)
+        await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        arc.require = lambda command: latch.require_moving(command.after_stop)
+        await arc.grant()
+        await placer.wait(lambda: arc.commands, within_s=0.5)
+        assert [command.after_stop for _at_s, _epoch, command in arc.commands] == [1]
+        await robot.close()
+
+    placer_world(scene)
+
+
+def test_told_to_stop_it_gives_its_arc_back(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["watch1-capture"]
+        placer.components["watch1"].end("test")
+        await placer.wait(lambda: not placer.components)
+        assert arc.released
+        assert placer.ended == ["watch1-capture"]
+
+    placer_world(scene)
