@@ -40,7 +40,6 @@ class Conversation(StrEnum):
     LEASES = "leases"  # the RC manager's renewals of holds
     BEAT = "beat"  # heartbeats of ARCs: their event loop and their owner's run
     HEALTH = "health"  # the launcher's verdict on the whole mission
-    CLOCK = "clock"
     LOG = "log"
 
 
