@@ -19,13 +19,13 @@ with zenoh.open((hub_config([sys.argv[2]]) if sys.argv[1] == "hub" else client_c
     print("open", flush=True)
     sys.stdin.readline()
     names = {task.joinpath("comm").read_text().strip() for task in pathlib.Path("/proc/self/task").iterdir()}
-    print(*sorted(names & {"rx-0", "tx-0", "acc-0", "net-0", "app-0"}), flush=True)
+    print(*sorted({name[:-2] for name in names} & {"rx", "tx", "acc", "net", "app"}), flush=True)
     sys.stdin.readline()
 """
 
 
 @pytest.mark.processes
-def test_a_client_has_two_threads_of_zenoh_and_a_hub_one_that_accepts_beside_them() -> None:
+def test_a_client_has_threads_that_receive_and_send_and_a_hub_also_those_that_accept() -> None:
     endpoint = free_endpoint()
     found: list[list[str]] = []
     with opened("hub", endpoint) as hub, opened("client", endpoint) as client:
@@ -37,8 +37,8 @@ def test_a_client_has_two_threads_of_zenoh_and_a_hub_one_that_accepts_beside_the
             found.append(each.stdout.readline().split())
         for each in (client, hub):
             each.communicate("\n", timeout=30)
-    assert found[0] == ["rx-0", "tx-0"]
-    assert "acc-0" in found[1]
+    assert {"rx"} <= set(found[0]) <= {"rx", "tx"}  # the sender begins with the first message
+    assert "acc" in found[1]
 
 
 def opened(role: str, endpoint: str) -> subprocess.Popen[str]:
