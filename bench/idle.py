@@ -40,9 +40,9 @@ def processor_s(pid: int) -> float:
 def mission_up(mission: Path) -> Iterator[psutil.Process]:
     """Bring a mission up until the block ends; give its launcher."""
     with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, "XDG_RUNTIME_DIR": folder}
+        os.environ["XDG_RUNTIME_DIR"] = folder
         command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
-        with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as launcher:
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
             assert launcher.stderr is not None
             for line in launcher.stderr:
                 if line.startswith("all ready"):
