@@ -73,21 +73,15 @@ class BlackboardReader:
             NotSealed: The value could change under its reader.
             ValueTooLong: The value is longer than ``most_bytes``.
         """
-        packet, descriptors = b"", list[int]()
-        while True:
-            try:
-                later = sealed_memory.receive(self._own, MOST_PACKET_BYTES)
-            except BlockingIOError:
-                break
-            except OSError:
-                later = (b"", [])
-            if not later[0]:
-                if packet:
-                    break
-                raise NoWriter(f"the writer of {self._name} has ended", name=self._name)
-            sealed_memory.close_all(descriptors)
-            packet, descriptors = later
-        return self._value(packet, descriptors) if packet else None
+        try:
+            packet, descriptors = sealed_memory.receive(self._own, MOST_PACKET_BYTES)
+        except BlockingIOError:
+            return None
+        except OSError:
+            packet, descriptors = b"", []
+        if not packet:
+            raise NoWriter(f"the writer of {self._name} has ended", name=self._name)
+        return self._value(packet, descriptors)
 
     def wait(self, within_s: float) -> Value | None:
         """Wait, in a thread, for the next value and take it; None: none came. Otherwise as ``newest``."""

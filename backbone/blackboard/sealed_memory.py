@@ -130,10 +130,9 @@ def receive(source: socket.socket, most_bytes: int) -> tuple[bytes, list[int]]:
 
 
 def discard(undelivered_at: socket.socket) -> None:
-    """Take back what waits in a socket; descriptors in it are closed by the system."""
+    """Take back the packet that waits in a socket, if there is one; the system closes its descriptors."""
     with contextlib.suppress(OSError):
-        while undelivered_at.recv(1):
-            pass
+        undelivered_at.recv(1)
 
 
 def close_all(descriptors: Sequence[int]) -> None:

@@ -7,6 +7,7 @@ waits. A reader's death ends its connection, and the system frees what waited fo
 
 from __future__ import annotations
 
+import asyncio
 import os
 import select
 import socket
@@ -73,8 +74,8 @@ class _Reader:
 class BlackboardWriter:
     """The one writer of a named board. Its methods may be called from any thread.
 
-    Readers are admitted with each ``put``. To admit them between two values, too, call ``serve`` when ``fileno`` is
-    readable (``loop.add_reader(writer, writer.serve)``), or ``serve_in_thread`` once.
+    Readers are admitted with each ``put``. To admit them between two values, too, call ``serve_in_loop`` or
+    ``serve_in_thread`` once.
 
     Args:
         directory: Folder of the boards; made if there is none. Only this user may be able to enter it.
@@ -110,7 +111,8 @@ class BlackboardWriter:
         self._guard = threading.RLock()
         self._readers: dict[int, _Reader] = {}
         self._newest: _Sent | None = None
-        self._is_open = True
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_open, self._is_served = True, False
         self.number = 0
         """Number of the newest value; 0: none yet."""
 
@@ -118,10 +120,6 @@ class BlackboardWriter:
     def has_readers(self) -> bool:
         """Whether a reader is connected."""
         return any(reader.way is not None for reader in self._readers.values())
-
-    def fileno(self) -> int:
-        """Return a descriptor that is readable when ``serve`` has something to do."""
-        return self._events.fileno()
 
     def put(self, value: bytes | memoryview) -> int:
         """Give all readers this value, whole, in place of those that they have not taken; return its number.
@@ -133,7 +131,8 @@ class BlackboardWriter:
         """
         require_short(memoryview(value).nbytes, self._most)
         with self._guard:
-            self.serve()
+            if not self._is_served:
+                self.serve()
             if not self._is_open:
                 return self.number
             self.number += 1
@@ -157,12 +156,18 @@ class BlackboardWriter:
             if not (self.keeps or self._readers):
                 self._forget()
 
+    def serve_in_loop(self) -> None:
+        """Call ``serve`` whenever it has something to do, in the running event loop; close the writer there."""
+        self._is_served, self._loop = True, asyncio.get_running_loop()
+        self._loop.add_reader(self._events.fileno(), self.serve)
+
     def serve_in_thread(self) -> threading.Thread:
         """Call ``serve`` whenever it has something to do, in a thread of its own, until the writer is closed."""
+        self._is_served = True
 
         def run() -> None:
             waiting = select.poll()
-            waiting.register(self.fileno(), select.POLLIN)
+            waiting.register(self._events, select.POLLIN)
             while self._is_open:
                 if waiting.poll(_LOOK_FOR_END_MS):
                     self.serve()
@@ -177,6 +182,8 @@ class BlackboardWriter:
             if not self._is_open:
                 return
             self._is_open = False
+            if self._loop is not None:
+                self._loop.remove_reader(self._events.fileno())
             for descriptor in tuple(self._readers):
                 self._let_go(descriptor)
             self._forget()

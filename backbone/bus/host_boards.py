@@ -79,7 +79,6 @@ class SentBoard:
     def close(self) -> None:
         """Let all readers go. Idempotent."""
         if self._writer is not None:
-            self._loop.remove_reader(self._writer)
             self._writer.close()
             self._writer = None
 
@@ -95,7 +94,7 @@ class SentBoard:
             log.info("no board on this host: %s", refusal)
             self._try_again_s = now_s + LOOK_EACH_S
             return False
-        self._loop.add_reader(self._writer, self._writer.serve)
+        self._writer.serve_in_loop()
         return True
 
 

@@ -40,15 +40,25 @@ class Outlet:
     def __init__(self, key: str, publisher: zenoh.Publisher, known_s: float, board: SentBoard | None) -> None:
         self.key, self.publisher, self.board, self._known_s = key, publisher, board, known_s
         self._token: zenoh.LivelinessToken | None = None
+        self._is_matched = False
+        self._matching = self._watch_matching() if board is not None else None
 
     def is_heard(self, now_s: float) -> bool:
-        """Return whether the network may have a subscriber. A new publisher does not know it yet."""
-        return now_s < self._known_s or self.has_subscriber
+        """Return whether the network may have a subscriber of large values. A new publisher does not know it yet."""
+        return self._is_matched or now_s < self._known_s
+
+    def _watch_matching(self) -> Any:
+        """Be told of subscribers, because to ask for each picture takes as long as to send it."""
+
+        def changed(status: zenoh.MatchingStatus) -> None:
+            self._is_matched = bool(cast("Any", status).matching)  # zenoh's stubs say bool of the status
+
+        return self.publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
 
     @property
     def has_subscriber(self) -> bool:
         """Whether the network is known to have a subscriber; 0.5 µs."""
-        return bool(cast("Any", self.publisher).matching_status.matching)  # zenoh's stubs say bool of its status
+        return bool(cast("Any", self.publisher).matching_status.matching)
 
     def raise_token(self, session: zenoh.Session, source: str, *, anew: bool) -> None:
         """Let listeners know this sender of the key, again if its board was opened just now."""
@@ -60,8 +70,9 @@ class Outlet:
 
     def close(self) -> None:
         """Withdraw the publisher."""
-        if self._token is not None:
-            self._token.undeclare()  # type: ignore[no-untyped-call]
+        for entity in (self._token, self._matching):
+            if entity is not None:
+                entity.undeclare()
         if self.board is not None:
             self.board.close()
         self.publisher.undeclare()  # type: ignore[no-untyped-call]

@@ -24,7 +24,7 @@ from backbone.ranges import Bulk, Count
 from backbone.wire import Message
 
 NAME, MISSION, SENDER, WITHIN_S = "room", "boards", "backbone/sender", 20.0
-SIZES = (76_800, 100, 300_000, 0, 65_536, 65_537)
+SIZES = (76_800, 100, 300_000, 0, 131_072, 131_073)
 
 
 class Map(Message, frozen=True):

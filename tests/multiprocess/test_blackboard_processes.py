@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import board_roles
@@ -80,8 +81,11 @@ def kill(one: Process) -> None:
 
 def has_named_memory(one: Process) -> bool:
     """Return whether a process has a file of the folder for shared memory, which would outlive it."""
-    files = [os.readlink(entry) for entry in Path(f"/proc/{one.pid}/fd").iterdir()]
-    return any("/dev/shm" in named for named in [*files, Path(f"/proc/{one.pid}/maps").read_text()])  # noqa: S108
+    named = [Path(f"/proc/{one.pid}/maps").read_text()]
+    for entry in Path(f"/proc/{one.pid}/fd").iterdir():
+        with suppress(FileNotFoundError):  # closed meanwhile
+            named.append(os.readlink(entry))
+    return any("/dev/shm" in name for name in named)  # noqa: S108
 
 
 @pytest.mark.parametrize("reads", [6_000, pytest.param(1_000_000, marks=[pytest.mark.slow, pytest.mark.alone])])

@@ -71,7 +71,7 @@ def test_a_newcomer_gets_the_newest_value_at_once(folder: Path) -> None:
     writer = BlackboardWriter(folder, "room")
     serving = writer.serve_in_thread()
     for number in range(3):
-        writer.put(bytes([number]) * 100_000)
+        writer.put(bytes([number]) * 200_000)
     reader = BlackboardReader(folder, "room")
     value = reader.wait(WITHIN_S)
     assert value is not None
@@ -101,10 +101,10 @@ def test_a_value_stays_as_long_as_it_is_looked_at(folder: Path, descriptors: Cou
     before = descriptors()
     writer = BlackboardWriter(folder, "room")
     reader = BlackboardReader(folder, "room")
-    writer.put(b"a" * 100_000)
+    writer.put(b"a" * 200_000)
     first = np.frombuffer(taken(reader).data, np.uint8)
     for _ in range(10):
-        writer.put(b"b" * 100_000)
+        writer.put(b"b" * 200_000)
     writer.close()
     reader.close()
     assert set(first.tolist()) == {ord("a")}
@@ -115,11 +115,11 @@ def test_a_value_stays_as_long_as_it_is_looked_at(folder: Path, descriptors: Cou
 def test_a_reader_that_takes_nothing_costs_one_value(folder: Path, descriptors: Count) -> None:
     writer = BlackboardWriter(folder, "room")
     slow, quick = BlackboardReader(folder, "room"), BlackboardReader(folder, "room")
-    writer.put(bytes(100_000))
+    writer.put(bytes(200_000))
     taken(quick)
     some = descriptors()
     for number in range(2, 2000):
-        writer.put(bytes(100_000))
+        writer.put(bytes(200_000))
         assert taken(quick).number == number
     assert descriptors() <= some + 1  # the value that ``quick`` looks at
     assert taken(slow).number == 1999
@@ -132,7 +132,7 @@ def test_who_keeps_very_many_values_gets_copies_not_descriptors(folder: Path, de
     writer, before = BlackboardWriter(folder, "room"), descriptors()
     reader, kept = BlackboardReader(folder, "room"), []
     for number in range(MOST_MAPPED + 50):
-        writer.put(number.to_bytes(4) * 20_000)
+        writer.put(number.to_bytes(4) * 40_000)
         kept.append(taken(reader))
     assert descriptors() <= before + MOST_MAPPED + 10
     assert all(bytes(value.data[:4]) == (value.number - 1).to_bytes(4) for value in kept)
@@ -179,9 +179,9 @@ def test_what_a_killed_writer_left_is_taken_over(folder: Path) -> None:
 def test_the_last_value_of_a_writer_that_ended_is_still_taken(folder: Path) -> None:
     writer = BlackboardWriter(folder, "room")
     reader = BlackboardReader(folder, "room")
-    writer.put(b"x" * 100_000)
+    writer.put(b"x" * 200_000)
     writer.close()
-    assert len(taken(reader).data) == 100_000
+    assert len(taken(reader).data) == 200_000
     with pytest.raises(NoWriter, match="room"):
         reader.wait(WITHIN_S)
     reader.close()
@@ -308,8 +308,8 @@ def test_where_memory_cannot_be_sealed_there_is_no_blackboard(folder: Path, monk
 
 
 async def test_tasks_wait_for_the_next_value(folder: Path) -> None:
-    loop, writer = asyncio.get_running_loop(), BlackboardWriter(folder, "room")
-    loop.add_reader(writer, writer.serve)
+    writer = BlackboardWriter(folder, "room")
+    writer.serve_in_loop()
 
     async def read() -> list[int]:
         reader, numbers = BlackboardReader(folder, "room"), list[int]()
@@ -322,12 +322,11 @@ async def test_tasks_wait_for_the_next_value(folder: Path) -> None:
 
     reading = [asyncio.create_task(read()) for _ in range(3)]
     for _ in range(20):
-        writer.put(bytes(80_000))
+        writer.put(bytes(180_000))
         await asyncio.sleep(0.001)
     async with asyncio.timeout(WITHIN_S):
         for numbers in await asyncio.gather(*reading):
             assert numbers == sorted(set(numbers))
-    loop.remove_reader(writer)
     writer.close()
 
 
@@ -348,7 +347,7 @@ def test_threads_that_write_and_read_at_once_see_whole_values_in_order(folder: P
 
     readers = [threading.Thread(target=read) for _ in range(3)]
     writers = [
-        threading.Thread(target=lambda n=n: [writer.put(bytes([n]) * 70_000) for _ in range(200)]) for n in b"abc"
+        threading.Thread(target=lambda n=n: [writer.put(bytes([n]) * 140_000) for _ in range(200)]) for n in b"abc"
     ]
     for thread in [*readers, *writers]:
         thread.start()
