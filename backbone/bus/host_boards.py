@@ -19,7 +19,7 @@ from backbone.blackboard.writer import BlackboardWriter
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES
 
 FOLDER = "board"
-LARGE_BYTES = 16_384  # chosen: smaller publications cost zenoh little; a Scout's picture is 76.8 kB
+LARGE_BYTES = 16_384  # chosen: a board is quicker at every size, but costs ten descriptors, and small outputs are many
 LOOK_EACH_S = 1.0  # chosen: as for recorders; a look takes some 20 µs
 
 log = logging.getLogger(__name__)

@@ -11,6 +11,7 @@ import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -360,3 +361,10 @@ def test_threads_that_write_and_read_at_once_see_whole_values_in_order(folder: P
     writer.close()
     serving.join(WITHIN_S)
     gc.collect()
+
+
+def test_the_program_in_the_guide_runs(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "how-to" / "share-large-values.md").read_text()
+    monkeypatch.chdir(folder.parent)
+    exec(guide.partition("```python\n")[2].partition("```")[0], {})  # noqa: S102
+    assert capsys.readouterr().out == "1 4000000\n"
