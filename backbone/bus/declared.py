@@ -28,6 +28,18 @@ class Declared:
                 self._entity.undeclare()
 
 
+class Both:
+    """Two zenoh entities that are withdrawn together."""
+
+    def __init__(self, first: Any, second: Any) -> None:
+        self._first, self._second = first, second
+
+    def undeclare(self) -> None:
+        """Withdraw both."""
+        self._first.undeclare()
+        self._second.undeclare()
+
+
 class FirstReply:
     """Passes a question's first reply to the loop, or None if there was none."""
 

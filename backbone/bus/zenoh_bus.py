@@ -10,15 +10,15 @@ messages (docs/decisions/0003-zenoh-settings.md).
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable
 from typing import Any, cast
 
 import zenoh
 
+from backbone.bus.answers import Came, TooLate, read_answer
 from backbone.bus.bus_base import quoted
-from backbone.bus.declared import Declared, FirstReply
+from backbone.bus.declared import Both, Declared, FirstReply
 from backbone.bus.host_boards import HostBoards, SentBoard
 from backbone.bus.host_copies import HostCopies
 from backbone.bus.inbox import (
@@ -28,7 +28,6 @@ from backbone.bus.inbox import (
     OverheardSamples,
     bytes_of,
     reader_of,
-    reply_reader_of,
 )
 from backbone.bus.interface import (
     Answer,
@@ -43,6 +42,7 @@ from backbone.bus.interface import (
 )
 from backbone.bus.near_listening import NearListening
 from backbone.bus.zenoh_outlets import Outlet, Outlets
+from backbone.bus.zenoh_questions import DirectQuestion, Query, Ways, new_inbox, query
 from backbone.bus.zenoh_sessions import (
     client_config,
     close_session,
@@ -53,7 +53,7 @@ from backbone.bus.zenoh_sessions import (
     watch_links,
 )
 from backbone.bus.zenoh_settings import LINK_LEASE_MS
-from backbone.errors import NoResponder, Refusal, ReplyTimeout
+from backbone.errors import Refusal
 from backbone.keys import LARGE, NEVER_DROPPED, Conversation, address_of, key, key_of_all, key_of_senders, sender_of
 from backbone.wire import (
     MAX_LARGE_MESSAGE_BYTES,
@@ -107,6 +107,8 @@ class ZenohBus(InboxBus):
         self._links = None if shared else watch_links(session)
         self._declared: set[Declared] = set()
         self._outlets = Outlets(session, mission, source, only_elsewhere=shared)
+        self.ways = Ways(self, session, mission, source, only_elsewhere=shared)
+        """To whom it asks again and again."""
         self._outlet(source, Conversation.TOLD)  # knows who overhears before the first question is answered
 
     @classmethod
@@ -134,76 +136,67 @@ class ZenohBus(InboxBus):
         asked_key = key(self._mission, address, Conversation.ASK)
         answered = self.open_question()
         self.asked += 1
-        arrived = FirstReply(self, answered)
-        cancel = zenoh.CancellationToken()
         try:
-            payload = write(self.envelope(question))
-            self._session.get(
-                asked_key,
-                zenoh.handlers.Callback(arrived.reply, arrived.end, indirect=False),
-                payload=payload,
-                timeout=max(0.0, within_s),
-                express=True,
-                cancellation_token=cancel,
-            )
-            got = await answered
-        except asyncio.CancelledError:
-            cancel.cancel()  # type: ignore[no-untyped-call]
-            raise
+            payload, way = write(self.envelope(question)), self.ways.way_to(address)
+            if way is not None:
+                came = await self.ways.ask(way, payload, answered, within_s)
+            else:
+                with self.ways.querying(address):
+                    got = await query(self, self._session, asked_key, payload, answered, within_s)
+                came = self._came_of(address, got)
         finally:
             self.end_question(answered)
-        return self._read_reply(address, question, reply, got, within_s)
+        try:
+            return read_answer(came, address, question, reply, within_s)
+        except MalformedMessage:
+            self.unreadable += 1
+            raise
 
-    def _read_reply(
-        self, address: str, question: Message, reply: type[Reply], got: zenoh.Reply | None, within_s: float
-    ) -> Reply:
-        what = type(question).__name__
+    def _came_of(self, address: str, got: zenoh.Reply | None) -> Came:
         if got is None:
-            raise NoResponder(f"no component answered {what} at {address}")
+            return None
         if got.err is not None:
             payload = got.err.payload.to_bytes()
-            if payload == _TIMEOUT_PAYLOAD:
-                raise ReplyTimeout(f"{address} did not answer {what} within {within_s:g} s")
-        else:
-            payload = cast("zenoh.Sample", got.ok).payload.to_bytes()
-        try:
-            body = reply_reader_of(reply).read(payload).body
-        except Refusal as unreadable:
-            self.unreadable += 1
-            raise MalformedMessage(
-                f"{address} answered {what} with something else: {unreadable.detail}"
-            ) from unreadable
-        if isinstance(body, Refused):
-            raise body.revive()
-        return cast("Reply", body)
+            return TooLate if payload == _TIMEOUT_PAYLOAD else payload
+        sample = cast("zenoh.Sample", got.ok)
+        self.ways.answered(address, sample.attachment)
+        return sample.payload.to_bytes()
 
     def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
         reader = reader_of(accepts)
-        own = key(self._mission, address, Conversation.ASK)
+        own, inbox = key(self._mission, address, Conversation.ASK), new_inbox(self._mission, address)
 
-        def arrived(query: zenoh.Query) -> None:
-            self.start(self._answer(reader, answer, own, query))
+        def asked(came: zenoh.Query) -> None:
+            self.start(self._answer(reader, answer, Query(came, own, inbox)))
 
-        return self._declare(self._session.declare_queryable(own, lambda query: self.push(arrived, query)))
+        def asked_directly(sample: zenoh.Sample) -> None:
+            if (question := DirectQuestion.of(self._session, self._mission, sample)) is None:
+                self.unreadable += 1
+            else:
+                self.start(self._answer(reader, answer, question))
 
-    async def _answer(self, reader: Reader[Message], answer: Answer, own: str, query: zenoh.Query) -> None:
+        direct = self._session.declare_subscriber(inbox, lambda sample: self.push(asked_directly, sample))
+        queries = self._session.declare_queryable(own, lambda came: self.push(asked, came))
+        return self._declare(Both(direct, queries))
+
+    async def _answer(self, reader: Reader[Message], answer: Answer, asked: Query | DirectQuestion) -> None:
         try:
-            question = reader.read(bytes_of(query.payload))
+            question = reader.read(bytes_of(asked.payload))
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
-                query.reply(own, self._write_reply(envelope), express=True)
+                asked.answer(self._write_reply(envelope))
                 self.tell(self.source, Conversation.ASK, question, envelope)
         except Refusal as unreadable:
             self.unreadable += 1
-            query.reply_err(write(self.envelope(Refused.of(unreadable))))
+            asked.refuse(write(self.envelope(Refused.of(unreadable))))
         except zenoh.ZError as error:  # the requester or the link is gone
-            log.info("reply on %s not sent: %s", own, error)
+            log.info("a reply of %s was not sent: %s", self.source, error)
         except Exception as bug:  # the reply cannot be encoded
             self.on_bug(bug)
         finally:
-            query.drop()  # type: ignore[no-untyped-call]
+            asked.drop()
 
     def _write_reply(self, envelope: Envelope[Message]) -> bytes:
         try:
@@ -386,6 +379,7 @@ class ZenohBus(InboxBus):
     async def leave(self) -> None:
         """Close the session unless other buses use it; return when its threads have ended."""
         self.empty_inbox()  # pending questions: their requesters get ``NoResponder``
+        self.ways.close()
         if not self._shared:
             self._outlets.close_boards()
             if self.copies is not None:
