@@ -72,6 +72,9 @@ def _unit(unit: Element) -> dict[str, object]:
         "name": unit.text("name"),
         "frequency_hz": unit.number("frequency-hz") or 0.0,
         "on_input": unit.text("on-input"),
+        "own_thread": bool(unit.flag("own-thread")),
+        "nice": int(unit.text("nice") or 0),
+        "cpus": [int(number) for number in unit.text("cpus").split()],
         "modules": [
             {
                 "name": module.text("name"),

@@ -16,6 +16,7 @@ from backbone.naming import Subsystem, address
 from mission_control.modules.graph import OUTSIDE, Graph, GraphRefused, WiringFault
 from mission_control.modules.orders import (
     ModuleOrder,
+    Running,
     Source,
     UnitParameters,
     is_message,
@@ -23,12 +24,11 @@ from mission_control.modules.orders import (
     output_address,
 )
 from mission_control.modules.ports import kinds_of_ports, type_name
-from mission_control.modules.unit_schedule import Trigger
 
 _NAMED = re.compile(r"`(?:\$\.)?(\w+)`")  # the parameter that msgspec speaks of
 
 
-class UnitOrder(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class UnitOrder(Running, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A unit.
 
     Attributes:
@@ -94,8 +94,7 @@ def _parameters(
         and not any(key == taken for other in every if other is not member for taken, _ in other.keyed_inputs)
     ]
     return UnitParameters(
-        frequency_hz=unit.frequency_hz,
-        on_input=unit.on_input,
+        **{name: getattr(unit, name) for name in Running.__struct_fields__},
         modules=unit.modules,
         sources={
             key: given[key].source
@@ -134,7 +133,8 @@ def judged(question: UnitsQuestion) -> Arranged:
         try:
             units.append(msgspec.convert(declared, UnitOrder))
         except msgspec.ValidationError as error:
-            found.append(UnitFault(str(error), "Give the unit a frequency or an input", unit=str(declared["name"])))
+            remedy = "Give the unit a frequency or an input, and a thread of its own if it needs one"
+            found.append(UnitFault(str(error), remedy, unit=str(declared["name"])))
     given = {key: msgspec.convert(one, GivenKey) for key, one in question.given.items()}
     found += [fault for unit in units for order in unit.modules for fault in _of_class(order)]
     found += [fault for key, one in given.items() for fault in _of_given(key, one)]

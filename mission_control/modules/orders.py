@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from typing import TypeGuard
+from typing import Annotated, TypeGuard
 
 import msgspec
 
@@ -72,7 +72,26 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     conversation: Conversation = Conversation.OUTPUTS
 
 
-class UnitParameters(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Running(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """When and where a unit has its rounds.
+
+    Attributes:
+        own_thread: Whether the rounds run in a thread of their own, beside the event loop.
+        nice: Added to the niceness of that thread.
+        cpus: Processors that it may run on; empty: all.
+    """
+
+    own_thread: bool = False
+    nice: Annotated[int, msgspec.Meta(ge=-20, le=19)] = 0
+    cpus: list[Annotated[int, msgspec.Meta(ge=0)]] = []
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.nice or self.cpus) and not self.own_thread:
+            raise ValueError("niceness and processors are those of a thread; let the unit have a thread of its own")
+
+
+class UnitParameters(Running, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Parameters of the component that runs a unit.
 
     Attributes:

@@ -6,7 +6,17 @@ from pydantic import Field
 
 from backbone.keys import Conversation as ConversationWord
 from backbone.mission.declaration.parts import Declared, ParameterElement
-from backbone.mission.declaration.values import ClassPath, Conversation, Frequency, Name, OnInput, SourceAddress
+from backbone.mission.declaration.values import (
+    ClassPath,
+    Conversation,
+    Flag,
+    Frequency,
+    Name,
+    Nice,
+    OnInput,
+    Processors,
+    SourceAddress,
+)
 
 
 class InputElement(Declared):
@@ -50,6 +60,18 @@ class UnitElement(Declared):
         description=(
             "When an input from outside the unit begins a round: any of them, all of them since they last did, or none."
         ),
+    )
+    own_thread: Flag = Field(
+        default=False,
+        description="Whether its rounds run in a thread of their own, where they delay nothing else of its process.",
+    )
+    nice: Nice = Field(
+        default=0,
+        description="Added to the niceness of its own thread, -20 to 19; above 0: other threads come first.",
+    )
+    cpus: Processors = Field(
+        default="",
+        description="Processors that its own thread may run on, as numbers separated by blanks; left out: all.",
     )
     host: Name = Field(default="", description="The host it runs on; left out: any.")
     process: Name = Field(

@@ -62,6 +62,13 @@ def test_units_are_described_with_their_connections(tmp_path: Path) -> None:
     }
     assert (then.parameters["frequency_hz"], then.parameters["on_input"]) == (5.0, "none")
     assert then.parameters["published"] == ["sum"]
+    assert not then.parameters["own_thread"]
+
+
+def test_a_unit_with_a_thread_is_described_with_its_place(tmp_path: Path) -> None:
+    place = ' own-thread="true" nice="-5" cpus="0 3"'
+    [one] = read(tmp_path, mission(unit("one", DOUBLER, attributes=place))).units
+    assert [one.parameters[name] for name in ("own_thread", "nice", "cpus")] == [True, -5, [0, 3]]
 
 
 def test_who_must_not_import_anything_reads_the_file_without_connections() -> None:
@@ -104,6 +111,14 @@ HOST = '<hosts><host name="base" address="127.0.0.1"/></hosts>'
         (mission(unit("one", module("no", "sample_modules:Number"))), ["5:19 sample_modules:Number is no module"]),
         (mission(unit("one", module("plain", "test_unit_component:Plain"))), ["4:7 unit one never runs"]),
         (
+            mission(unit("one", DOUBLER, attributes=' cpus="0"')),
+            ["4:7 niceness and processors are those of a thread; let the unit have a thread of its own"],
+        ),
+        (
+            mission(unit("one", DOUBLER, attributes=' own-thread="maybe" nice="20" cpus="0,1"')),
+            ["4:18 own-thread='maybe'", "4:37 nice='20'", "4:47 cpus='0,1'"],
+        ),
+        (
             mission(unit("one", DOUBLER), given=GIVEN.replace("sample_modules:Number", "sample_modules:Counter")),
             ["3:21 sample_modules:Counter, the class of number, is no message"],
         ),
@@ -145,7 +160,7 @@ def test_an_execution_unit_is_no_behavior(tmp_path: Path) -> None:
 
 
 def test_the_guide_shows_the_example() -> None:
-    [shown] = re.findall(r"```xml\n(.*?)```", (TOP / "docs/how-to/write-a-module.md").read_text(), re.DOTALL)
+    shown, *_ = re.findall(r"```xml\n(.*?)```", (TOP / "docs/how-to/write-a-module.md").read_text(), re.DOTALL)
     assert textwrap.indent(shown, "  ") in (TOP / "docs/examples/pair.xml").read_text()
 
 
