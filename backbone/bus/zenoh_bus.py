@@ -68,6 +68,7 @@ _TIMEOUT_PAYLOAD = b"Timeout"
 _URGENT = (zenoh.Priority.REAL_TIME, zenoh.CongestionControl.BLOCK)
 _SURE = (zenoh.Priority.DATA, zenoh.CongestionControl.BLOCK)
 TELL_WITHIN_S = 0.01  # chosen: copies for recorders are made after a context switch, not in it; a death loses so much
+UNHEARD_AFTER_S = 1.0  # chosen: the hub reports its subscribers to a new publisher in milliseconds; until then it sends
 MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
 _REPEATED = (zenoh.Priority.DATA, zenoh.CongestionControl.DROP)
 _BULK = (zenoh.Priority.DATA_LOW, zenoh.CongestionControl.DROP)
@@ -164,6 +165,7 @@ class ZenohBus(InboxBus):
         self._links = None if shared else watch_links(session)
         self._declared: set[_Declared] = set()
         self._publishers: OrderedDict[tuple[str, Conversation], zenoh.Publisher] = OrderedDict()
+        self._unheard_from_s: dict[tuple[str, Conversation], float] = {}
         self._publisher(source, Conversation.TOLD)  # knows who overhears before the first question is answered
 
     @classmethod
@@ -286,15 +288,27 @@ class ZenohBus(InboxBus):
                 self.tell(address, conversation, envelope)
 
     def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Message]:
-        """Publish over the session and return the envelope."""
+        """Publish over the session and return the envelope. An output that nobody out there hears is not encoded."""
         publisher = self._publisher(address, conversation)
         self.published += 1
         envelope = self.envelope(message)
+        copies = self.copies
+        if copies is not None and (conversation is Conversation.TOLD or not copies.wants(conversation)):
+            copies = None
+        if copies is None and conversation is Conversation.OUTPUTS and self._is_unheard(address, conversation):
+            return envelope
         raw = write(envelope)
         publisher.put(raw)
-        if self.copies is not None and self.copies.wants(conversation) and conversation is not Conversation.TOLD:
-            self.copies.send(key(self._mission, address, conversation), raw)
+        if copies is not None:
+            copies.send(key(self._mission, address, conversation), raw)
         return envelope
+
+    def _is_unheard(self, address: str, conversation: Conversation) -> bool:
+        """Return whether certainly no other process subscribes to this; 0.5 µs."""
+        if self._loop.time() < self._unheard_from_s[address, conversation]:
+            return False
+        publisher = cast("Any", self._publishers[address, conversation])  # zenoh's stubs say bool of its status
+        return not publisher.matching_status.matching
 
     def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
         """Publish copies if a component overhears; questions with answers go to the recorder of this host, too."""
@@ -330,8 +344,10 @@ class ZenohBus(InboxBus):
             congestion_control=congestion_control,
             allowed_destination=zenoh.Locality.REMOTE if self._shared else zenoh.Locality.ANY,
         )
+        self._unheard_from_s[address, conversation] = self._loop.time() + UNHEARD_AFTER_S
         while len(self._publishers) > MOST_PUBLISHERS:
-            _, longest_silent = self._publishers.popitem(last=False)
+            silent, longest_silent = self._publishers.popitem(last=False)
+            del self._unheard_from_s[silent]
             longest_silent.undeclare()  # type: ignore[no-untyped-call]
         return publisher
 
