@@ -24,6 +24,7 @@ def check_modules(tables: Tables, report: Report) -> None:
     modules = [module for unit in tables.units for module in unit.all("module")]
     check_unique(section.all("given"), "key", "given key", report)
     check_unique(modules, "name", "module", report)
+    check_unique([choice for unit in tables.units for choice in unit.all("choose")], "key", "choice of", report)
     for element in (*section.all("given"), *modules):
         if CLASS_PATH.fullmatch(element.text("class")):
             check_class_path(element, "class", report)
@@ -85,6 +86,10 @@ def _unit(unit: Element) -> dict[str, object]:
             }
             for module in unit.all("module")
         ],
+        "choices": [
+            {"key": one.text("key"), "source": one.text("from"), "others": one.text("or").split()}
+            for one in unit.all("choose")
+        ],
     }
 
 
@@ -104,6 +109,9 @@ def _places(tables: Tables, fault: UnitFault) -> Iterator[Place]:
                     if part.text("name") == fault.port:
                         yield part.place_of("value" if part.tag == "parameter" else "key")
                 yield module.place_of("name")
+        for choice in unit.all("choose"):
+            if fault.module == f"choose-{choice.text('key')}":
+                yield choice.place_of("from" if fault.port.startswith("from") else "key")
         if fault.unit and unit.text("name") == fault.unit:
             yield unit.place_of("name")
     if section is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import operator
 from typing import Annotated, TypeGuard
 
 import msgspec
@@ -98,11 +99,13 @@ class UnitParameters(Running, frozen=True, forbid_unknown_fields=True, kw_only=T
         modules: What it runs.
         sources: Key → where its values come from, for what the unit does not produce itself.
         published: Keys of the outputs that others get.
+        chosen: Key → chosen source, where it is another than the first one of a ``Choice``; settable.
     """
 
     modules: list[ModuleOrder]
     sources: dict[str, Source] = {}
     published: list[str] = []
+    chosen: dict[str, str] = {}
 
 
 def output_address(unit: str, key: str) -> str:
@@ -128,7 +131,7 @@ def load_at(class_path: str) -> object:
     """
     file, _, name = class_path.partition(":")
     try:
-        return getattr(importlib.import_module(file), name)
+        return operator.attrgetter(name)(importlib.import_module(file))
     except Exception as error:  # a file that is being written raises anything
         raise WrongModule(f"{class_path}: {type(error).__name__}: {error}", class_path=class_path) from error
 

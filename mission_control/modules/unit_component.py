@@ -13,6 +13,8 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
+import msgspec
+
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, WrongParameter
 from backbone.component.launch import Launch
@@ -22,6 +24,7 @@ from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.debug_views import DebugViews
 from mission_control.modules.arrangement import judged
+from mission_control.modules.choice import Choice
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.graph import Graph
 from mission_control.modules.orders import UnitParameters, WrongModule, is_message, output_address
@@ -68,6 +71,8 @@ class UnitComponent(Component[UnitParameters]):
         for name, module in self._modules.items():
             module.debug = ViewsOfModule(name, self._views)
         self._unit: ExecutionUnit = self._new_unit()
+        self._as_started = msgspec.structs.replace(given, chosen={})
+        self._choose()
         self._thread: UnitThread | None = None
         self._place: ThreadPlace | None = None
         self._missed, self._report_again_s = 0, -math.inf
@@ -108,10 +113,30 @@ class UnitComponent(Component[UnitParameters]):
                 raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 
     def parameters_changed(self) -> None:
-        """Refuse: modules and connections are those of the start."""
-        raise WrongParameter(
-            f"{self.name} runs the modules it was started with", remedy="Change the mission file and start it again."
-        )
+        """Choose sources; all else is as at the start.
+
+        Raises:
+            WrongParameter: Something else is to change, or there is no such choice.
+        """
+        if msgspec.structs.replace(self.parameters, chosen={}) != self._as_started:
+            raise WrongParameter(
+                f"{self.name} runs the modules it was started with",
+                remedy="Change the mission file and start it again.",
+            )
+        self._choose()
+
+    def _choose(self) -> None:
+        choices = {one.parameters.key: one for one in self._modules.values() if isinstance(one, Choice)}
+        for key, source in self.parameters.chosen.items():
+            known = choices[key].parameters.sources if key in choices else []
+            if source not in known:
+                told = [f"{one} from {' or '.join(each.parameters.sources)}" for one, each in choices.items()]
+                raise WrongParameter(
+                    f"{self.name} cannot choose {source} as {key}",
+                    remedy=f"Choose {'; '.join(told)}." if told else "Write <choose> in the mission file.",
+                )
+        for key, choice in choices.items():
+            choice.chosen = self.parameters.chosen.get(key, choice.parameters.sources[0])
 
     def statistics(self) -> dict[str, float]:
         """Return rates, lateness and misses of the unit, and the times of each module."""

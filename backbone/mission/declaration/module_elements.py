@@ -12,6 +12,7 @@ from backbone.mission.declaration.values import (
     Flag,
     Frequency,
     Name,
+    Names,
     Nice,
     OnInput,
     Processors,
@@ -43,6 +44,18 @@ class ModuleElement(Declared):
     parameter: tuple[ParameterElement, ...] = ()
     input: tuple[InputElement, ...] = ()
     output: tuple[OutputElement, ...] = ()
+
+
+class ChooseElement(Declared):
+    """A choice: algorithms for one task run side by side, and one of them is the source of a key."""
+
+    key: Name = Field(description="The key that gets the values; unique in the mission.")
+    source: Name = Field(alias="from", description="The key whose values it gets at first.")
+    others: Names = Field(
+        default=(),
+        alias="or",
+        description="Keys of the same class that can be chosen instead while the mission runs, separated by blanks.",
+    )
 
 
 class UnitElement(Declared):
@@ -80,6 +93,7 @@ class UnitElement(Declared):
         "names; left out: a process of its own.",
     )
     module: tuple[ModuleElement, ...] = ()
+    choose: tuple[ChooseElement, ...] = ()
 
 
 class GivenElement(Declared):

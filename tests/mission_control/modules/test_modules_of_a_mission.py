@@ -71,6 +71,17 @@ def test_a_unit_with_a_thread_is_described_with_its_place(tmp_path: Path) -> Non
     assert [one.parameters[name] for name in ("own_thread", "nice", "cpus")] == [True, -5, [0, 3]]
 
 
+SIDE_BY_SIDE = module("doubler", "sample_modules:Doubler", '<output name="twice" key="by-two"/>')
+
+
+def test_a_choice_is_described_as_a_module(tmp_path: Path) -> None:
+    chosen = '<choose key="twice" from="by-two" or="number"/>'
+    [one] = read(tmp_path, mission(unit("one", SIDE_BY_SIDE, SUMMING, chosen))).units
+    assert one.parameters["published"] == ["by-two", "sum"]
+    [*_, choice] = one.parameters["modules"]  # type: ignore[misc]
+    assert (choice["name"], choice["parameters"]["sources"]) == ("choose-twice", ["by-two", "number"])
+
+
 def test_who_must_not_import_anything_reads_the_file_without_connections() -> None:
     classes: dict[str, ClassFacts] = {}
     described = read_mission_bytes(mission(unit("early", DOUBLER)).encode(), "m.xml", classes)
@@ -110,6 +121,14 @@ HOST = '<hosts><host name="base" address="127.0.0.1"/></hosts>'
         (mission(unit("one", module("gone", "sample_modules:Gone"))), ["5:21 sample_modules:Gone: no class Gone"]),
         (mission(unit("one", module("no", "sample_modules:Number"))), ["5:19 sample_modules:Number is no module"]),
         (mission(unit("one", module("plain", "test_unit_component:Plain"))), ["4:7 unit one never runs"]),
+        (
+            mission(unit("one", SIDE_BY_SIDE, SUMMING, '<choose key="twice" from="by-tow"/>')),
+            ["7:21 twice can be chosen from by-tow, and no module produces it (did you mean 'by-two'?)"],
+        ),
+        (
+            mission(unit("one", SIDE_BY_SIDE, '<choose key="by-two" from="number"/>')),
+            ["6:9 choose-by-two produces by-two, and so does doubler"],
+        ),
         (
             mission(unit("one", DOUBLER, attributes=' cpus="0"')),
             ["4:7 niceness and processors are those of a thread; let the unit have a thread of its own"],
