@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import threading
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
@@ -23,7 +23,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
 from mission_control.modules.module import Module
-from mission_control.modules.orders import ModuleOrder, Source
+from mission_control.modules.orders import ModuleOrder, Source, UnitParameters
 from mission_control.modules.os_threads import ThreadRefused, place_thread
 from mission_control.modules.unit_component import UnitComponent
 
@@ -72,23 +72,28 @@ ORDERS = [
 
 
 @asynccontextmanager
+async def running(local_mission: Any, beside: Any, units: Mapping[str, UnitParameters]) -> AsyncIterator[Bus]:
+    """Give a bus beside these units, all in this process."""
+    clock = MissionClock.started_now()
+    async with AsyncExitStack() as stack:
+        network = await stack.enter_async_context(local_mission(clock=clock))
+        for name, parameters in units.items():
+            given = msgspec.to_builtins(parameters)
+            launch = Launch("local", Subsystem.MISSION_CONTROL, name, "unit", "", "local", "", 0.0, 1.0, given)
+            await stack.enter_async_context(beside(UnitComponent(launch, network.join(launch.address, clock), clock)))
+        bus = network.join(TESTER, clock)
+        stack.push_async_callback(bus.close)
+        yield bus
+
+
+@asynccontextmanager
 async def units(
     local_mission: Any, beside: Any, orders: Sequence[UnitOrder] = ORDERS
 ) -> AsyncIterator[tuple[Bus, asyncio.Queue[Number]]]:
     """Give a bus and what comes out at the end, beside the units."""
     OPEN.set()
     heard: asyncio.Queue[Number] = asyncio.Queue()
-    clock = MissionClock.started_now()
-    async with AsyncExitStack() as stack:
-        network = await stack.enter_async_context(local_mission(clock=clock))
-        for name, parameters in arranged(orders, NUMBERS).items():
-            launch = Launch(
-                "local", Subsystem.MISSION_CONTROL, name, "execution_unit", "", "local", "", 0.0, 1.0,
-                msgspec.to_builtins(parameters),
-            )  # fmt: skip
-            await stack.enter_async_context(beside(UnitComponent(launch, network.join(launch.address, clock), clock)))
-        bus = network.join(TESTER, clock)
-        stack.push_async_callback(bus.close)
+    async with running(local_mission, beside, arranged(orders, NUMBERS)) as bus:
         bus.subscribe("mission_control/*/end", Conversation.OUTPUTS, Number, lambda one: heard.put_nowait(one.body))
         yield bus, heard
 
