@@ -215,4 +215,4 @@ def test_two_algorithms_stand_side_by_side_as_the_explanation_of_the_vision_show
         for key, kind in (("picture", "GreyPicture"), ("swapped_in", "SwappedIn"))
     )
     [vision] = read(tmp_path, mission(shown, given=given)).units
-    assert vision.parameters["published"] == ["motion", "motion-by-difference"]
+    assert vision.parameters["published"] == ["judged", "motion", "motion-by-difference"]
