@@ -45,6 +45,7 @@ class UnitComponent(Component[UnitParameters]):
     """Runs the modules of one unit in the component's event loop, or in a thread of their own beside it."""
 
     parameters_type = UnitParameters
+    shares_process = False
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(UnitParameters.__struct_fields__)
     accepts: ClassVar[Accepts | None] = ListViews | LookAt
 
