@@ -21,6 +21,7 @@ import msgspec
 
 from backbone.addresses import NAMESERVER
 from backbone.authentication import secret_of
+from backbone.bus.host_boards import boards_for
 from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -133,7 +134,7 @@ class Component(Generic[P_co]):
         """Open the component's bus: a client of the hub, unless the class is the hub."""
         config = client_config(launch.endpoint, secret_of(launch.run_directory))
         bus = ZenohBus.open(launch.mission, launch.address, clock, config)
-        bus.copies = copies_for(launch.run_directory)
+        bus.copies, bus.boards = copies_for(launch.run_directory), boards_for(launch.run_directory)
         return bus
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

@@ -12,7 +12,7 @@ from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.component.launch import Launch
 from backbone.creator.messages import RestartPolicy, creator_name
-from backbone.creator.preload import arc_modules
+from backbone.creator.preload import preloaded_modules
 from backbone.mission.model import Host, MissionDescription
 from backbone.naming import Subsystem
 
@@ -56,7 +56,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
         "placer": lambda _: {"packs": options.pack},
         "creator": lambda host: {
             "tags": list(host.tags),
-            "preload": arc_modules(description.types),
+            "preload": preloaded_modules(description.types, description.placed_types()),
             "types": types,
         },
         "dependency_database": lambda _: {"resources": resources, "kinds": kinds},

@@ -9,7 +9,7 @@ import pytest
 import pytest_asyncio
 from free_ports import free_endpoint
 
-from backbone.bus import zenoh_bus
+from backbone.bus import zenoh_bus, zenoh_outlets
 from backbone.bus.clock import MissionClock
 from backbone.bus.shared_bus import SharedBus, SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
@@ -37,7 +37,7 @@ def encoded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return write(envelope)
 
     monkeypatch.setattr(zenoh_bus, "write", counting)
-    monkeypatch.setattr(zenoh_bus, "UNHEARD_AFTER_S", 0.0)
+    monkeypatch.setattr(zenoh_outlets, "KNOWN_AFTER_S", 0.0)
     return numbers
 
 
@@ -85,7 +85,7 @@ async def test_outputs_to_neighbors_are_not_encoded_until_another_process_hears_
 async def test_a_new_publisher_encodes_until_it_knows_who_hears(
     buses: tuple[SharedBus, SharedBus, ZenohBus], encoded: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(zenoh_bus, "UNHEARD_AFTER_S", WITHIN_S)
+    monkeypatch.setattr(zenoh_outlets, "KNOWN_AFTER_S", WITHIN_S)
     unit, _taker, _stranger = buses
     unit.publish(OUTPUT, Conversation.OUTPUTS, Ball(1))
     unit.publish(OUTPUT, Conversation.EVENTS, Ball(2))
