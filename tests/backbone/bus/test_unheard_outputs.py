@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 import pytest
 import pytest_asyncio
@@ -31,22 +32,25 @@ def encoded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     numbers: list[int] = []
     write = zenoh_bus.write
 
-    def counting(envelope: Envelope[Message]) -> bytes:
+    def counting(envelope: Envelope[Message], *limit: int) -> bytes:
         if isinstance(envelope.body, Ball):
             numbers.append(envelope.body.number)
-        return write(envelope)
+        return write(envelope, *limit)
 
     monkeypatch.setattr(zenoh_bus, "write", counting)
     monkeypatch.setattr(zenoh_outlets, "KNOWN_AFTER_S", 0.0)
     return numbers
 
 
-@pytest_asyncio.fixture
-async def buses() -> AsyncIterator[tuple[SharedBus, SharedBus, ZenohBus]]:
-    """Give the buses of two neighbors and of a stranger."""
+@pytest_asyncio.fixture(params=["without a folder", "with the mission's folder"])
+async def buses(
+    request: pytest.FixtureRequest, short_path: Path
+) -> AsyncIterator[tuple[SharedBus, SharedBus, ZenohBus]]:
+    """Give the buses of two neighbors and of a stranger; with a folder, large values go by blackboards."""
+    directory = str(short_path) if request.param.startswith("with ") else ""
     endpoint, clock = free_endpoint(), MissionClock.started_now()
     hub = ZenohBus.open("pool", "backbone/hub", clock, hub_config([endpoint]))
-    session = SharedSession("pool", endpoint)
+    session = SharedSession("pool", endpoint, directory=directory)
     neighbors = session.join(UNIT, clock), session.join(TAKER, clock)
     stranger = ZenohBus.open("pool", "ui_console/stranger", clock, client_config(endpoint))
     yield *neighbors, stranger
