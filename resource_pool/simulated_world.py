@@ -54,6 +54,7 @@ class SimulatedWorld(Component[WorldParameters]):
     """Plays robots and room for the simulated drivers, and audits the packets on the air."""
 
     parameters_type = WorldParameters
+    shares_process = False
     given_elsewhere = frozenset({"world"})
     accepts = AskWorld | AskPose | AskHome | AskFloorPlan
 

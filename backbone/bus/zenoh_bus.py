@@ -222,6 +222,8 @@ class ZenohBus(InboxBus):
         if outlet.board is not None:
             self._send_large(outlet, outlet.board, envelope, copies)
             return envelope
+        if copies is None and conversation is Conversation.OUTPUTS and outlet.is_unheard(self._loop.time()):
+            return envelope  # the next output follows soon; other messages may be the last for long
         raw = write(envelope)
         outlet.publisher.put(raw)
         if copies is not None:

@@ -60,6 +60,10 @@ class Outlet:
         """Whether the network is known to have a subscriber; 0.5 µs."""
         return bool(cast("Any", self.publisher).matching_status.matching)
 
+    def is_unheard(self, now_s: float) -> bool:
+        """Return whether the network is known to have no subscriber; also without a board."""
+        return now_s >= self._known_s and not self.has_subscriber
+
     def raise_token(self, session: zenoh.Session, source: str, *, anew: bool) -> None:
         """Let listeners know this sender of the key, again if its board was opened just now."""
         if anew and self._token is not None:

@@ -105,6 +105,8 @@ class Component(Generic[P_co]):
     """Its own questions, besides the common ones: a message class or a union of them."""
     is_robot: ClassVar[bool] = False
     """True for the RC of a robot, which operators can stop."""
+    shares_process: ClassVar[bool] = True
+    """False for a class that computes for long; where the mission file names no process, it then has one of its own."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
 
