@@ -23,6 +23,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.host_boards import LARGE_BYTES, boards_for
 from backbone.bus.shared_bus import SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.zenoh_outlets import MOST_PUBLISHERS
 from backbone.keys import Conversation
 from backbone.ranges import Bulk, Count
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, Message, OversizedMessage
@@ -358,3 +359,43 @@ async def test_a_lost_board_sends_the_listener_to_the_network_at_once(folder: Pa
         await until(lambda: len(heard.all) > count, "it is heard again", send)
         await until_near(network, send)
         assert heard.numbers() == sorted(set(heard.numbers()))
+
+
+async def test_who_publishes_under_ever_new_addresses_does_not_collect_boards(folder: Path) -> None:
+    """As a framegrabber does for each ARC that holds it."""
+    async with host(folder) as near:
+        sender = near.join(SERVER)
+        for number in range(MOST_PUBLISHERS + 20):
+            sender.publish(f"resource_pool/arc-{number}", SAID, picture(number))
+        files = list((folder / "board").iterdir())
+        assert len(files) <= 2 * MOST_PUBLISHERS
+        await sender.close()
+        assert list((folder / "board").iterdir()) == []
+
+
+async def test_a_member_that_moved_to_another_process_is_heard_there(folder: Path, network: list[int]) -> None:
+    endpoint = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    here, there = (SharedSession(MISSION, endpoint, "", str(folder)) for _ in range(2))
+    listener, other = here.join(ASKER, CLOCK), there.join(THIRD, CLOCK)
+    heard, sent = Heard(), list[int]()
+    listener.subscribe(AT, SAID, Map, heard, latest=True)
+    for session in (here, there, here):
+        sender = session.join(SERVER, CLOCK)
+
+        def both(sender: Any = sender) -> None:
+            sending(other, sent)()
+            sending(sender, sent)()
+
+        before = len(heard.all)
+        await until(
+            lambda n=before: {SERVER, THIRD} <= {e.source for e in heard.all[n:]},  # type: ignore[misc]
+            "both are heard",
+            both,
+        )
+        await sender.close()
+    for bus in (listener, other):
+        await bus.close()
+    for session in (here, there):
+        await session.close()
+    await hub.close()
