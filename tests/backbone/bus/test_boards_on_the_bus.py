@@ -6,6 +6,7 @@ The laws of all publications hold for them as well (``test_bus_publications``); 
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -18,7 +19,9 @@ import pytest
 from bus_laws import ASKER, SERVER, THIRD, Heard, fail_on_bug, until_known, within
 from free_ports import free_endpoint
 
-from backbone.bus import zenoh_outlets
+from backbone.blackboard import sealed_memory
+from backbone.blackboard.values import MOST_IN_PACKET
+from backbone.bus import host_boards, zenoh_outlets
 from backbone.bus.clock import MissionClock
 from backbone.bus.host_boards import LARGE_BYTES, boards_for
 from backbone.bus.shared_bus import SharedSession
@@ -26,7 +29,14 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.bus.zenoh_outlets import MOST_PUBLISHERS
 from backbone.keys import Conversation
 from backbone.ranges import Bulk, Count
-from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, Message, OversizedMessage
+from backbone.wire import (
+    MAX_LARGE_MESSAGE_BYTES,
+    MAX_MESSAGE_BYTES,
+    WIRE_VERSION,
+    Envelope,
+    Message,
+    OversizedMessage,
+)
 
 MISSION, CLOCK = "boards", MissionClock.started_now()
 AT, SAID = SERVER, Conversation.FRAMES
@@ -226,18 +236,21 @@ async def test_other_listeners_get_every_picture_by_the_network(folder: Path, ne
 
 
 async def test_a_second_sender_is_heard_while_the_first_goes_on(folder: Path, network: list[int]) -> None:
-    """On this host, and from a host without a board: a framegrabber elsewhere that the ARC holds now."""
+    """From another host, from a system without blackboards, and on this host."""
     async with host(folder) as near:
         first, listener = near.join(SERVER), near.join(ASKER)
         heard, sent = Heard(), list[int]()
         listener.subscribe(AT, SAID, Map, heard, latest=True)
         await until_known(listener, first)
         await until_near(network, sending(first, sent))
-        for source, is_near in (("resource_pool/far", False), ("resource_pool/near", True)):
-            other = near.join(source, is_near=is_near)
-            if not is_near:  # a sender of another host has a board there
-                other.boards = boards_for(str(folder / "elsewhere"))
-                (folder / "elsewhere").mkdir()
+        (folder / "elsewhere").mkdir()
+        for source, its_folder in (
+            ("resource_pool/far", folder / "elsewhere"),  # a sender of another host has a board there
+            ("resource_pool/boardless", None),
+            ("resource_pool/near", folder),
+        ):
+            other = near.join(source)
+            other.boards = boards_for(str(its_folder)) if its_folder else None
 
             def both(other: ZenohBus = other) -> None:
                 sending(first, sent)()
@@ -253,6 +266,22 @@ async def test_a_second_sender_is_heard_while_the_first_goes_on(folder: Path, ne
         for source in {e.source for e in heard.all}:
             numbers = [e.sequence for e in heard.all if e.source == source]
             assert numbers == sorted(set(numbers))
+
+
+async def test_a_replay_is_heard_beside_a_board(folder: Path, network: list[int]) -> None:
+    async with host(folder) as near:
+        sender, listener, player = near.join(SERVER), near.join(ASKER), near.join(THIRD)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        await until_near(network, send := sending(sender, sent))
+        recorded = Envelope(WIRE_VERSION, "resource_pool/then", 5, 1.0, "", picture(77))
+
+        def play() -> None:
+            player.pass_on(AT, SAID, recorded)
+            send()
+
+        await until(lambda: any(e.source == recorded.source for e in heard.all), "the replay is heard", play)
 
 
 async def test_a_sender_that_ends_and_begins_anew_is_heard_again(folder: Path, network: list[int]) -> None:
@@ -305,6 +334,30 @@ async def test_a_large_output_reaches_this_host_and_a_longer_one_is_refused(fold
             far.publish(AT, Conversation.OUTPUTS, picture(8, size))
         with pytest.raises(OversizedMessage):
             sender.publish(AT, Conversation.EVENTS, picture(8, size))
+
+
+@pytest.mark.parametrize("at", ["sealed", "mapped"])
+async def test_without_memory_or_descriptors_pictures_go_by_the_network(
+    folder: Path, network: list[int], monkeypatch: pytest.MonkeyPatch, at: str
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        send = sending(sender, sent, 2 * MOST_IN_PACKET)
+        await until_near(network, send)
+        with monkeypatch.context() as patched:
+            patched.setattr(sealed_memory, at, refuse)
+            send()
+            count = len(heard.all)
+            await until(lambda: len(heard.all) > count + 5, "they are heard", send)
+        await asyncio.sleep(host_boards.LOOK_EACH_S)
+        await until_near(network, send)
+        assert heard.numbers() == sorted(set(heard.numbers()))
 
 
 async def test_an_unreadable_value_on_a_board_is_counted_and_skipped(folder: Path, network: list[int]) -> None:
