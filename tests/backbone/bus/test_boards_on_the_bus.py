@@ -452,3 +452,28 @@ async def test_a_member_that_moved_to_another_process_is_heard_there(folder: Pat
     for session in (here, there):
         await session.close()
     await hub.close()
+
+
+async def test_pictures_go_on_while_there_is_no_hub(folder: Path, network: list[int]) -> None:
+    endpoint = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    near = Host(endpoint, folder)
+    sender, listener = near.join(SERVER), near.join(ASKER)
+    heard, sent, links = Heard(), list[int](), Heard()
+    listener.watch_link(links)
+    listener.subscribe(AT, SAID, Map, heard, latest=True)
+    await until_known(listener, sender)
+    await until_near(network, send := sending(sender, sent))
+    await hub.close()
+    await links.until(lambda all_: all_[-1] is False, "the link is lost")
+    for _ in range(20):
+        send()
+        await heard.until(lambda all_: all_[-1].body.number == len(sent), "the newest picture without a hub")
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    await links.until(lambda all_: all_[-1] is True, "the link is back")
+    await until_near(network, send)
+    count = len(heard.all)
+    await until(lambda: len(heard.all) > count + 5, "pictures go on", send)
+    assert heard.numbers() == sorted(set(heard.numbers()))
+    for bus in (sender, listener, hub):
+        await bus.close()
