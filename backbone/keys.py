@@ -105,14 +105,14 @@ def key_of_sender(of: str, source: str) -> str:
     return f"{of}/by/{source}"
 
 
-def sender_of(token: str) -> str:
-    """Return the sender whose token it is.
+def sender_of(of: str, token: str) -> str:
+    """Return the sender of a key whose token it is.
 
     Example:
-        >>> sender_of("scout/iros2001/resource_pool/watch/frames/by/resource_pool/framegrabber1")
-        'resource_pool/framegrabber1'
+        >>> sender_of("scout/iros2001/backbone/by/frames", "scout/iros2001/backbone/by/frames/by/backbone/by")
+        'backbone/by'
     """
-    return token.partition("/by/")[2]
+    return token.removeprefix(f"{of}/by/")
 
 
 def address_of(key_expression: str) -> str:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import uvloop
 import zenoh
-from measuring import helper, percentile, report, summary, wait_for_end_of_input
+from measuring import helper, percentile, report, wait_for_end_of_input
 
 from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
@@ -99,48 +99,48 @@ def place(way: str, size: int) -> str:
     return f"{SENDER}/{way}-{size}"
 
 
+Say = Callable[[], None]
+
+
+def ways_to_say(raw: socket.socket, bare: zenoh.Session, near: ZenohBus, far: ZenohBus, size: int) -> list[Say]:
+    """Return what sends a value of this size by each way."""
+    data = bytes(size)
+    publisher = bare.declare_publisher(f"{BARE_KEY}/{size}")
+
+    def on_bus(bus: ZenohBus, way: str) -> Say:
+        at, view = place(way, size), memoryview(data)
+        return lambda: bus.publish(at, Conversation.OUTPUTS, Large(time.monotonic(), view))
+
+    ways: list[Say] = [
+        lambda: raw.sendall(HEAD.pack(size, time.monotonic()) + data),
+        lambda: publisher.put(HEAD.pack(size, time.monotonic()) + data),
+        on_bus(near, "board"),
+    ]
+    return ways if size > MAX_MESSAGE_BYTES else [*ways, on_bus(far, "network")]
+
+
 async def send(folder: str, values: int) -> None:
     """Be the sending process."""
     endpoint = socket_endpoint(Path(folder))
     near = ZenohBus.open(MISSION, SENDER, CLOCK, client_config(endpoint))
     near.boards = boards_for(folder)
     far = ZenohBus.open(MISSION, f"{SENDER}-far", CLOCK, client_config(endpoint))
-    bare = zenoh.open(client_config(endpoint))
     ready = asyncio.Event()
     near.watch_alive(RECEIVER, lambda _address, alive: ready.set() if alive else None)
     await asyncio.wait_for(ready.wait(), READY_S)
-    raw = socket.socket(socket.AF_UNIX)
-    raw.connect(f"{folder}/raw")
-    for size in SIZES:
-        data = bytes(size)
-        view, publisher = memoryview(data), bare.declare_publisher(f"{BARE_KEY}/{size}")
-
-        def by_socket(data: bytes = data, size: int = size) -> None:
-            raw.sendall(HEAD.pack(size, time.monotonic()) + data)
-
-        def by_zenoh(data: bytes = data, size: int = size, publisher: zenoh.Publisher = publisher) -> None:
-            publisher.put(HEAD.pack(size, time.monotonic()) + data)
-
-        ways: list[Callable[[], None]] = [by_socket, by_zenoh]
-        for way, bus in (("board", near), ("network", far)):
-            if way == "board" or size < MAX_MESSAGE_BYTES:
-                at = place(way, size)
-                ways.append(
-                    lambda bus=bus, at=at, view=view: bus.publish(  # type: ignore[misc]
-                        at, Conversation.OUTPUTS, Large(time.monotonic(), view)
-                    )
-                )
-        for _ in range(values + WARM_UP):
-            for say in ways:
-                say()
-                await CLOCK.sleep_s(PAUSE_S + size * PAUSE_A_BYTE_S)
-    await CLOCK.sleep_s(0.5)
-    bare.put(OVER_KEY, b"", congestion_control=zenoh.CongestionControl.BLOCK)
-    await asyncio.get_running_loop().run_in_executor(None, wait_for_end_of_input)
-    raw.close()
-    for bus in (near, far):
-        await bus.close()
-    bare.close()
+    with zenoh.open(client_config(endpoint)) as bare, socket.socket(socket.AF_UNIX) as raw:
+        raw.connect(f"{folder}/raw")
+        for size in SIZES:
+            ways = ways_to_say(raw, bare, near, far, size)
+            for _ in range(values + WARM_UP):
+                for say in ways:
+                    say()
+                    await CLOCK.sleep_s(PAUSE_S + size * PAUSE_A_BYTE_S)
+        await CLOCK.sleep_s(0.5)
+        bare.put(OVER_KEY, b"", congestion_control=zenoh.CongestionControl.BLOCK)
+        await asyncio.get_running_loop().run_in_executor(None, wait_for_end_of_input)
+    await near.close()
+    await far.close()
 
 
 def be_hub(folder: str) -> None:
@@ -149,68 +149,78 @@ def be_hub(folder: str) -> None:
         wait_for_end_of_input()
 
 
+class Latencies:
+    """How old values were when they arrived, by way and size."""
+
+    def __init__(self) -> None:
+        self.by_way: dict[str, dict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
+
+    def note(self, way: str, size: int, made_s: float) -> None:
+        """Take a value that arrives now."""
+        self.by_way[way][size].append(time.monotonic() - made_s)
+
+    def report(self, values: int) -> None:
+        """Print the line."""
+        told = {way: {size: of[WARM_UP:] for size, of in by_size.items()} for way, by_size in self.by_way.items()}
+        p50 = {
+            way: {size: percentile(of, 0.5) * 1e6 for size, of in by_size.items() if of}
+            for way, by_size in told.items()
+        }
+        report(
+            "placements",
+            values=values,
+            p50_us={way: {size: round(each, 1) for size, each in by_size.items()} for way, by_size in p50.items()},
+            arrived={
+                way: {size: round(len(of) / values, 2) for size, of in by_size.items()} for way, by_size in told.items()
+            },
+            ratio={
+                way: {size: round(each / p50[floor][size], 2) for size, each in p50[way].items() if size in p50[floor]}
+                for way, floor in (("board", "socket"), ("network", "zenoh"))
+            },
+        )
+
+
 async def measure(folder: str, values: int) -> None:
     """Be the receiving process, and report."""
-    latencies: dict[tuple[str, int], list[float]] = defaultdict(list)
-    endpoint, loop, over = socket_endpoint(Path(folder)), asyncio.get_running_loop(), asyncio.Event()
-
-    def note(way: str, size: int, made_s: float) -> None:
-        latencies[way, size].append(time.monotonic() - made_s)
+    latencies, endpoint = Latencies(), socket_endpoint(Path(folder))
+    loop, over = asyncio.get_running_loop(), asyncio.Event()
 
     async def read(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
             while True:
                 size, made_s = HEAD.unpack(await reader.readexactly(HEAD.size))
                 await reader.readexactly(size)
-                note("socket", size, made_s)
+                latencies.note("socket", size, made_s)
         except (asyncio.IncompleteReadError, asyncio.CancelledError):
             writer.close()  # asyncio prints a stream's handler that is cancelled as a bug
 
     def arrived(sample: zenoh.Sample) -> None:
-        note("zenoh", *HEAD.unpack_from(sample.payload.to_bytes()))
+        latencies.note("zenoh", *HEAD.unpack_from(sample.payload.to_bytes()))
+
+    def listen(way: str, size: int) -> None:
+        bus.subscribe(
+            place(way, size),
+            Conversation.OUTPUTS,
+            Large,
+            lambda one: latencies.note(way, len(one.body.data), one.body.made_s),
+            latest=True,
+        )
 
     server = await asyncio.start_unix_server(read, f"{folder}/raw", limit=max(SIZES))
     bus = ZenohBus.open(MISSION, RECEIVER, CLOCK, client_config(endpoint))
     bus.boards = boards_for(folder)
-    bare = zenoh.open(client_config(endpoint))
+    with zenoh.open(client_config(endpoint)) as bare:
+        for size in SIZES:
+            bare.declare_subscriber(f"{BARE_KEY}/{size}", lambda sample: loop.call_soon_threadsafe(arrived, sample))
+            listen("board", size)
+            listen("network", size)
+        bare.declare_subscriber(OVER_KEY, lambda _sample: loop.call_soon_threadsafe(over.set))
+        bus.declare_alive(RECEIVER)
+        await over.wait()
     for size in SIZES:
-        bare.declare_subscriber(f"{BARE_KEY}/{size}", lambda sample: loop.call_soon_threadsafe(arrived, sample))
-        for way in ("board", "network"):
-            bus.subscribe(
-                place(way, size),
-                Conversation.OUTPUTS,
-                Large,
-                lambda one, way=way: note(way, len(one.body.data), one.body.made_s),  # type: ignore[misc]
-                latest=True,
-            )
-    bare.declare_subscriber(OVER_KEY, lambda _sample: loop.call_soon_threadsafe(over.set))
-    bus.declare_alive(RECEIVER)
-    await over.wait()
-    for size in SIZES:
-        latencies["unit", size] = in_one_unit(size, values + WARM_UP)
-    told = {
-        way: {size: of[WARM_UP:] for (named, size), of in latencies.items() if named == way} for way, _ in latencies
-    }
-    p50_us = {way: {size: summary(of)["p50_us"] for size, of in by_size.items() if of} for way, by_size in told.items()}
-    floors = (("board", "socket"), ("network", "zenoh"))
-    report(
-        "placements",
-        values=values,
-        p50_us=p50_us,
-        arrived={
-            way: {size: round(len(of) / values, 2) for size, of in by_size.items()} for way, by_size in told.items()
-        },
-        ratio={
-            way: {
-                size: round(percentile(of, 0.5) / percentile(told[floor][size], 0.5), 2)
-                for size, of in told[way].items()
-                if of and told[floor].get(size)
-            }
-            for way, floor in floors
-        },
-    )
+        latencies.by_way["unit"][size] = in_one_unit(size, values + WARM_UP)
+    latencies.report(values)
     await bus.close()
-    bare.close()
     server.close()
 
 

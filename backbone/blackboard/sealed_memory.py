@@ -129,10 +129,18 @@ def receive(source: socket.socket, most_bytes: int) -> tuple[bytes, list[int]]:
     return raw, list(descriptors)
 
 
-def discard(undelivered_at: socket.socket) -> None:
-    """Take back the packet that waits in a socket, if there is one; the system closes its descriptors."""
+def peek(undelivered_at: socket.socket, length: int) -> bytes:
+    """Return the begin of the oldest packet that waits in a socket, which stays there; b"": none waits."""
     with contextlib.suppress(OSError):
-        undelivered_at.recv(1)
+        return undelivered_at.recv(length, socket.MSG_PEEK)
+    return b""
+
+
+def take_back(undelivered_at: socket.socket, length: int) -> bytes:
+    """Return the begin of the oldest packet that waits in a socket and drop it; the system closes its descriptors."""
+    with contextlib.suppress(OSError):
+        return undelivered_at.recv(length)
+    return b""
 
 
 def close_all(descriptors: Sequence[int]) -> None:

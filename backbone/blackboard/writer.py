@@ -32,14 +32,18 @@ from backbone.blackboard.values import (
 class _Sent:
     """A value as it is sent; the descriptor of its memory file is -1 if it travels in the packet."""
 
-    parts: tuple[bytes | memoryview, ...]
+    head: bytes
+    content: bytes = b""
     descriptor: int = -1
 
     @classmethod
     def of(cls, number: int, value: bytes | memoryview) -> _Sent:
-        length = len(value) if isinstance(value, bytes) else value.nbytes
+        length = memoryview(value).nbytes
         head = HEADER.pack(number, length)
-        return cls((head, bytes(value))) if length <= MOST_IN_PACKET else cls((head,), sealed_memory.sealed(value))
+        return cls(head, bytes(value)) if length <= MOST_IN_PACKET else cls(head, b"", sealed_memory.sealed(value))
+
+    def send(self, way: socket.socket) -> None:
+        sealed_memory.send(way, (self.head, self.content), [self.descriptor] if self.descriptor >= 0 else [])
 
     def close(self) -> None:
         if self.descriptor >= 0:
@@ -56,14 +60,22 @@ class _Reader:
     undelivered: socket.socket | None = None
 
     def send(self, newest: _Sent) -> None:
-        """Leave the value as the only undelivered one.
+        """Leave the value as the only undelivered one; until it is sent, the one before it can be taken.
 
         Raises:
             OSError: It cannot be sent.
         """
-        if self.way is not None and self.undelivered is not None:
-            sealed_memory.discard(self.undelivered)
-            sealed_memory.send(self.way, newest.parts, [newest.descriptor] if newest.descriptor >= 0 else [])
+        if self.way is None or self.undelivered is None:
+            return
+        is_behind = bool(sealed_memory.peek(self.undelivered, 1))
+        try:
+            newest.send(self.way)
+        except BlockingIOError:  # the one before it fills the socket
+            sealed_memory.take_back(self.undelivered, 1)
+            newest.send(self.way)
+            return
+        if is_behind and sealed_memory.take_back(self.undelivered, HEADER.size) == newest.head:
+            newest.send(self.way)  # the reader was quicker: this was the newest
 
     def close(self) -> None:
         for one in (self.connection, self.way, self.undelivered):

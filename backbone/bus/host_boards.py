@@ -73,8 +73,13 @@ class SentBoard:
         is_new = self._writer is None and len(raw) >= LARGE_BYTES and self._open()
         if self._writer is not None:
             self._writer.keeps = len(raw) > MAX_MESSAGE_BYTES  # a listener may learn of the board by this value
-            self._writer.put(raw)
-        return is_new
+            try:
+                self._writer.put(raw)
+            except OSError as error:  # neither memory nor descriptors are left: listeners turn to the network
+                log.warning("no board on this host for now: %s", error)
+                self._try_again_s = self._loop.time() + LOOK_EACH_S
+                self.close()
+        return is_new and self.is_open
 
     def close(self) -> None:
         """Let all readers go. Idempotent."""

@@ -8,6 +8,7 @@ rises, it is declared again at once. So no sender is missed for longer than a de
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
@@ -21,6 +22,9 @@ from backbone.wire import MAX_LARGE_MESSAGE_BYTES, Envelope, Message, Reader
 
 IN_FLIGHT_S = 1.0  # chosen: the longest time for which a value may be on its way while a newer one overtakes it
 MOST_SENDERS = 64  # chosen: of one key; a key has one sender at a time, and any bytes may arrive
+
+
+log = logging.getLogger(__name__)
 
 
 class Entity(Protocol):
@@ -162,9 +166,9 @@ class NearListening(LatestSample):
     def _take(self, source: str) -> None:
         try:
             value = self._readers[source].newest()
-        except Refusal as refusal:
-            if not isinstance(refusal, NoWriter):
-                self.count_unreadable(self._key, refusal)
+        except (Refusal, OSError) as fault:
+            if not isinstance(fault, NoWriter):  # nonsense, or no descriptors are left
+                log.warning("no board of %s for now: %s", source, fault)
                 self._look_again_s[source] = self._loop.time() + LOOK_EACH_S
             self._leave(source)
             self._mend()

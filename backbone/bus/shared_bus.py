@@ -57,7 +57,7 @@ class SharedSession:
     def join(self, source: str, clock: Clock) -> SharedBus:
         """Return a new member's bus. Close it before the session."""
         bus = SharedBus(self._neighbors, source, clock, self._session)
-        bus.copies = self._copies
+        bus.copies, bus.members = self._copies, self._members
         self._members.add(source)
         bus.boards = boards_for(self._directory, self._members)
         return bus
@@ -76,6 +76,8 @@ class SharedBus(Neighbor, ZenohBus):
         super().__init__(neighbors.mission, source, clock, session, shared=True)
         self.network = neighbors
         self.declared = []
+        self.members = set[str]()
+        """Sources of this process; settable."""
 
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component, a neighbor without leaving the process; see ``Bus.ask``."""
@@ -134,6 +136,11 @@ class SharedBus(Neighbor, ZenohBus):
         """Withdraw all declarations, in this process and on the session."""
         self.take_back_from_neighbors()
         super().take_back()
+
+    async def leave(self) -> None:
+        """Leave the session, which other members use."""
+        self.members.discard(self.source)
+        await super().leave()
 
 
 class _Watch:

@@ -75,7 +75,6 @@ __all__ = ["ZenohBus", "client_config", "hub_config"]
 log = logging.getLogger(__name__)
 
 _TIMEOUT_PAYLOAD = b"Timeout"
-
 TELL_WITHIN_S = 0.01  # chosen: copies for recorders are made after a context switch, not in it; a death loses so much
 
 
@@ -238,7 +237,8 @@ class ZenohBus(InboxBus):
         if not (is_heard or copies is not None or board.is_read):
             return
         raw = write(envelope, MAX_LARGE_MESSAGE_BYTES)
-        outlet.raise_token(self._session, self.source, anew=board.put(raw))
+        if board.put(raw):
+            outlet.raise_token(self._session, self.source)
         if len(raw) > MAX_MESSAGE_BYTES:
             if not board.is_open:
                 refuse_oversized(len(raw))
@@ -291,7 +291,7 @@ class ZenohBus(InboxBus):
         near = NearListening(self, reader, listener, boards, own, declare)
 
         def changed(sample: zenoh.Sample) -> None:
-            near.sender_changed(sender_of(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
+            near.sender_changed(sender_of(own, str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
 
         at_once: Any = zenoh.handlers.Callback(lambda sample: self.push(changed, sample), indirect=False)
         near.tokens = cast(

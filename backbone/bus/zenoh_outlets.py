@@ -64,13 +64,11 @@ class Outlet:
         """Return whether the network is known to have no subscriber; also without a board."""
         return now_s >= self._known_s and not self.has_subscriber
 
-    def raise_token(self, session: zenoh.Session, source: str, *, anew: bool) -> None:
-        """Let listeners know this sender of the key, again if its board was opened just now."""
-        if anew and self._token is not None:
+    def raise_token(self, session: zenoh.Session, source: str) -> None:
+        """Let listeners know this sender of the key; again, when its board was opened."""
+        if self._token is not None:
             self._token.undeclare()  # type: ignore[no-untyped-call]
-            self._token = None
-        if self._token is None:
-            self._token = session.liveliness().declare_token(key_of_sender(self.key, source))
+        self._token = session.liveliness().declare_token(key_of_sender(self.key, source))
 
     def close(self) -> None:
         """Withdraw the publisher."""
@@ -130,4 +128,7 @@ class Outlets:
             allowed_destination=self._destination,
         )
         board = boards.board(name, self._source) if boards is not None and conversation in LARGE else None
-        return Outlet(name, publisher, now_s + KNOWN_AFTER_S, board)
+        outlet = Outlet(name, publisher, now_s + KNOWN_AFTER_S, board)
+        if conversation in LARGE:
+            outlet.raise_token(self._session, self._source)
+        return outlet

@@ -168,6 +168,44 @@ def test_a_writer_that_is_stopped_blocks_nobody(folder: Path, processes: Process
     watcher.close()
 
 
+STRANGER = """
+import os, socket, sys
+os.setgroups([]); os.setgid(65534); os.setuid(65534)
+asked = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+try:
+    asked.connect(sys.argv[1])
+except PermissionError:
+    print("no entry")
+    raise SystemExit
+own, way = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+try:
+    socket.send_fds(asked, [b"0"], [way.fileno(), own.fileno()])
+except BrokenPipeError:
+    pass
+way.close()
+print(own.recv(1000))
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another account")
+def test_another_account_gets_nothing_even_if_it_may_enter(folder: Path) -> None:
+    place = folder / "board"
+    writer = BlackboardWriter(place, NAME)
+    writer.serve_in_thread()
+    writer.put(b"secret")
+
+    def what_a_stranger_gets() -> str:
+        command = [sys.executable, "-c", STRANGER, str(place / f"{NAME}.board")]
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=WITHIN_S).stdout.strip()
+
+    folder.chmod(0o755)
+    assert what_a_stranger_gets() == "no entry"
+    place.chmod(0o755)
+    (place / f"{NAME}.board").chmod(0o777)
+    assert what_a_stranger_gets() == "b''"
+    writer.close()
+
+
 @pytest.mark.parametrize("kills", [2, pytest.param(20, marks=pytest.mark.thorough)])
 async def test_listeners_of_the_bus_outlive_senders_and_each_other(
     folder: Path, processes: Processes, kills: int

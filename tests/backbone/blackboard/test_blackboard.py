@@ -188,6 +188,48 @@ def test_the_last_value_of_a_writer_that_ended_is_still_taken(folder: Path) -> N
     reader.close()
 
 
+@pytest.mark.parametrize("size", [1000, MOST_IN_PACKET, 1_000_000])
+def test_a_writer_that_dies_in_a_put_leaves_the_value_before_it(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, size: int
+) -> None:
+    writer, reader = BlackboardWriter(folder, "room"), BlackboardReader(folder, "room")
+    writer.put(bytes([1]) * size)
+
+    def die(*_: object) -> None:
+        raise SystemExit
+
+    monkeypatch.setattr(sealed_memory, "send", die)
+    with pytest.raises(SystemExit):
+        writer.put(bytes([2]) * size)
+    assert bytes(taken(reader).data) == bytes([1]) * size
+    monkeypatch.undo()
+    reader.close()
+    writer.close()
+
+
+def test_a_reader_that_is_quicker_than_the_writer_still_gets_the_newest(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It takes the value before in the middle of a put."""
+    writer, reader = BlackboardWriter(folder, "room"), BlackboardReader(folder, "room")
+    writer.put(b"first")
+    took = list[int]()
+
+    def take(*given: Any) -> None:
+        send(*given)
+        if not took:
+            took.append(taken(reader).number)
+
+    send = sealed_memory.send
+    monkeypatch.setattr(sealed_memory, "send", take)
+    writer.put(b"second")
+    assert took == [1]
+    assert bytes(taken(reader).data) == b"second"
+    assert reader.newest() is None
+    reader.close()
+    writer.close()
+
+
 def test_a_value_that_is_too_long_is_refused_and_changes_nothing(folder: Path) -> None:
     writer = BlackboardWriter(folder, "room", most_bytes=1000)
     reader = BlackboardReader(folder, "room", most_bytes=500)

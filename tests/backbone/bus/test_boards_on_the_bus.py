@@ -6,6 +6,7 @@ The laws of all publications hold for them as well (``test_bus_publications``); 
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -18,14 +19,24 @@ import pytest
 from bus_laws import ASKER, SERVER, THIRD, Heard, fail_on_bug, until_known, within
 from free_ports import free_endpoint
 
-from backbone.bus import zenoh_outlets
+from backbone.blackboard import sealed_memory
+from backbone.blackboard.values import MOST_IN_PACKET
+from backbone.bus import host_boards, zenoh_outlets
 from backbone.bus.clock import MissionClock
 from backbone.bus.host_boards import LARGE_BYTES, boards_for
 from backbone.bus.shared_bus import SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.zenoh_outlets import MOST_PUBLISHERS
 from backbone.keys import Conversation
 from backbone.ranges import Bulk, Count
-from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, Message, OversizedMessage
+from backbone.wire import (
+    MAX_LARGE_MESSAGE_BYTES,
+    MAX_MESSAGE_BYTES,
+    WIRE_VERSION,
+    Envelope,
+    Message,
+    OversizedMessage,
+)
 
 MISSION, CLOCK = "boards", MissionClock.started_now()
 AT, SAID = SERVER, Conversation.FRAMES
@@ -225,18 +236,21 @@ async def test_other_listeners_get_every_picture_by_the_network(folder: Path, ne
 
 
 async def test_a_second_sender_is_heard_while_the_first_goes_on(folder: Path, network: list[int]) -> None:
-    """On this host, and from a host without a board: a framegrabber elsewhere that the ARC holds now."""
+    """From another host, from a system without blackboards, and on this host."""
     async with host(folder) as near:
         first, listener = near.join(SERVER), near.join(ASKER)
         heard, sent = Heard(), list[int]()
         listener.subscribe(AT, SAID, Map, heard, latest=True)
         await until_known(listener, first)
         await until_near(network, sending(first, sent))
-        for source, is_near in (("resource_pool/far", False), ("resource_pool/near", True)):
-            other = near.join(source, is_near=is_near)
-            if not is_near:  # a sender of another host has a board there
-                other.boards = boards_for(str(folder / "elsewhere"))
-                (folder / "elsewhere").mkdir()
+        (folder / "elsewhere").mkdir()
+        for source, its_folder in (
+            ("resource_pool/far", folder / "elsewhere"),  # a sender of another host has a board there
+            ("resource_pool/boardless", None),
+            ("resource_pool/near", folder),
+        ):
+            other = near.join(source)
+            other.boards = boards_for(str(its_folder)) if its_folder else None
 
             def both(other: ZenohBus = other) -> None:
                 sending(first, sent)()
@@ -252,6 +266,22 @@ async def test_a_second_sender_is_heard_while_the_first_goes_on(folder: Path, ne
         for source in {e.source for e in heard.all}:
             numbers = [e.sequence for e in heard.all if e.source == source]
             assert numbers == sorted(set(numbers))
+
+
+async def test_a_replay_is_heard_beside_a_board(folder: Path, network: list[int]) -> None:
+    async with host(folder) as near:
+        sender, listener, player = near.join(SERVER), near.join(ASKER), near.join(THIRD)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        await until_near(network, send := sending(sender, sent))
+        recorded = Envelope(WIRE_VERSION, "resource_pool/then", 5, 1.0, "", picture(77))
+
+        def play() -> None:
+            player.pass_on(AT, SAID, recorded)
+            send()
+
+        await until(lambda: any(e.source == recorded.source for e in heard.all), "the replay is heard", play)
 
 
 async def test_a_sender_that_ends_and_begins_anew_is_heard_again(folder: Path, network: list[int]) -> None:
@@ -306,6 +336,30 @@ async def test_a_large_output_reaches_this_host_and_a_longer_one_is_refused(fold
             sender.publish(AT, Conversation.EVENTS, picture(8, size))
 
 
+@pytest.mark.parametrize("at", ["sealed", "mapped"])
+async def test_without_memory_or_descriptors_pictures_go_by_the_network(
+    folder: Path, network: list[int], monkeypatch: pytest.MonkeyPatch, at: str
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        send = sending(sender, sent, 2 * MOST_IN_PACKET)
+        await until_near(network, send)
+        with monkeypatch.context() as patched:
+            patched.setattr(sealed_memory, at, refuse)
+            send()
+            count = len(heard.all)
+            await until(lambda: len(heard.all) > count + 5, "they are heard", send)
+        await asyncio.sleep(host_boards.LOOK_EACH_S)
+        await until_near(network, send)
+        assert heard.numbers() == sorted(set(heard.numbers()))
+
+
 async def test_an_unreadable_value_on_a_board_is_counted_and_skipped(folder: Path, network: list[int]) -> None:
     async with host(folder) as near:
         sender, listener = near.join(SERVER), near.join(ASKER)
@@ -358,3 +412,68 @@ async def test_a_lost_board_sends_the_listener_to_the_network_at_once(folder: Pa
         await until(lambda: len(heard.all) > count, "it is heard again", send)
         await until_near(network, send)
         assert heard.numbers() == sorted(set(heard.numbers()))
+
+
+async def test_who_publishes_under_ever_new_addresses_does_not_collect_boards(folder: Path) -> None:
+    """As a framegrabber does for each ARC that holds it."""
+    async with host(folder) as near:
+        sender = near.join(SERVER)
+        for number in range(MOST_PUBLISHERS + 20):
+            sender.publish(f"resource_pool/arc-{number}", SAID, picture(number))
+        files = list((folder / "board").iterdir())
+        assert len(files) <= 2 * MOST_PUBLISHERS
+        await sender.close()
+        assert list((folder / "board").iterdir()) == []
+
+
+async def test_a_member_that_moved_to_another_process_is_heard_there(folder: Path, network: list[int]) -> None:
+    endpoint = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    here, there = (SharedSession(MISSION, endpoint, "", str(folder)) for _ in range(2))
+    listener, other = here.join(ASKER, CLOCK), there.join(THIRD, CLOCK)
+    heard, sent = Heard(), list[int]()
+    listener.subscribe(AT, SAID, Map, heard, latest=True)
+    for session in (here, there, here):
+        sender = session.join(SERVER, CLOCK)
+
+        def both(sender: Any = sender) -> None:
+            sending(other, sent)()
+            sending(sender, sent)()
+
+        before = len(heard.all)
+        await until(
+            lambda n=before: {SERVER, THIRD} <= {e.source for e in heard.all[n:]},  # type: ignore[misc]
+            "both are heard",
+            both,
+        )
+        await sender.close()
+    for bus in (listener, other):
+        await bus.close()
+    for session in (here, there):
+        await session.close()
+    await hub.close()
+
+
+async def test_pictures_go_on_while_there_is_no_hub(folder: Path, network: list[int]) -> None:
+    endpoint = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    near = Host(endpoint, folder)
+    sender, listener = near.join(SERVER), near.join(ASKER)
+    heard, sent, links = Heard(), list[int](), Heard()
+    listener.watch_link(links)
+    listener.subscribe(AT, SAID, Map, heard, latest=True)
+    await until_known(listener, sender)
+    await until_near(network, send := sending(sender, sent))
+    await hub.close()
+    await links.until(lambda all_: all_[-1] is False, "the link is lost")
+    for _ in range(20):
+        send()
+        await heard.until(lambda all_: all_[-1].body.number == len(sent), "the newest picture without a hub")
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    await links.until(lambda all_: all_[-1] is True, "the link is back")
+    await until_near(network, send)
+    count = len(heard.all)
+    await until(lambda: len(heard.all) > count + 5, "pictures go on", send)
+    assert heard.numbers() == sorted(set(heard.numbers()))
+    for bus in (sender, listener, hub):
+        await bus.close()
