@@ -54,7 +54,7 @@ class Way:
 
     def __init__(self, bus: InboxBus, publisher: zenoh.Publisher, inbox: str, lost: Callable[[Way], None]) -> None:
         self.inbox, self.publisher, self._lost = inbox, publisher, lost
-        self.waiting: dict[int, asyncio.Future[Any]] = {}
+        self.waiting: dict[int, asyncio.Future[Came]] = {}
         """Number → open question."""
         self.is_open = False
         """Whether the hub knows the owner of the inbox."""
@@ -62,12 +62,12 @@ class Way:
         def changed(status: zenoh.MatchingStatus) -> None:
             bus.push(self._changed, bool(cast("Any", status).matching))
 
-        self._listener: Any = publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
+        self._listener = publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
 
     def close(self) -> None:
         """Withdraw it. Questions that wait still do."""
         self.is_open = False
-        self._listener.undeclare()
+        self._listener.undeclare()  # type: ignore[no-untyped-call]
         self.publisher.undeclare()  # type: ignore[no-untyped-call]
 
     def _changed(self, has_owner: bool) -> None:
@@ -89,7 +89,7 @@ class Ways:
         self._destination = zenoh.Locality.REMOTE if only_elsewhere else zenoh.Locality.ANY
         self.answers = _new_key(mission, own, "answers")
         """Key of the inbox for answers."""
-        self._subscriber: Any = None
+        self._subscriber: zenoh.Subscriber[None] | None = None
         self._number = 0
         self._querying = Counter[str]()
         self._answered_by: OrderedDict[str, str] = OrderedDict()  # address → inbox of who answered the last query
@@ -149,7 +149,7 @@ class Ways:
         while self._ways:
             self._ways.popitem()[1].close()
         if self._subscriber is not None:
-            self._subscriber.undeclare()
+            self._subscriber.undeclare()  # type: ignore[no-untyped-call]
             self._subscriber = None
 
     def _make_way(self, address: str, inbox: str) -> None:
