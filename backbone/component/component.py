@@ -14,7 +14,6 @@ import logging
 import os
 import time
 from collections.abc import Coroutine, Mapping
-from pathlib import Path
 from typing import ClassVar, Generic, TypeVar, cast
 
 import msgspec
@@ -54,6 +53,7 @@ from backbone.component.story import StoryBook
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import claim_address
+from backbone.operating_system.processes import exists
 from backbone.spoken import value_text
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
@@ -340,7 +340,7 @@ class Component(Generic[P_co]):
     def _is_of_the_dead(self, taken: NameTaken) -> bool:
         """Return whether the name belongs to a process of this host that was killed before it declared its claim."""
         pid = taken.facts.get("pid", 0)
-        return taken.facts.get("host") == self.launch.host and bool(pid) and not Path(f"/proc/{pid}").exists()
+        return taken.facts.get("host") == self.launch.host and isinstance(pid, int) and pid > 0 and not exists(pid)
 
     async def _live_and_report_end(self) -> None:
         try:

@@ -9,7 +9,6 @@ import contextlib
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import tempfile
@@ -242,7 +241,7 @@ def _started(words: Sequence[str], environment: Mapping[str, str]) -> subprocess
 def _end(launcher: subprocess.Popen[str], mark: str) -> None:
     """End what is left, without mercy."""
     if launcher.poll() is None:
-        launcher.send_signal(signal.SIGKILL)
+        launcher.kill()
     launcher.wait(10)
     left = wait_gone(mark, GONE_WITHIN_S)
     for process in left:
