@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import os
 import stat
 from pathlib import Path
+
+from backbone.operating_system.file_locks import lock_alone_nowait
 
 _NO_FOLDER_SYNC = (errno.EINVAL, errno.ENOTSUP)
 """File systems that keep no folders of their own, such as some network shares."""
@@ -89,7 +90,7 @@ def _claim(path: Path, flags: int) -> int:
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC | flags, 0o666)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_alone_nowait(descriptor)
             if is_at(descriptor, path):
                 return descriptor
         except BaseException:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import suppress
 
 from backbone.command_line.connection import connected
@@ -12,6 +11,7 @@ from backbone.command_line.where import Where
 from backbone.foxglove.bridge import Bridge
 from backbone.foxglove.well_known import installed
 from backbone.launcher.endings import ExitCode, say
+from backbone.operating_system.own_process import go_behind_others
 from backbone.spoken import counted
 
 
@@ -22,7 +22,7 @@ async def bridge(where: Where, host: str, port: int, keys: tuple[str, ...]) -> E
         PortUnusable: The port cannot be opened.
     """
     with suppress(OSError):
-        os.nice(10)  # who decides goes before who shows
+        go_behind_others()  # who decides goes before who shows
     async with connected(where) as (bus, clock), until_ended(bus) as ended:
         with opening_port(host, port):
             served = Bridge(bus.mission, host, port, installed())

@@ -222,6 +222,23 @@ def resources(
 
 
 @app.command()
+def load(
+    for_s: Annotated[
+        float, typer.Option("--for", min=0.1, max=3600.0, callback=finite, help="Seconds between the two readings.")
+    ] = 1.0,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Show the processor time of each robot, each module and each process."""
+    from backbone.command_line.load_table import print_loads
+
+    where = chosen(mission, connect, secret_file)
+    run(lambda: print_loads(where, for_s, as_json=as_json, width=_width()))
+
+
+@app.command()
 def why(
     name: NameOrCause,
     as_json: AsJson = False,

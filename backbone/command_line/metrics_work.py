@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 from contextlib import suppress
 
 from backbone.command_line.connection import connected
@@ -12,6 +11,7 @@ from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode, say
 from backbone.metrics.page import Metrics, MetricsServer, Numbers, metrics
 from backbone.metrics.watch import MetricsWatch
+from backbone.operating_system.own_process import go_behind_others
 
 READ_WITHIN_S = 5.0  # chosen: half of Prometheus' usual patience
 
@@ -23,7 +23,7 @@ async def serve_metrics(where: Where, host: str, port: int) -> ExitCode:
         PortUnusable: The port cannot be opened.
     """
     with suppress(OSError):
-        os.nice(10)  # who decides goes before who counts
+        go_behind_others()  # who decides goes before who counts
     async with connected(where) as (bus, clock), until_ended(bus) as ended:
         loop, watch = asyncio.get_running_loop(), MetricsWatch(bus, clock)
 

@@ -36,6 +36,7 @@ from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.naming import Subsystem, address
+from backbone.operating_system.own_process import go_behind_others
 from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.host_ear import HostEar
@@ -108,7 +109,7 @@ async def record_to(
                 host_only=told.host_only,
             )
             with suppress(OSError):
-                os.nice(10)  # who decides goes before who records
+                go_behind_others()  # who decides goes before who records
             await _run(recorder, path, for_s, ends_with_input=told.host_only)
     say(f"{path}: {counted(recorder.written, 'message')}")
     if recorder.dropped:

@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from backbone.bus.interface import Clock
+from backbone.operating_system.processes import processor_times_s
 
 log = logging.getLogger(__name__)
 
 BEAT_EVERY_S = 0.25  # chosen: a hung process is seen within 1 s, at four wake-ups of the event loop a second
 DOING_BYTES = 160  # chosen: a line for people
-_NS = 1e-9
 _ONE_BEAT_NS = 1_000_000_000  # chosen: every file system keeps whole seconds
 _LATEST_NS = 1_000_000_000 * _ONE_BEAT_NS  # 2001: the stamp of a file before its first beat is later
 
@@ -93,12 +93,9 @@ def heartbeat_path(run_directory: str, pid: int) -> Path:
 
 def read_vitals(run_directory: str, pid: int) -> Vitals | None:
     """Read the vitals of a process; None if the process has ended."""
-    try:
-        ran_ns, queued_ns, *_ = Path(f"/proc/{pid}/schedstat").read_bytes().split()
-    except FileNotFoundError:
+    times_s = processor_times_s(pid)
+    if times_s is None:
         return None
-    except (OSError, ValueError):  # a kernel without these counters
-        ran_ns, queued_ns = b"0", b"0"
     beats, doing = 0, b""
     if run_directory:
         with suppress(OSError):
@@ -106,7 +103,7 @@ def read_vitals(run_directory: str, pid: int) -> Vitals | None:
             stamp_ns = path.stat().st_mtime_ns
             beats = 0 if stamp_ns > _LATEST_NS else stamp_ns // _ONE_BEAT_NS
             doing = path.read_bytes()
-    return Vitals(beats, int(ran_ns) * _NS, int(queued_ns) * _NS, doing.decode(errors="replace").strip())
+    return Vitals(beats, *times_s, doing.decode(errors="replace").strip())
 
 
 def forget_heartbeat(run_directory: str, pid: int) -> None:

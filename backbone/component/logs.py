@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import fcntl
 import logging
 import os
 import sys
@@ -22,6 +21,7 @@ from pathlib import Path
 
 from backbone.atomic_file import is_at, write_all
 from backbone.component.repeats import Repeats
+from backbone.operating_system.file_locks import lock_alone_nowait, lock_together
 from backbone.printable_text import printable_lines
 
 LOG_BYTES = 1 << 20  # chosen: a day of an honest component; with the one before it, two
@@ -179,7 +179,7 @@ def _is_held(path: Path) -> bool:
     """Return whether a living process holds the log."""
     try:
         with path.open("rb") as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_alone_nowait(file.fileno())
     except BlockingIOError:
         return True
     except FileNotFoundError:
@@ -191,7 +191,7 @@ def _remove_ended(path: Path) -> bool:
     """Remove the log unless a living process holds it; return whether it is gone."""
     try:
         with path.open("rb") as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_alone_nowait(file.fileno())
             if is_at(file.fileno(), path):
                 path.unlink()
     except FileNotFoundError:
@@ -206,7 +206,7 @@ def _open(path: Path) -> int:
     while True:
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_SH)
+            lock_together(descriptor)
             if is_at(descriptor, path):
                 return descriptor
         except BaseException:

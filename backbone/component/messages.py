@@ -129,6 +129,10 @@ class MissionTime(Message, frozen=True):
     unix_s: Instant = 0.0
 
 
+PROCESSOR_S = "processor_s"
+"""Among the statistics: processor time of the component's process with all its threads; not on virtual time."""
+
+
 class AskStatistics(Message, frozen=True):
     """Ask for the component's counters and measures."""
 

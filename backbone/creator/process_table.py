@@ -8,21 +8,13 @@ needs time for that.
 
 from __future__ import annotations
 
-import asyncio
-import ctypes
-import os
-import signal
-from collections.abc import Collection, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+
+from backbone.operating_system import processes
 
 MARK = "SCOUT_COMPONENT"
 """Environment variable with the pid of the component that started a process."""
-
-_PR_SET_PDEATHSIG, _PR_SET_NAME, _PR_SET_CHILD_SUBREAPER = 1, 15, 36  # linux/prctl.h
-_LONGEST_TITLE = 15  # linux/sched.h: TASK_COMM_LEN less its end mark
-_libc = ctypes.CDLL(None, use_errno=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,19 +37,9 @@ class Process:
 Table = Mapping[int, Process]
 
 
-def threads() -> int:
-    """Return the number of threads of this process, threads of C libraries included."""
-    return len(os.listdir("/proc/self/task"))
-
-
 def read_table() -> dict[int, Process]:
     """Return all processes of this machine by pid."""
-    table = {}
-    for folder in os.listdir("/proc"):
-        if folder.isdigit():
-            with suppress(OSError):
-                table[int(folder)] = read_line(Path(f"/proc/{folder}/stat").read_text())
-    return table
+    return {pid: read_line(line) for pid, line in processes.table_lines().items()}
 
 
 def read_line(stat: str) -> Process:
@@ -75,7 +57,7 @@ def read_line(stat: str) -> Process:
 def is_stopped(pid: int) -> bool:
     """Return whether a signal or a debugger has stopped the process."""
     try:
-        stat = Path(f"/proc/{pid}/stat").read_text()
+        stat = processes.table_line(pid)
     except OSError:
         return False
     return stat.rpartition(")")[2].split()[0] in "Tt"
@@ -122,7 +104,7 @@ def remains(table: Table, component: int, adopter: int | None = None) -> set[int
     left = {
         pid
         for pid, process in table.items()
-        if process.session == component or (adopter in (None, process.parent) and mark in environment(pid))
+        if process.session == component or (adopter in (None, process.parent) and mark in processes.environment(pid))
     }
     return {pid for pid in left if not table[pid].is_gone and not is_zygote(table[pid])}
 
@@ -131,59 +113,3 @@ def zygotes_of(table: Table, parent: int) -> set[int]:
     """Return the zygotes that serve, or served, this process and have not ended."""
     title = zygote_title(parent)
     return {pid for pid, process in table.items() if process.title == title and not process.is_gone}
-
-
-def environment(pid: int) -> list[bytes]:
-    """Return the environment of the process at its start; empty if it has ended or belongs to another user."""
-    with suppress(OSError):
-        return Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
-    return []
-
-
-def send(pids: Iterable[int], number: signal.Signals) -> None:
-    """Send the signal to each process; skip processes that have ended."""
-    for pid in pids:
-        with suppress(ProcessLookupError):
-            os.kill(pid, number)
-
-
-async def wait_gone(pids: Collection[int]) -> None:
-    """Return when each of these processes, children or not, has ended."""
-    loop = asyncio.get_running_loop()
-    for pid in pids:
-        try:
-            handle = os.pidfd_open(pid)
-        except ProcessLookupError:
-            continue
-        gone = asyncio.Event()
-        loop.add_reader(handle, gone.set)
-        try:
-            await gone.wait()
-        finally:
-            loop.remove_reader(handle)
-            os.close(handle)
-
-
-# Settings of the calling process in the kernel.
-
-
-def die_with_parent() -> None:
-    """Ask the kernel to send SIGKILL to this process when the thread that forked it ends."""
-    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def adopt_orphans() -> None:
-    """Make this process the parent of descendants whose own parent ends."""
-    _prctl(_PR_SET_CHILD_SUBREAPER, 1)
-
-
-def set_title(title: str) -> None:
-    """Set the name of this process in ``ps`` and ``top``, cut to 15 characters."""
-    _prctl(_PR_SET_NAME, ctypes.create_string_buffer(title[:_LONGEST_TITLE].encode()))
-
-
-def _prctl(option: int, value: object) -> None:
-    argument = value if isinstance(value, ctypes.Array) else ctypes.c_ulong(value)  # type: ignore[arg-type]
-    if _libc.prctl(option, argument, 0, 0, 0) != 0:
-        number = ctypes.get_errno()
-        raise OSError(number, f"prctl({option}): {os.strerror(number)}")

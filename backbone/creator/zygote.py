@@ -38,6 +38,7 @@ from backbone.creator.zygote_process import (
     serve,
 )
 from backbone.errors import BackboneError
+from backbone.operating_system import processes
 from backbone.waiting import settle
 
 log = logging.getLogger(__name__)
@@ -153,7 +154,7 @@ class Zygote:
         if not process_table.is_stopped(self._body.pid):
             return ""
         log.warning("zygote %d was stopped and is continued", self._body.pid)
-        process_table.send([self._body.pid], signal.SIGCONT)
+        processes.send([self._body.pid], signal.SIGCONT)
         return "the zygote was stopped"
 
     async def close(self) -> None:
@@ -204,19 +205,19 @@ class Zygote:
         The components die with their zygote; this method kills their children.
         """
         lost, self._live = sorted(self._live), set()
-        process_table.send(lost, signal.SIGKILL)
-        await process_table.wait_gone(lost)
+        processes.send(lost, signal.SIGKILL)
+        await processes.wait_gone(lost)
         for pid in lost:
             table = process_table.read_table()
             zygotes = process_table.zygotes_of(table, pid)
             try:
                 async with asyncio.timeout(ZYGOTE_GRACE_S):
-                    await process_table.wait_gone(zygotes)
+                    await processes.wait_gone(zygotes)
             except TimeoutError:
-                process_table.send(zygotes, signal.SIGKILL)
+                processes.send(zygotes, signal.SIGKILL)
             while left := process_table.remains(process_table.read_table(), pid):
-                process_table.send(left, signal.SIGKILL)
-                await process_table.wait_gone(left)
+                processes.send(left, signal.SIGKILL)
+                await processes.wait_gone(left)
             self._tell_exit(pid, -signal.SIGKILL)
 
     def _tell_exit(self, pid: int, returncode: int) -> None:
@@ -262,7 +263,7 @@ class _ZygoteChannel:
     async def wait_gone(self) -> None:
         """Return when the zygote has ended and is reaped."""
         if not self._is_reaped:
-            await process_table.wait_gone([self.pid])
+            await processes.wait_gone([self.pid])
             self._is_reaped = True
             self._reap()
         if self._writer is not None:

@@ -38,7 +38,8 @@ from backbone.component.logs import redirect
 from backbone.component.process import EXIT_BUG, run_process
 from backbone.component.shared_process import run_shared_process
 from backbone.creator import process_table
-from backbone.heaps import share_heaps
+from backbone.operating_system import own_process, processes
+from backbone.operating_system.heaps import share_heaps
 from backbone.ranges import ExitCode, Pid, Signal, Text
 from backbone.run_files import ENDED
 from backbone.wire import Message
@@ -183,8 +184,8 @@ class _ZygoteProcess:
     def _prepare(self) -> None:
         if os.getsid(0) != self._own_pid:
             os.setsid()  # Ctrl-C at a terminal is for the launcher, which then ends the zygote
-        process_table.adopt_orphans()
-        process_table.set_title(process_table.zygote_title(self._settings.parent))
+        own_process.adopt_orphans()
+        own_process.set_title(process_table.zygote_title(self._settings.parent))
         self._signals.setblocking(False)
         self._signals_in.setblocking(False)
         signal.set_wakeup_fd(self._signals_in.fileno(), warn_on_full_buffer=False)
@@ -207,7 +208,7 @@ class _ZygoteProcess:
             importlib.import_module(module)
         except Exception as error:  # a component that needs the module reports it
             log.warning("%s is not preloaded: %r", module, error)
-        if process_table.threads() > 1:
+        if processes.threads() > 1:
             log.warning("%s starts threads when it is imported, and a process with threads cannot fork", module)
             self._begin_anew_without(module)
 
@@ -249,7 +250,7 @@ class _ZygoteProcess:
                 self._tell(self._fork(launch))
             case Kill(pid=pid, number=number):
                 if pid in self._live:  # else it was reaped, and another process may have the pid
-                    process_table.send(process_table.tree(process_table.read_table(), pid), signal.Signals(number))
+                    processes.send(process_table.tree(process_table.read_table(), pid), signal.Signals(number))
             case _:
                 assert_never(order)
 
@@ -276,7 +277,7 @@ class _ZygoteProcess:
         code = EXIT_BUG
         try:
             os.setsid()
-            process_table.die_with_parent()
+            own_process.die_with_parent()
             if os.getppid() != self._own_pid:  # the zygote died before the child was tied to it
                 os._exit(EXIT_BUG)
             signal.set_wakeup_fd(-1)
@@ -286,7 +287,7 @@ class _ZygoteProcess:
             for inherited in (self._channel, self._signals, self._signals_in):
                 inherited.close()
             os.environ[process_table.MARK] = str(os.getpid())
-            process_table.set_title(launch.name)
+            own_process.set_title(launch.name)
             redirect(launch.run_directory, launch.name)
             code = run_shared_process(launch) if launch.is_shared_process else run_process(launch)
         except BaseException:
@@ -326,7 +327,7 @@ class _ZygoteProcess:
             if sweep.zygotes_until_s is not None and now_s >= sweep.zygotes_until_s:
                 left |= zygotes
                 self._sweeps[pid] = _Sweep(sweep.returncode, None)
-            process_table.send(left, signal.SIGKILL)
+            processes.send(left, signal.SIGKILL)
             if not left | zygotes:
                 del self._sweeps[pid]
                 self._tell(Exited(pid, sweep.returncode))
@@ -338,7 +339,7 @@ class _ZygoteProcess:
         now_s = time.monotonic()
         kill_at_s, kill_zygotes_at_s = now_s + GRACE_S, now_s + GRACE_S + ZYGOTE_GRACE_S
         table = process_table.read_table()
-        process_table.send({one for pid in self._live for one in process_table.tree(table, pid)}, signal.SIGTERM)
+        processes.send({one for pid in self._live for one in process_table.tree(table, pid)}, signal.SIGTERM)
         while self._reap():
             now_s = time.monotonic()
             if now_s < kill_at_s:
@@ -348,7 +349,7 @@ class _ZygoteProcess:
                 victims = process_table.descendants(table, self._own_pid)
                 if now_s >= kill_zygotes_at_s:
                     victims |= {pid for pid, process in table.items() if process.parent == self._own_pid}
-                process_table.send(victims, signal.SIGKILL)
+                processes.send(victims, signal.SIGKILL)
                 wait_s = kill_zygotes_at_s - now_s if now_s < kill_zygotes_at_s else None
             if self._selector.select(wait_s):
                 self._signals.recv(1 << 12)

@@ -25,7 +25,6 @@ from backbone.component.process import run_with_heartbeat
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.errors import BackboneError
-from backbone.heaps import share_heaps
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, launcher_launch, service_launch
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.launcher.launcher import LISTING_TIME_S, Launcher
@@ -34,6 +33,7 @@ from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up
 from backbone.mission.model import MissionDescription
+from backbone.operating_system.heaps import share_heaps
 
 START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of it
 

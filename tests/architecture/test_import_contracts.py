@@ -45,6 +45,7 @@ PLANTED = [
     ("foxglove", "backbone/recording/planted.py", "import foxglove"),
     ("foxglove", "resource_pool/planted.py", "from foxglove.messages import Log"),
     ("prometheus", "backbone/metrics/planted.py", "import prometheus_client"),
+    ("pytest", "mission_control/laboratory/planted.py", "import pytest"),
     ("pyarrow", "backbone/command_line/planted.py", "import pyarrow"),
     ("pydantic", "backbone/placer/planted.py", "import pydantic"),
     ("pydantic", "resource_pool/planted.py", "from lxml import etree"),

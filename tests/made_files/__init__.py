@@ -16,6 +16,7 @@ from backbone.mission.class_facts import SHIPPED
 from backbone.mission.declaration.xsd import XSD, xsd_text
 from backbone.mission.shipped_types import shipped_types
 
+from .kit_reference import kit_reference
 from .mission_reference import reference_text
 from .page_types import CONSOLE, DESIGNER, declarations
 
@@ -38,6 +39,7 @@ MADE_FILES: dict[Path, Callable[[str], str]] = {
     ROOM / SHIPPED: lambda _old: shipped_classes_text(),
     ROOM / XSD: lambda _old: xsd_text(),
     Path("docs/reference/mission-file.md"): reference_text,
+    Path("docs/reference/module-kit.md"): kit_reference,
     PAGE / "messages.d.ts": lambda _old: declarations(CONSOLE),
     PAGE / "design_messages.d.ts": lambda _old: declarations(DESIGNER),
 }

@@ -87,3 +87,17 @@ async def test_the_example_goes_into_a_mission_unchanged() -> None:
         assert "waves" in done.stdout
         tree = mission.command("scout-backbone", "tree", "--json", "--mission", mission.name)
         assert json.loads(tree.stdout)["tree"] == []
+
+
+def test_load_shows_the_processor_time_of_modules_and_processes() -> None:
+    with mission_up(mission_xml=EXAMPLES / "pair.xml") as mission:
+        done = mission.command("scout-backbone", "load", "--json", "--mission", mission.name)
+        assert done.returncode == 0, done.stderr
+        told = json.loads(done.stdout)
+        assert {one["module"] for one in told["modules"]} == {"wave", "smoothing"}
+        assert all(one["unit"] == "waves" and one["rate_hz"] > 1.0 for one in told["modules"])
+        processes = {name: one for one in told["processes"] for name in one["components"]}
+        assert processes["waves"]["pid"] == mission.component("waves")["pid"]
+        assert processes["launcher"]["processor_s"] > processes["waves"]["processor_s"] > 0.0
+        drawn = mission.command("scout-backbone", "load", "--for", "0.1", "--mission", mission.name)
+        assert "smoothing" in drawn.stdout

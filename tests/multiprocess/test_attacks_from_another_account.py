@@ -98,7 +98,7 @@ async def test_no_attack_from_another_account_changes_a_mission_on_one_machine(v
         let_others_enter(Path(mission.environment["XDG_RUNTIME_DIR"]))
         async with mission.bus() as bus:
             stopped = await stop_scout3(bus)
-            mission.wait_for_watchers()
+            mission.wait_for_components("watch-scout1", "watch-scout2")
             before = lives(mission.status())
             found = await asyncio.to_thread(attacks, what_is_known(mission, pwd.getpwnam("nobody").pw_uid, victim))
             assert sum(found["tried"].values()) == ATTEMPTS

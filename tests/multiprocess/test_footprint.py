@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 
+import psutil
 import pytest
 import zenoh
 from footprint import Footprint, footprint, grown
@@ -19,6 +22,8 @@ pytestmark = pytest.mark.processes
 
 WARM_UP_S, HOSTILE_S = 180.0, 180.0  # a framegrabber fills its stores of noise and pictures for three minutes
 LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its size
+CREATOR_MIB = 60.0  # of a small computer with half a gigabyte, a tenth
+CORE, CORE_S = "backbone.component.process", 0.3  # all that a component's process needs before its own class
 FEW_BYTES = 10_000  # the big ones are for a test of their own; here it is many that counts
 
 
@@ -30,6 +35,20 @@ def test_of_every_process_of_a_mission_there_is_a_footprint() -> None:
         assert pids < {one.pid for one in found.values()}, sorted(found)
         assert {"launcher", "nameserver", "rc_manager", "zygote of launcher"} < set(found), sorted(found)
         assert all(one.memory_kb > 1000 and one.descriptors > 2 and one.threads for one in found.values()), found
+
+
+@pytest.mark.thorough
+def test_a_creator_fits_a_small_computer() -> None:
+    with mission_up() as mission:
+        resident = psutil.Process(mission.component("creator-base")["pid"]).memory_info().rss
+    assert resident / 2**20 < CREATOR_MIB
+
+
+def test_the_core_is_imported_in_little_processor_time() -> None:
+    code = f"import time; import {CORE}; print(time.process_time())"
+    words = [sys.executable, "-c", code]
+    took_s = min(float(subprocess.run(words, capture_output=True, check=True).stdout) for _ in range(3))
+    assert took_s < CORE_S
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ def test_every_command_of_the_guide_prints_what_it_says() -> None:
 @pytest.mark.thorough
 async def test_a_picture_is_shown_live_in_a_terminal_and_q_leaves() -> None:
     with mission_up() as mission:
-        await asyncio.to_thread(mission.wait_for_watchers)
+        await asyncio.to_thread(mission.wait_for_components, "watch-scout1", "watch-scout2")
         await asyncio.to_thread(has_shown, mission)
         ours, theirs = pty.openpty()
         termios.tcsetwinsize(ours, (40, 132))

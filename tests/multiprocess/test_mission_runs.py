@@ -26,7 +26,7 @@ def trace_of(file: Path) -> list[dict[str, object]]:
 @pytest.fixture(scope="module")
 def mission() -> RunningMission:
     with mission_up() as running:
-        running.wait_for_watchers()
+        running.wait_for_components("watch-scout1", "watch-scout2")
         yield running
 
 

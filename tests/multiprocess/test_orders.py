@@ -101,7 +101,7 @@ def ordered(mission: RunningMission) -> Iterator[Script]:
 @pytest.fixture(scope="module")
 def mission() -> Iterator[RunningMission]:
     with mission_up() as running:
-        running.wait_for_watchers()
+        running.wait_for_components("watch-scout1", "watch-scout2")
         yield running
 
 

@@ -187,7 +187,9 @@ async def mission_in_one_process(
 
 def _painted(mission: MissionDescription) -> MissionDescription:
     """Return the mission with the painter behind each simulated receiver: its pictures are the same everywhere."""
-    receivers = {kind.name for kind in mission.types if issubclass(load_class(kind.class_path), Framegrabber)}
+    used = {resource.type for resource in mission.resources}  # others are not imported
+    types = {kind.name: kind.class_path for kind in mission.types if kind.name in used}
+    receivers = {name for name, class_path in types.items() if issubclass(load_class(class_path), Framegrabber)}
     resources = tuple(
         msgspec.structs.replace(resource, parameters={**resource.parameters, "camera": "paint"})
         if resource.type in receivers and resource.driver == SIMULATED

@@ -11,15 +11,14 @@ from backbone.creator.process_table import (
     MARK,
     Process,
     descendants,
-    environment,
     read_line,
     read_table,
     remains,
     tree,
-    wait_gone,
     zygote_title,
     zygotes_of,
 )
+from backbone.operating_system.processes import environment, wait_gone
 
 
 def alive(parent: int, session: int, title: str = "x") -> Process:

@@ -8,11 +8,11 @@ import sys
 
 import pytest
 
-from backbone.heaps import FEW
+from backbone.operating_system.heaps import FEW
 
 PROGRAM = """
 import ctypes, sys, threading
-from backbone.heaps import share_heaps
+from backbone.operating_system.heaps import share_heaps
 libc = ctypes.CDLL(None)
 if not hasattr(libc, "malloc_info"):
     sys.exit(77)

@@ -1,0 +1,39 @@
+"""Settings of the calling process in the kernel: its title, its parent's death, orphans."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+
+_PR_SET_PDEATHSIG, _PR_SET_NAME, _PR_SET_CHILD_SUBREAPER = 1, 15, 36  # linux/prctl.h
+_LONGEST_TITLE = 15  # linux/sched.h: TASK_COMM_LEN less its end mark
+_BEHIND = 10  # chosen: half of what there is
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+def die_with_parent() -> None:
+    """Ask the kernel to send SIGKILL to this process when the thread that forked it ends."""
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def adopt_orphans() -> None:
+    """Make this process the parent of descendants whose own parent ends."""
+    _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+
+
+def set_title(title: str) -> None:
+    """Set the name of this process in ``ps`` and ``top``, cut to 15 characters."""
+    _prctl(_PR_SET_NAME, ctypes.create_string_buffer(title[:_LONGEST_TITLE].encode()))
+
+
+def go_behind_others() -> None:
+    """Let other processes of this machine go first from now on."""
+    os.nice(_BEHIND)
+
+
+def _prctl(option: int, value: object) -> None:
+    argument = value if isinstance(value, ctypes.Array) else ctypes.c_ulong(value)  # type: ignore[arg-type]
+    if _libc.prctl(option, argument, 0, 0, 0) != 0:
+        number = ctypes.get_errno()
+        raise OSError(number, f"prctl({option}): {os.strerror(number)}")

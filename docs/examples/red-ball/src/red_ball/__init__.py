@@ -1,0 +1,1 @@
+"""Find a red ball in pictures and follow it."""

@@ -1,0 +1,1 @@
+"""Module kit: pytest fixtures for who writes modules and missions; see ``plugin``."""

@@ -1,0 +1,186 @@
+"""A module fed by hand, and the rules that every module must keep.
+
+Rules:
+
+* inputs and outputs are of exactly the declared classes, and a required output is there;
+* a message among them is the same after it has crossed the bus;
+* an update changes neither its inputs nor what the update before handed over, because others have the same objects.
+
+Values are compared by their pickles; what cannot be pickled is not compared.
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+import typing
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from backbone.errors import Refusal
+from backbone.naming import did_you_mean
+from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, write
+from mission_control.modules.module import Module, default_name
+from mission_control.modules.ports import Port, Ports, kinds_of_ports, ports_of, type_name
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+AnyModule = TypeVar("AnyModule", bound=Module)
+Pickles = Mapping[str, bytes | None]
+
+
+class ModuleRuleBroken(Refusal):
+    """A module, or the test that feeds it, broke a rule of modules."""
+
+    code = "module.rule"
+
+
+class ModuleUnderTest:
+    """A module fed by hand; each update checks the rules.
+
+    Attributes:
+        module: The module itself.
+        shown: Debug view → what the module showed last; pictures are made each time.
+    """
+
+    def __init__(self, module: Module) -> None:
+        self.module, self.shown = watched(module), dict[str, object]()
+        module.debug = Shown(self.shown)
+        self._history: list[tuple[dict[str, Any], Pickles]] = []
+
+    def update(self, **inputs: Any) -> Any:
+        """Return the module's outputs for these inputs, which are named as its ``Inputs`` names them.
+
+        Raises:
+            ModuleRuleBroken: The inputs are not the declared ones, or the module broke a rule.
+        """
+        _check_names(self.module, inputs)
+        outputs = self.module.update(self.module.Inputs(**inputs))
+        self._history.append((inputs, _pickles(outputs)))
+        return outputs
+
+    def check_reset(self) -> None:
+        """Reset the module, feed all inputs so far again, and compare: it says the same.
+
+        Raises:
+            ModuleRuleBroken: It says something else, so its ``reset`` forgets to set an attribute.
+        """
+        self.module.reset()
+        for number, (inputs, before) in enumerate(self._history, 1):
+            if _pickles(self.module.update(self.module.Inputs(**inputs))) != before:
+                name = default_name(type(self.module))
+                raise ModuleRuleBroken(
+                    f"update {number} of {name} says something else after a reset",
+                    remedy="Set in reset every attribute that update changes; use no clock and no random numbers.",
+                )
+
+
+MakeModule = Callable[[Module], ModuleUnderTest]
+
+
+class Shown:
+    """The debug views of a module at which somebody always looks; see ``mission_control.modules.module.Debug``."""
+
+    def __init__(self, into: dict[str, object]) -> None:
+        self._into = into
+
+    def picture(self, view: str, make: Callable[[], NDArray[np.generic]]) -> None:
+        """Make the picture and keep it."""
+        self._into[view] = make()
+
+    def value(self, view: str, value: float | bool | str) -> None:
+        """Keep the value."""
+        self._into[view] = value
+
+
+def watched(module: AnyModule) -> AnyModule:
+    """Return the module; from now on each of its updates raises ``ModuleRuleBroken`` if it breaks a rule."""
+    name, update = default_name(type(module)), module.update
+    handed_over = list[tuple[object, Pickles]]()
+
+    def checked(inputs: Ports) -> Ports:
+        _check_values(name, "input", inputs)
+        handed_over.append((inputs, _pickles(inputs)))
+        outputs: object = update(inputs)
+        for struct, before in handed_over:
+            _check_unchanged(name, struct, before)
+        if type(outputs) is not module.Outputs:
+            kind = type_name(type(outputs))
+            remedy = f"Return self.Outputs(…), declared as {type_name(module.Outputs)}."
+            raise ModuleRuleBroken(f"{name} returns {kind}", remedy=remedy)
+        _check_values(name, "output", outputs)
+        handed_over[:] = [(inputs, _pickles(inputs)), (outputs, _pickles(outputs))]
+        return outputs
+
+    module.update = checked  # type: ignore[method-assign]  # this one module only
+    return module
+
+
+# ---------------------------------------------------------------------- the rules
+def _check_names(module: Module, inputs: Mapping[str, object]) -> None:
+    ports, name = ports_of(module.Inputs), default_name(type(module))
+    known = [port.name for port in ports]
+    declared = f"It declares {', '.join(known) or 'no input'}."
+    for given in inputs:
+        if given not in known:
+            detail = f"{name} has no input {given!r}{did_you_mean(given, known)}"
+            raise ModuleRuleBroken(detail, remedy=declared)
+    for port in ports:
+        if port.is_required and port.name not in inputs:
+            raise ModuleRuleBroken(f"{name} waits for its input {port.name}", remedy=declared)
+
+
+def _check_values(module: str, what: str, struct: Ports) -> None:
+    for port in ports_of(type(struct)):
+        value, kind = getattr(struct, port.name), kinds_of_ports(type(struct))[port.name]
+        if value is not None or (what == "output" and port.is_required):
+            _check_class(f"{what} {port.name} of {module}", port, kind, value)
+
+
+def _check_class(what: str, port: Port, kind: object, value: object) -> None:
+    top = typing.get_origin(kind) or kind
+    is_message = isinstance(top, type) and issubclass(top, Message)
+    if isinstance(top, type) and not (type(value) is top if is_message else isinstance(value, top)):
+        remedy = "Messages are of exactly the declared class; an output that may be left out has the default None."
+        raise ModuleRuleBroken(f"{what} is {type_name(type(value))}, declared is {port.type}", remedy=remedy)
+    if is_message and isinstance(value, Message):
+        written = write(Envelope(WIRE_VERSION, "kit/kit", 0, 0.0, "", value))
+        try:
+            same = write(_reader(type(value)).read(written)) == written
+        except Refusal as refusal:
+            raise ModuleRuleBroken(f"{what} cannot cross the bus: {refusal.detail}", remedy=refusal.remedy) from None
+        if not same:
+            raise ModuleRuleBroken(f"{what} is not the same after the bus", remedy="Use fields of the declared types.")
+
+
+def _check_unchanged(module: str, struct: object, before: Pickles) -> None:
+    for name, after in _pickles(struct).items():
+        if after != before[name]:
+            raise ModuleRuleBroken(
+                f"{module} changed {name} of {type_name(type(struct))} after it was handed over",
+                remedy="Make a new object, because others have the same one.",
+            )
+
+
+@lru_cache(maxsize=1024)
+def _reader(kind: type[Message]) -> Reader[Message]:
+    return Reader(kind)
+
+
+def _pickles(struct: object) -> Pickles:
+    return {name: _pickle(getattr(struct, name)) for name in getattr(struct, "__struct_fields__", ())}
+
+
+def _pickle(value: object) -> bytes | None:
+    written = io.BytesIO()
+    pickler = pickle.Pickler(written)
+    pickler.fast = True  # equal values are equal bytes, whichever of their parts are the same object
+    pickler.dispatch_table = {memoryview: lambda view: (memoryview, (view.tobytes(),))}
+    try:
+        pickler.dump(value)
+    except (pickle.PicklingError, TypeError, AttributeError, ValueError):  # all that it raises on what it cannot write
+        return None
+    return written.getvalue()

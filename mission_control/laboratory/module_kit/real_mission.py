@@ -1,0 +1,275 @@
+"""A real mission for tests: started by the real command line, in a runtime folder of its own.
+
+Its hub listens on a socket in that folder, so no other mission and no port that is taken is in its way.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import uuid
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from backbone import run_files
+from backbone.authentication import secret_of
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from mission_control.laboratory.module_kit.virtual_mission import is_text
+
+READY_WITHIN_S = 60.0  # chosen: a machine that is busy with other tests
+MARK = "SCOUT_TEST_MARK"
+"""Environment variable by which all processes of a mission are found."""
+BIN = Path(sys.executable).parent
+DOWN_WITHIN_S = 30.0  # chosen: same
+GONE_WITHIN_S = 3.0  # chosen: a process that was killed is gone at once, on a busy machine a moment later
+LAST_LINES, LAST_OF_A_LOG = 60, 15  # chosen: as much as a person reads of a failure
+
+
+@dataclass
+class RealMission:
+    """A mission that is up.
+
+    Attributes:
+        name: Its name.
+        environment: For further commands of the same runtime folder.
+        launcher: The ``up`` process.
+        lines: What ``up`` said so far.
+        is_over: No more lines can come.
+        news: Set with each line, and when it is over.
+    """
+
+    name: str
+    environment: dict[str, str]
+    launcher: subprocess.Popen[str]
+    lines: list[str] = field(default_factory=list)
+    is_over: bool = False
+    news: threading.Event = field(default_factory=threading.Event)
+
+    def command(
+        self, *words: str, within_s: float = 60.0, stdin: str | None = None
+    ) -> subprocess.CompletedProcess[str]:
+        """Run ``scout-backbone`` or ``scout-console`` with these words beside the mission."""
+        return subprocess.run(  # noqa: S603  our own command lines
+            [str(BIN / words[0]), *words[1:]],
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=within_s,
+            input=stdin,
+            check=False,
+        )
+
+    def status(self) -> dict[str, Any]:
+        """Return ``status --json``."""
+        done = self.command("scout-backbone", "status", "--json", "--mission", self.name)
+        _must_succeed(done)
+        found: dict[str, Any] = json.loads(done.stdout)
+        return found
+
+    def wait_for_components(self, *names: str, within_s: float = 10.0) -> None:
+        """Return when components of these names run; children of behaviors come a moment after all is ready."""
+        ends_s = time.monotonic() + within_s
+        while missing := set(names) - {component["name"] for component in self.status()["components"]}:
+            if time.monotonic() > ends_s:
+                raise AssertionError(f"not there within {within_s} s: {', '.join(sorted(missing))}")
+
+    def component(self, name: str) -> dict[str, Any]:
+        """Return one component of the status."""
+        found: list[dict[str, Any]] = [c for c in self.status()["components"] if c["name"] == name]
+        if not found:
+            raise AssertionError(f"{name} is not there")
+        return found[0]
+
+    def processes(self) -> list[psutil.Process]:
+        """Return every process of this mission, launcher included."""
+        return marked(self.environment[MARK])
+
+    def story(self) -> str:
+        """Return what ``up`` said and the ends of all logs, for failure messages."""
+        parts = ["--- up said", *self.lines[-LAST_LINES:]]
+        with contextlib.suppress(OSError):
+            for log in sorted(self.directory.glob("log/*.log")):
+                parts += [f"--- {log.name}", *log.read_text(errors="replace").splitlines()[-LAST_OF_A_LOG:]]
+        return "\n".join(parts)
+
+    @property
+    def directory(self) -> Path:
+        """The mission's run directory."""
+        return Path(self.environment["XDG_RUNTIME_DIR"]) / "scout-backbone" / self.name
+
+    @property
+    def endpoint(self) -> str:
+        """Where its hub listens."""
+        with runtime_directory(self.environment["XDG_RUNTIME_DIR"]):
+            return run_files.find(self.name).endpoint
+
+    @property
+    def clock(self) -> MissionClock:
+        """Its time."""
+        with runtime_directory(self.environment["XDG_RUNTIME_DIR"]):
+            found = run_files.find(self.name)
+        return MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+
+    @contextlib.asynccontextmanager
+    async def bus(self, source: str = "ui_console/tester") -> AsyncIterator[ZenohBus]:
+        """Open a bus to the mission."""
+        config = client_config(self.endpoint, secret_of(str(self.directory)))
+        opened = await ZenohBus.open_when_up(self.name, source, self.clock, config)
+        try:
+            yield opened
+        finally:
+            await opened.close()
+
+    def wait_for_line(self, pattern: str, within_s: float) -> str:
+        """Return the first line ``up`` said that matches."""
+        ends_s = time.monotonic() + within_s
+        while True:
+            self.news.clear()
+            is_over = self.is_over
+            for line in list(self.lines):
+                if re.search(pattern, line):
+                    return line
+            if is_over or not self.news.wait(ends_s - time.monotonic()):
+                raise AssertionError(f"'up' said no line {pattern!r} within {within_s} s")
+
+    def down(self) -> int:
+        """Take it down by command; return the exit code of ``up``."""
+        done = self.command("scout-backbone", "down", "--mission", self.name)
+        _must_succeed(done)
+        return self.launcher.wait(DOWN_WITHIN_S)
+
+
+@contextlib.contextmanager
+def runtime_directory(path: str) -> Iterator[None]:
+    """Let this process look for missions in that runtime folder."""
+    before = os.environ.get("XDG_RUNTIME_DIR")
+    os.environ["XDG_RUNTIME_DIR"] = path
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["XDG_RUNTIME_DIR"]
+        else:
+            os.environ["XDG_RUNTIME_DIR"] = before
+
+
+def marked(mark: str) -> list[psutil.Process]:
+    """Return every process whose environment carries the mark."""
+    found = []
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error):
+            if process.environ().get(MARK) == mark and process.status() != psutil.STATUS_ZOMBIE:
+                found.append(process)
+    return found
+
+
+@contextlib.contextmanager
+def mission_up(
+    mission: Path | str,
+    *options: str,
+    name: str = "",
+    change: Mapping[str, str] | None = None,
+    beside: RealMission | None = None,
+) -> Iterator[RealMission]:
+    """Bring a mission up, yield it when all is ready, and make sure that nothing of it is left afterwards.
+
+    Args:
+        mission: Path of a mission file, or its text.
+        options: Further words for ``up``.
+        name: Its name; left out: one that no other mission has.
+        change: Texts to replace in the file.
+        beside: Another mission of the same user; None: it has a runtime folder of its own.
+    """
+    mark = uuid.uuid4().hex
+    name = name or f"test-{mark[:8]}"
+    with tempfile.TemporaryDirectory(prefix="scout-test-") as folder:
+        file = Path(folder) / "mission.xml"
+        file.write_text(_renamed(mission, name, change or {}))
+        runtime = folder if beside is None else beside.environment["XDG_RUNTIME_DIR"]
+        environment = {**os.environ, "XDG_RUNTIME_DIR": runtime, MARK: mark}
+        words = [str(BIN / "scout-backbone"), "up", str(file), "--headless", *options]
+        with _started(words, environment) as launcher:
+            running = RealMission(name, environment, launcher)
+            reader = threading.Thread(target=_read, args=(running,), daemon=True)
+            reader.start()
+            try:
+                running.wait_for_line("^all ready", READY_WITHIN_S)
+                yield running
+                if launcher.poll() is None:
+                    running.down()
+                left = wait_gone(mark, GONE_WITHIN_S)
+                if left:
+                    raise AssertionError(f"left behind: {left}")
+            except BaseException as error:
+                error.add_note(running.story())
+                raise
+            finally:
+                _end(launcher, mark)
+                reader.join(5)
+
+
+def _renamed(mission: Path | str, name: str, change: Mapping[str, str]) -> str:
+    """Return the mission's text under this name, with these texts replaced."""
+    text = mission if is_text(mission) else Path(mission).read_text()
+    text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{name}", text, count=1)
+    for old, new in change.items():
+        if old not in text:
+            raise AssertionError(f"{old!r} is not in {mission}")
+        text = text.replace(old, new)
+    return text
+
+
+def _started(words: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(  # noqa: S603  our own command line
+        words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+
+
+def _end(launcher: subprocess.Popen[str], mark: str) -> None:
+    """End what is left, without mercy."""
+    if launcher.poll() is None:
+        launcher.kill()
+    launcher.wait(10)
+    left = wait_gone(mark, GONE_WITHIN_S)
+    for process in left:
+        with contextlib.suppress(psutil.Error):
+            process.kill()
+    psutil.wait_procs(left, timeout=GONE_WITHIN_S)
+
+
+def wait_gone(mark: str, within_s: float) -> list[psutil.Process]:
+    """Return the marked processes that are still there after at most this time."""
+    deadline = time.monotonic() + within_s
+    while (left := marked(mark)) and time.monotonic() < deadline:
+        psutil.wait_procs(left, timeout=0.1)
+    return left
+
+
+def _read(mission: RealMission) -> None:
+    for line in mission.launcher.stdout or ():
+        mission.lines.append(line.rstrip())
+        mission.news.set()
+    mission.is_over = True
+    mission.news.set()
+
+
+def _must_succeed(done: subprocess.CompletedProcess[str]) -> None:
+    if done.returncode != 0:
+        raise AssertionError(f"{done.args} ends with {done.returncode}: {done.stderr}")
+
+
+BringUp = Callable[..., AbstractContextManager[RealMission]]
+"""``mission_up``."""

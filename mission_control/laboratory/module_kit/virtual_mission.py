@@ -1,0 +1,56 @@
+"""A whole mission in one process on virtual time, played for one scene."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Protocol, TypeGuard, TypeVar
+
+from backbone.bus.clock import run_virtual
+from backbone.mission.model import MissionDescription
+from backbone.mission.reader import read_mission, read_mission_bytes
+from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
+
+Result = TypeVar("Result")
+
+
+def play(mission: Path | str, scene: Callable[[RunningMission], Awaitable[Result]]) -> Result:
+    """Return what the scene returns, played while the mission is up.
+
+    Args:
+        mission: Path of a mission file, or its text; the text's files are looked for in the working directory.
+        scene: Gets the running mission, at virtual time.
+
+    Raises:
+        MissionInvalid: With every fault of the file.
+        MissionFell: A component fell.
+        Refusal: A component could not be started.
+    """
+    description = described(mission)
+
+    async def main() -> Result:
+        async with mission_in_one_process(description) as running:
+            return await scene(running)
+
+    return run_virtual(main())
+
+
+def described(mission: Path | str) -> MissionDescription:
+    """Return the mission of a file, or of its text.
+
+    Raises:
+        MissionInvalid: With every fault of the file.
+    """
+    return read_mission_bytes(mission.encode(), "mission.xml") if is_text(mission) else read_mission(mission)
+
+
+def is_text(mission: Path | str) -> TypeGuard[str]:
+    """Return whether this is a mission's text instead of the path of its file."""
+    return isinstance(mission, str) and mission.lstrip().startswith("<")
+
+
+class Play(Protocol):
+    """Plays a mission for one scene."""
+
+    def __call__(self, mission: Path | str, scene: Callable[[RunningMission], Awaitable[Result]]) -> Result:
+        """Return what the scene returns; see ``play``."""
