@@ -71,7 +71,7 @@ class Table:
         """Return whether the policy ``strict`` holds the ARC back: a higher usable one of its group waits."""
         return self.strict and any(
             other.state is RequestState.WAITING and other.goes_before(arc) and self.usable(other)
-            for other in self.state.groups.of(arc).arcs
+            for other in self.state.groups.of[arc].arcs
         )
 
     def _seniority(self, arc: ArcEntry) -> Seniority:

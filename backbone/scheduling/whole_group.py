@@ -60,11 +60,11 @@ class WholeGroupPlanner:
         """Return an ARC whose time is now, and the holders to revoke for it; None if no examined group has one."""
         while self._near:
             rc = next(iter(self._near))
-            users = self._state.users(rc)
+            users = self._state.users.get(rc, ())
             if not users:
                 del self._near[rc]
                 continue
-            group = self._state.groups.of(next(iter(users)))
+            group = self._state.groups.of[next(iter(users))]
             turn = self._due_in(group, now_s)
             if turn is not None:
                 return turn
@@ -82,7 +82,7 @@ class WholeGroupPlanner:
         if runs_on or any(self._table.is_overdue(arc, now_s) for arc in group):
             return None
         self._plans.clear()
-        turn = self._due_in(self._state.groups.of(group[0]), now_s)
+        turn = self._due_in(self._state.groups.of[group[0]], now_s)
         return turn.arc if turn is not None else None
 
     def _due_in(self, group: Group[ArcEntry], now_s: float) -> Turn | None:
@@ -202,7 +202,7 @@ class WholeGroupPlanner:
 
     def start_s(self, arc: ArcEntry, now_s: float) -> float:
         """Return when the RCs of a queued ARC will begin to settle, as of the present decision."""
-        return self._plans_of(self._state.groups.of(arc), now_s).now.start_s(arc)
+        return self._plans_of(self._state.groups.of[arc], now_s).now.start_s(arc)
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the queued ARCs of its group that come before a queued one, in order."""
