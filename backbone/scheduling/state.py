@@ -231,11 +231,12 @@ class ScheduleState:
             self.held_alone &= ~arc.excludes
         if arc.active and not was_active:
             self.groups.add(arc, arc.uses)
-            self.compatibility.demand_changed(arc.shares)
-            self.fairness.joined(arc, now_s)
         elif was_active and not arc.active:
             self.groups.remove(arc)
+        if arc.shares and arc.active is not was_active:
             self.compatibility.demand_changed(arc.shares)
+        if arc.active and not was_active:
+            self.fairness.joined(arc, now_s)
 
     def set_afterwards(self, arc: ArcEntry, afterwards: Afterwards) -> None:
         """Set the state of an ARC that is being revoked, once its RCs are free."""

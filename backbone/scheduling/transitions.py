@@ -118,8 +118,8 @@ class Transitions:
     def make_way(self, turn: Turn) -> None:
         """Revoke the holders of the RCs of the ARC whose turn it is."""
         for holder in in_order_of_revocation(turn):
-            overridden = higher(turn.arc.path, holder.path)
-            forced = overridden and not holder.served(self._decision.now_s)
+            served, overridden = holder.served(self._decision.now_s), turn.arc.goes_before(holder)
+            forced = overridden and not served
             if forced or not self._schedule.planner_of(turn.arc).reserves:
                 self._reserve(turn.arc, forced=forced)
             if overridden:
@@ -206,12 +206,13 @@ class Transitions:
 
     def lose(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
         """Count the ARC's RCs as being disconnected; a served ARC has its next place behind its equals."""
-        self.trace.record("revoke", because(why, by), arc=arc.name, why=why, **({"by": by} if by else {}))
+        cause = because(why, by)
         if arc.served(self._decision.now_s):
             arc.stamp = self._stamp()
         arc.swapped_out, arc.swapped_out_by = why, by
         arc.afterwards = afterwards
         self._enter(arc, RequestState.REVOKING)
+        self.trace.record("revoke", cause, arc=arc.name, why=why, **({"by": by} if by else {}))
 
     def free(self, arc: ArcEntry, state: RequestState) -> None:
         """Queue or idle an ARC whose RCs are in their safe states."""

@@ -79,8 +79,8 @@ FAULTS = [
     Planted(
         "who is overridden goes before whose slice is over",
         "planner.py",
-        "key=lambda holder: higher(turn.arc.path, holder.path))",
-        "key=lambda holder: not higher(turn.arc.path, holder.path))",
+        "key=turn.arc.goes_before)",
+        "key=lambda holder: not turn.arc.goes_before(holder))",
     ),
     Planted("nothing is reserved for an ARC that overrides", "transitions.py", "if forced or not", "if not"),
     Planted(
@@ -97,13 +97,16 @@ FAULTS = [
         "self._slack_s",
     ),
     Planted(
-        "a lower ARC overlaps what a higher one reserved", "plan.py", "if rank(other.path, arc.path) > 0:", "if False:"
+        "a lower ARC overlaps what a higher one reserved",
+        "plan.py",
+        "if other.level is not arc.level and rank(other.path, arc.path) > 0:",
+        "if False:",
     ),
     Planted(
         "an ARC whose RC is down has a start",
         "plan.py",
-        "if self._table.usable(arc) else math.inf",
-        "if arc else math.inf",
+        "        if not table.usable(arc):\n            return math.inf\n",
+        "",
     ),
     Planted(
         "a higher holder stands only until now", "table.py", "return math.inf if before > 0 else now_s", "return now_s"
@@ -120,7 +123,7 @@ FAULTS = [
     Planted(
         "the ARC granted last goes first",
         "table.py",
-        "(-holder.granted_s, *_later(holder))",
+        "(-holder.granted_s, -holder.stamp[0], -holder.stamp[1])",
         "(holder.granted_s, *holder.stamp)",
     ),
     Planted(
