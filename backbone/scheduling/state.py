@@ -150,6 +150,7 @@ class ScheduleState:
             path: The same with their numbers.
             longest_s: Longest time of its slices, also for a shorter request.
         """
+        level = self._level_of(path)
         rcs = [self.rcs[rc] for rc in uses]
         settle_s = max((rc.connect_s for rc in rcs), default=0.0)
         shares = tuple(rc.name for rc in rcs if rc.sharable and uses[rc.name].streams)
@@ -160,7 +161,7 @@ class ScheduleState:
             uses=uses,
             place_in_tree=place,
             path=path,
-            level=self._level_of(path),
+            level=level,
             minimum_s=request.minimum_runtime_s,
             length_s=settle_s + request.minimum_runtime_s,
             maximum_s=max(request.minimum_runtime_s, request.maximum_runtime_s, longest_s),
