@@ -17,10 +17,9 @@ from collections.abc import Sequence
 
 import msgspec
 
-from backbone.scheduling import trace
 from backbone.scheduling.alternatives import can_be_planned
 from backbone.scheduling.damping import Damping
-from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry
+from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry, Decision
 from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.packet_times import PacketTimes
@@ -35,27 +34,35 @@ RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pa
 
 
 class ArcEvents:
-    """Applies events of ARCs."""
+    """Applies events of ARCs.
+
+    Attributes:
+        retrying: ARCs that want time again at a later time, by name.
+        understating: ARCs whose packets take longer than their requests say, by name.
+    """
 
     def __init__(
         self,
+        decision: Decision,
         transitions: Transitions,
         schedule: MasterSchedule,
         tree: PriorityTree,
         priorities: PriorityEvents,
         rules: SchedulingRules,
     ) -> None:
+        self._decision = decision
         self._transitions = transitions
+        self._trace = transitions.trace
         self._state = schedule.state
         self._table = schedule.table
         self._tree = tree
         self._priorities = priorities
         self._grid_s = rules.grid_s
         self._successors: dict[str, Requested] = {}
-        self._retrying: dict[str, ArcEntry] = {}
+        self.retrying: dict[str, ArcEntry] = {}
         self._damping = Damping()
         self._packet_times = PacketTimes()
-        self._understating: dict[str, ArcEntry] = {}
+        self.understating: dict[str, ArcEntry] = {}
 
     # Requests of ARCs.
 
@@ -71,7 +78,8 @@ class ArcEvents:
         if known.afterwards is Afterwards.GONE and known.holds:
             self._successors[request.arc] = event  # a new request while its last RCs are still being freed
             return
-        place_in_tree = self._priorities.place(request)
+        place_in_tree = self._place(request)
+        self._trace.introduce_nodes(self._tree.path(place_in_tree))
         is_another = _chosen(known.request, tuple(known.uses)) != _chosen(request, event.rcs)
         if is_another or known.place_in_tree != place_in_tree:
             self._successors[request.arc] = event
@@ -111,7 +119,7 @@ class ArcEvents:
 
     def _want(self, arc: ArcEntry) -> None:
         """Queue an idle ARC, later if its owner asked and left too often."""
-        wait_s = self._damping.wait_s(arc.request.owner, self._transitions.now_s)
+        wait_s = self._damping.wait_s(arc.request.owner, self._decision.now_s)
         if wait_s:
             self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
         else:
@@ -121,16 +129,16 @@ class ArcEvents:
         if arc.understates:
             self._ask_anew(arc)
             return
-        self._transitions.trace.record(trace.about("want", self._transitions.now_s, arc.name), "it wants time again")
+        self._trace.record("want", "it wants time again", arc=arc.name)
         self._transitions.queue(arc)
 
     def _wait_to_ask(self, arc: ArcEntry, wait_s: float, why: str) -> None:
-        self._state.retry_at(arc, self._transitions.now_s + wait_s, why)
-        self._retrying[arc.name] = arc
+        self._state.retry_at(arc, self._decision.now_s + wait_s, why)
+        self.retrying[arc.name] = arc
 
     def _leaves(self, arc: ArcEntry) -> None:
         if arc.has_forced and arc.state in (RequestState.WAITING, RequestState.CONNECTING):
-            self._damping.left_in_vain(arc.request.owner, self._transitions.now_s)
+            self._damping.left_in_vain(arc.request.owner, self._decision.now_s)
 
     def idled(self, name: str) -> None:
         """Revoke an ARC that wants no time now; it keeps its request."""
@@ -148,7 +156,7 @@ class ArcEvents:
         elif arc.state is not RequestState.IDLE:
             self._record_idle(name, "it wants no time now")
             if arc.state is RequestState.WAITING:
-                self._state.rest(arc, self._transitions.now_s)
+                self._transitions.rest(arc)
             else:
                 self._transitions.revoke(arc, "self", "", Afterwards.IDLE)
 
@@ -166,7 +174,7 @@ class ArcEvents:
         self._remove(arc, why)
 
     def _remove(self, arc: ArcEntry, why: str) -> None:
-        self._transitions.trace.record(trace.about("depart", self._transitions.now_s, arc.name), because(why, ""))
+        self._trace.record("depart", because(why, ""), arc=arc.name)
         if not arc.holds:
             self._forget(arc)
         elif arc.state is RequestState.REVOKING:
@@ -185,8 +193,8 @@ class ArcEvents:
         if not can_be_planned(minimum_s, maximum_s):
             return
         self._state.set_run_times(arc, minimum_s, maximum_s)
-        line = trace.runtime(self._transitions.now_s, event.arc, minimum_s, maximum_s)
-        self._transitions.trace.record(line, "from the next slice on")
+        cause = "from the next slice on"
+        self._trace.record("min_run", cause, arc=event.arc, min_run=minimum_s, max_run=maximum_s)
 
     def extended(self, name: str, until_s: float) -> None:
         """Extend the slice of a running ARC, at most until the end of its maximum run time."""
@@ -211,21 +219,19 @@ class ArcEvents:
             counted = self._packet_times.counted(name, arc.uses)
             if counted != arc.uses:
                 self._state.measure(arc, counted)
-                self._understating[name] = arc
+                self.understating[name] = arc
                 if arc.state is RequestState.WAITING:
                     self._ask_anew(arc)
 
     def ask_anew_where_late(self) -> None:
         """Let connected ARCs ask anew where an RC cannot serve all of them by the measured times."""
-        held = dict.fromkeys(rc for arc in self._understating.values() if arc.state in CONNECTED for rc in arc.shares)
+        held = dict.fromkeys(rc for arc in self.understating.values() if arc.state in CONNECTED for rc in arc.shares)
         for rc in held:
             for arc in self._table.understating(rc):
                 self._ask_anew(arc)
 
     def ask_anew_beside(self, arc: ArcEntry) -> bool:
         """Let holders ask anew beside which the ARC would be late; return whether there are any."""
-        if not self._understating:
-            return False
         asked = dict.fromkeys(holder for rc in arc.shares for holder in self._table.understating(rc, [arc]))
         for holder in asked:
             self._ask_anew(holder)
@@ -267,9 +273,7 @@ class ArcEvents:
             return
         afterwards = arc.afterwards
         waits = afterwards is Afterwards.WAIT
-        self._transitions.trace.record(
-            trace.about("free", self._transitions.now_s, name), "its RCs are in their safe states"
-        )
+        self._trace.record("free", "its RCs are in their safe states", arc=name)
         self._transitions.free(arc, RequestState.WAITING if waits else RequestState.IDLE)
         if afterwards is Afterwards.WANT:
             self.wanted(name)
@@ -282,16 +286,16 @@ class ArcEvents:
 
     def retry(self) -> None:
         """Queue the ARCs whose time to retry has come."""
-        for arc in [*self._retrying.values()]:
+        for arc in [*self.retrying.values()]:
             if arc.retry_s is None:
-                del self._retrying[arc.name]
-            elif arc.state is RequestState.IDLE and arc.retry_s <= self._transitions.now_s:
-                del self._retrying[arc.name]
+                del self.retrying[arc.name]
+            elif arc.state is RequestState.IDLE and arc.retry_s <= self._decision.now_s:
+                del self.retrying[arc.name]
                 self._queue(arc)
 
     def next_retry_s(self) -> float | None:
         """Return when the next ARC retries; None if none does."""
-        return min((arc.retry_s for arc in self._retrying.values() if arc.retry_s is not None), default=None)
+        return min((arc.retry_s for arc in self.retrying.values() if arc.retry_s is not None), default=None)
 
     # Bookkeeping.
 
@@ -301,29 +305,36 @@ class ArcEvents:
         return coming or any(rc in arc.uses for arc in self._state.arcs.values())
 
     def _add(self, event: Requested) -> ArcEntry:
-        request = event.request
-        for rc in event.rcs:
-            self._transitions.trace.introduce_rc(self._state.rcs[rc], self._transitions.now_s)
-        place_in_tree = self._priorities.place(request)
-        uses = self._packet_times.counted(request.arc, _chosen(request, event.rcs))
-        path = self._tree.path(place_in_tree)
+        request, now_s = event.request, self._decision.now_s
         longest_s = self._longest_s(request.minimum_runtime_s)
-        arc = self._state.add_arc(request, uses, place_in_tree, path, longest_s, self._transitions.now_s)
-        wait_s = 0.0 if request.idle else self._damping.wait_s(request.owner, self._transitions.now_s)
-        self._transitions.trace.record_request(arc, self._transitions.now_s, idle=request.idle or wait_s > 0)
+        chosen = _chosen(request, event.rcs)
+        place_in_tree = self._place(request)
+        path = self._tree.path(place_in_tree)
+        uses = self._packet_times.counted(request.arc, chosen)
+        wait_s = 0.0 if request.idle else self._damping.wait_s(request.owner, now_s)
+        arc = self._state.add_arc(request, uses, place_in_tree, path, longest_s, now_s)
+        rcs = [self._state.rcs[rc] for rc in event.rcs]
+        self._trace.record_request(arc, rcs, idle=request.idle or wait_s > 0)
         if wait_s:
             self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
         elif not request.idle:
             self._transitions.queue(arc)
         return arc
 
+    def _place(self, request: SchedulingRequest) -> tuple[str, ...]:
+        """Add the nodes of a request to the tree; return the names from the root to its owner."""
+        place_in_tree, renumbered = self._tree.place(request.path, console=request.console)
+        if renumbered:
+            self._priorities.renumber()
+        return place_in_tree
+
     def _longest_s(self, minimum_s: float) -> float:
         """Return the longest slice of this minimum run time that is not extended on request."""
         return minimum_s + self._grid_s
 
     def _forget(self, arc: ArcEntry) -> None:
-        self._retrying.pop(arc.name, None)
-        self._understating.pop(arc.name, None)
+        self.retrying.pop(arc.name, None)
+        self.understating.pop(arc.name, None)
         self._state.forget(arc)
         successor = self._successors.pop(arc.name, None)
         if successor is not None:
@@ -339,7 +350,7 @@ class ArcEvents:
         self._successors[name] = Requested(msgspec.structs.replace(event.request, **changes), event.rcs)
 
     def _record_idle(self, name: str, cause: str) -> None:
-        self._transitions.trace.record(trace.about("idle", self._transitions.now_s, name), cause)
+        self._trace.record("idle", cause, arc=name)
 
 
 def _chosen(request: SchedulingRequest, rcs: Sequence[str]) -> dict[str, RcUse]:

@@ -6,7 +6,7 @@ An exclusive RC has one holder; on a sharable one every stream of every holder m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from backbone.scheduling.entries import ArcEntry, RcEntry
 from backbone.scheduling.priority import by_precedence
@@ -23,7 +23,7 @@ class Compatibility:
     """
 
     def __init__(
-        self, rcs: Mapping[str, RcEntry], users: Callable[[str], Collection[ArcEntry]], admission: Analysis
+        self, rcs: Mapping[str, RcEntry], users: Mapping[str, Collection[ArcEntry]], admission: Analysis
     ) -> None:
         """Begin with no answers.
 
@@ -71,7 +71,7 @@ class Compatibility:
     def has_room_for_all(self, rc: str) -> bool:
         """Return whether the whole active demand fits at once (rule 15): then every part of it does."""
         if rc not in self._roomy:
-            users = [*self._users(rc)]
+            users = [*self._users.get(rc, ())]
             self._roomy[rc] = all(rc in user.shares for user in users) and self._admissible(rc, users)
         return self._roomy[rc]
 

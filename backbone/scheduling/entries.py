@@ -1,6 +1,7 @@
-"""Entries: the record of each RC and of each ARC in the schedule.
+"""Entries: the record of each RC and of each ARC in the schedule, and of the decision that is being made.
 
-Rule of this file: data, and values computed from it alone. Only ``ScheduleState`` writes it.
+Rule of this file: data, and values computed from it alone. ``state`` writes the entries, and ``transitions`` and
+``slice_ends`` write how an ARC gets and loses its RCs.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
+from backbone.scheduling.events import Instruction
 from backbone.scheduling.priority import Level, Path, higher
 from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
 from backbone.scheduling.response_time import Stream
@@ -18,6 +20,21 @@ SOON_S = 1e-6  # chosen: an RC that should be free by now is expected at once, b
 
 HOLDING = frozenset({RequestState.CONNECTING, RequestState.RUNNING, RequestState.REVOKING})
 CONNECTED = frozenset({RequestState.CONNECTING, RequestState.RUNNING})
+
+
+@dataclass(slots=True)
+class Decision:
+    """The decision that is being made.
+
+    Attributes:
+        now_s: Its time; it never goes back from one to the next.
+        instructions: What the loop is to carry out, so far, in this order.
+        ended: ARCs whose slices it ended for an equal, each with a sharable RC that both use.
+    """
+
+    now_s: float = 0.0
+    instructions: list[Instruction] = field(default_factory=list)
+    ended: list[tuple[ArcEntry, str]] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -67,12 +84,14 @@ class ArcEntry:
     """One ARC in the master schedule.
 
     Attributes:
+        name: Of the ARC.
         request: As last sent.
         uses: RC → its use; the chosen alternative.
         place_in_tree: Names from the root to its owner.
         path: The same with the present numbers.
         level: Its parent's path and its own number, the same object in all siblings of that number: they are equals.
         minimum_s: Run time it needs to be served, counted from the grant.
+        length_s: Time from the beginning of settling to the end of its minimum run time.
         maximum_s: End of all extensions, counted from the grant.
         settle_s: Longest settling time of its RCs.
         release_s: Longest release time of its RCs.
@@ -85,6 +104,9 @@ class ArcEntry:
         reservation: Set while RCs are being freed for it by force, or where equals reserve nothing from each other: it
             comes before all equals; smaller is earlier.
         state: State of its request.
+        active: True: it wants time, or still holds RCs.
+        holds: True: RCs are connected to it, settling for it, or not yet free of it.
+        queued: True: it has a place in the order: it waits, or will wait as soon as its RCs are free.
         since_s: When it entered that state.
         began_s: When its RCs began to settle, while it holds them.
         end_s: End of its slice, while it runs.
@@ -103,12 +125,14 @@ class ArcEntry:
         swapped_out_by: ARC or RC that caused this.
     """
 
+    name: str
     request: SchedulingRequest
     uses: Mapping[str, RcUse]
     place_in_tree: tuple[str, ...]
     path: Path
     level: Level
     minimum_s: float
+    length_s: float
     maximum_s: float
     settle_s: float
     release_s: float
@@ -121,6 +145,9 @@ class ArcEntry:
     stamp: tuple[float, int] = (0.0, 0)
     reservation: int | None = None
     state: RequestState = RequestState.IDLE
+    active: bool = False
+    holds: bool = False
+    queued: bool = False
     began_s: float = 0.0
     end_s: float = 0.0
     granted_s: float = 0.0
@@ -138,11 +165,6 @@ class ArcEntry:
     swapped_out: str = ""
     swapped_out_by: str = ""
 
-    @property
-    def name(self) -> str:
-        """Name of the ARC."""
-        return self.request.arc
-
     def goes_before(self, other: ArcEntry) -> bool:
         """Return whether its owner is strictly higher than the other's."""
         return self.level is not other.level and higher(self.path, other.path)
@@ -151,28 +173,6 @@ class ArcEntry:
     def understates(self) -> bool:
         """Whether its packets take longer than its present request says."""
         return self.measured is not self.streams
-
-    @property
-    def active(self) -> bool:
-        """Whether it wants time, or still holds RCs."""
-        return self.state is not RequestState.IDLE
-
-    @property
-    def holds(self) -> bool:
-        """Whether RCs are connected to it, settling for it, or not yet free of it."""
-        return self.state in HOLDING
-
-    @property
-    def queued(self) -> bool:
-        """Whether it has a place in the order: it waits, or will wait as soon as its RCs are free."""
-        return self.state is RequestState.WAITING or (
-            self.state is RequestState.REVOKING and self.afterwards is Afterwards.WAIT
-        )
-
-    @property
-    def length_s(self) -> float:
-        """Time from the beginning of settling to the end of its minimum run time."""
-        return self.settle_s + self.minimum_s
 
     def served(self, now_s: float) -> bool:
         """Return whether it runs and had its whole slice."""

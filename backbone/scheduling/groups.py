@@ -12,6 +12,7 @@ Source: RAM 2002, "ARCs that ask for independent sets of RCs are put into differ
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 A = TypeVar("A", bound=Hashable)
@@ -56,27 +57,24 @@ def groups(uses: Mapping[str, Collection[str]]) -> list[list[str]]:
     return found
 
 
+@dataclass(slots=True, eq=False)
 class Group(Generic[A]):
-    """ARCs that share RCs; a big group may have fallen apart for a while before ``Groups`` splits it."""
+    """ARCs that share RCs; a big group may have fallen apart for a while before ``Groups`` splits it.
 
-    __slots__ = ("_left", "arcs")
+    Attributes:
+        left: How many have left since the last check that the group is one.
+    """
 
-    def __init__(self, arcs: dict[A, None]) -> None:
-        self.arcs = arcs
-        self._left = 0
-
-    def __len__(self) -> int:
-        return len(self.arcs)
-
-    def leave(self, arc: A) -> int:
-        """Remove the ARC; return how many have left since the last check that the group is one."""
-        del self.arcs[arc]
-        self._left += 1
-        return self._left
+    arcs: dict[A, None]
+    left: int = 0
 
 
 class Groups(Generic[A]):
     """The groups of the present ARCs.
+
+    Attributes:
+        of: Present ARC → its group.
+        users: RC → the ARCs that use it, in the order of their arrival; none where none ever did.
 
     Args:
         exact_up_to: Groups of at most this size are always exactly one group; bigger ones may be
@@ -86,52 +84,45 @@ class Groups(Generic[A]):
     def __init__(self, exact_up_to: int) -> None:
         self._exact_up_to = exact_up_to
         self._uses: dict[A, Collection[str]] = {}
-        self._users: dict[str, dict[A, None]] = {}
-        self._of: dict[A, Group[A]] = {}
+        self.users: dict[str, dict[A, None]] = {}
+        self.of: dict[A, Group[A]] = {}
 
     def __contains__(self, arc: A) -> bool:
-        return arc in self._of
-
-    def of(self, arc: A) -> Group[A]:
-        """Return the group of a present ARC."""
-        return self._of[arc]
-
-    def users(self, rc: str) -> Collection[A]:
-        """Return the ARCs that use the RC, in the order of their arrival."""
-        return self._users.get(rc, {})
+        return arc in self.of
 
     def all(self) -> list[Group[A]]:
         """Return all groups, in the order of their first ARCs' arrivals."""
-        return list(dict.fromkeys(self._of.values()))
+        return list(dict.fromkeys(self.of.values()))
 
     def add(self, arc: A, rcs: Collection[str]) -> None:
         """Add the ARC; it joins the groups of all ARCs that use its RCs."""
         self._uses[arc] = rcs
         joined = Group({arc: None})
         for rc in rcs:
-            users = self._users.setdefault(rc, {})
+            users = self.users.setdefault(rc, {})
             if users:
-                joined = self._join(joined, self._of[next(iter(users))])
+                joined = self._join(joined, self.of[next(iter(users))])
             users[arc] = None
         joined.arcs[arc] = None
-        self._of[arc] = joined
+        self.of[arc] = joined
 
     def remove(self, arc: A) -> None:
         """Remove the ARC; its group may fall apart."""
         for rc in self._uses.pop(arc):
-            del self._users[rc][arc]
-        group = self._of.pop(arc)
-        left = group.leave(arc)
-        if len(group) <= self._exact_up_to or left * SPLIT_SHARE > len(group):
+            del self.users[rc][arc]
+        group = self.of.pop(arc)
+        del group.arcs[arc]
+        group.left += 1
+        if len(group.arcs) <= self._exact_up_to or group.left * SPLIT_SHARE > len(group.arcs):
             self._split(group)
 
     def _join(self, one: Group[A], other: Group[A]) -> Group[A]:
         if one is other:
             return one
-        small, big = sorted((one, other), key=len)
+        small, big = sorted((one, other), key=lambda group: len(group.arcs))
         big.arcs.update(small.arcs)
         for arc in small.arcs:
-            self._of[arc] = big
+            self.of[arc] = big
         return big
 
     def _split(self, group: Group[A]) -> None:
@@ -144,9 +135,9 @@ class Groups(Generic[A]):
                 for rc in self._uses[reached.pop()]:
                     if rc not in looked:
                         looked.add(rc)
-                        new = [user for user in self._users[rc] if user in rest]
+                        new = [user for user in self.users[rc] if user in rest]
                         for user in new:
                             part.arcs[user] = rest.pop(user)
                         reached += new
             for arc in part.arcs:
-                self._of[arc] = part
+                self.of[arc] = part

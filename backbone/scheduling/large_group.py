@@ -47,11 +47,11 @@ class LargeGroupPlanner:
         These are its users, and ARCs that may wait for one of its users at another RC.
         """
         state = self._state
-        users = state.users(rc)
+        users = state.users.get(rc, ())
         elsewhere = {other: None for arc in users if arc.queued for other in arc.uses if self._may_hold_up(arc, other)}
         near = dict.fromkeys(users)
         for other in elsewhere:
-            near.update((user, None) for user in state.users(other) if not state.is_kept_out(user))
+            near.update((user, None) for user in state.users.get(other, ()) if not state.is_kept_out(user))
         self._candidates.update((arc, None) for arc in near if arc.state is RequestState.WAITING)
 
     def _may_hold_up(self, arc: ArcEntry, rc: str) -> bool:
@@ -112,7 +112,7 @@ class LargeGroupPlanner:
         version = self._state.version_of(rc)
         known = self._firsts.get(rc)
         if known is None or known[0] != version:
-            queued = [user for user in self._state.users(rc) if user.queued and self._table.usable(user)]
+            queued = [user for user in self._state.users.get(rc, ()) if user.queued and self._table.usable(user)]
             known = self._firsts[rc] = version, self._table.first_in_order(queued) if queued else None
         return known[1]
 
@@ -169,7 +169,7 @@ class LargeGroupPlanner:
         """
         before: dict[ArcEntry, None] = {}
         for rc in arc.uses:
-            order = self._table.in_order([user for user in self._state.users(rc) if user.queued])
+            order = self._table.in_order([user for user in self._state.users.get(rc, ()) if user.queued])
             before.update(dict.fromkeys(order[: order.index(arc)]))
         if self._table.strict:
             group = self._state.group_of(arc)

@@ -6,6 +6,7 @@ another). A group of up to ``exact_up_to`` ARCs is planned whole, a larger one a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from backbone.scheduling.entries import ArcEntry
@@ -25,6 +26,7 @@ class MasterSchedule:
     Attributes:
         table: Questions about it.
         whole: Plans groups whole; also hypothetical ones.
+        planned_whole_up_to: In groups of at most this size each queued ARC has a reserved start.
     """
 
     def __init__(
@@ -52,10 +54,12 @@ class MasterSchedule:
         if planner is not None:
             self._small = self._large = planner(self.table, slack_s=tolerance_s)
         self._exact_up_to = exact_up_to
+        whole_up_to = math.inf if self._large.is_exact else exact_up_to
+        self.planned_whole_up_to: float = whole_up_to if self._small.is_exact else 0
 
     def planner_of(self, arc: ArcEntry) -> Planner:
         """Return the planner of an active ARC's group."""
-        return self._small if len(self.state.groups.of(arc)) <= self._exact_up_to else self._large
+        return self._small if len(self.state.groups.of[arc].arcs) <= self._exact_up_to else self._large
 
     def due(self, now_s: float) -> Turn | None:
         """Return an ARC whose time is now, and the holders to revoke for it; None if there is none.
@@ -66,8 +70,9 @@ class MasterSchedule:
         return self._small.due(now_s) or self._large.due(now_s)
 
     def _look_where_it_changed(self) -> None:
-        changed = [rc for rc in self.state.take_changed() if self.state.users(rc)]
-        planners = [self.planner_of(next(iter(self.state.users(rc)))) for rc in changed]
+        changed = [rc for rc in self.state.changed if self.state.users.get(rc)]
+        self.state.changed.clear()
+        planners = [self.planner_of(next(iter(self.state.users[rc]))) for rc in changed]
         for rc, planner in zip(changed, planners, strict=True):
             planner.look_near(rc)
         if (

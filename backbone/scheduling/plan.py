@@ -7,17 +7,92 @@ last.
 
 from __future__ import annotations
 
+import functools
 import math
 from bisect import insort
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from backbone.scheduling.entries import CONNECTED, INSTANT_S, ArcEntry
-from backbone.scheduling.planner import Hold, Slot
+from backbone.scheduling.planner import Hold, Slot, Turn
 from backbone.scheduling.priority import higher, rank
+from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
 _Reservation = tuple[float, int, float, ArcEntry]
 """Begin of a reservation, the ARC's place in the order, its end, and the ARC."""
+
+
+class GroupPlans:
+    """The plans of a decision about one group, each made when it is first needed.
+
+    Attributes:
+        order: Its queued ARCs, in order.
+    """
+
+    def __init__(
+        self,
+        table: Table,
+        order: list[ArcEntry],
+        group: Iterable[ArcEntry],
+        now_s: float,
+        *,
+        slack_s: float,
+        among_equals: bool = True,
+    ) -> None:
+        """Plan nothing yet; the arguments are those of ``Plan``."""
+        self.order = order
+        self._table = table
+        self._group = [*group]
+        self._now_s = now_s
+        self._make = functools.partial(Plan, table, order, self._group, now_s, among_equals=among_equals)
+        self._slack_s = slack_s
+
+    def due(self, queued: Sequence[ArcEntry], possible: Collection[ArcEntry]) -> Turn | None:
+        """Return the ARC whose time is now, and the holders to revoke for it; None if there is none.
+
+        A slice is ended only for an ARC that fits without tolerance, for any end of the hand-overs under way: else
+        it might be ended for a gap that closes meanwhile.
+
+        Args:
+            queued: The first of the order, or all.
+            possible: ARCs that no single holder keeps from a start now.
+        """
+        table, now = self._table, self.now
+        if not any(now.starts_now(arc) for arc in queued if arc in possible):
+            return None
+        before: list[ArcEntry] = []
+        for arc in queued:
+            if arc.state is not RequestState.WAITING or table.must_let_higher_go_first(arc):
+                continue
+            if arc in possible and (
+                now.starts_now(arc) or (self.exact.starts_now(arc) and self.certain.starts_now(arc))
+            ):
+                pending = [other for other in before if self.certain.starts_now(other)]
+                in_the_way = table.in_the_way(arc, pending, self._group, self._now_s)
+                if in_the_way and self.certain.starts_now(arc):
+                    return Turn(arc, in_the_way)
+                holders = [holder for holder in self._group if holder.holds]
+                if not in_the_way and now.starts_now(arc) and table.fits(arc, holders):
+                    return Turn(arc, [])
+            before.append(arc)
+        return None
+
+    @functools.cached_property
+    def now(self) -> Plan:
+        """The plan of the present state, with the tolerance of this run."""
+        return self._make(slack_s=self._slack_s)
+
+    @functools.cached_property
+    def exact(self) -> Plan:
+        """The plan in which no ARC overlaps another."""
+        return self._make(slack_s=0.0)
+
+    @functools.cached_property
+    def certain(self) -> Plan:
+        """The same, as if all RCs that are being freed were free already."""
+        if not any(arc.state is RequestState.REVOKING for arc in self._group):
+            return self.exact
+        return self._make(slack_s=0.0, handed_over=True)
 
 
 class Plan:
@@ -71,7 +146,7 @@ class Plan:
     def _find_next(self) -> None:
         place = len(self._starts_s)
         arc = self._order[place]
-        start_s = self._starts_s[arc] = self._earliest_s(arc, place) if self._table.usable(arc) else math.inf
+        start_s = self._starts_s[arc] = self._earliest_s(arc, place)
         if start_s < math.inf:
             insort(self._reserved, (start_s, place, start_s + arc.length_s, arc))
 
@@ -81,6 +156,8 @@ class Plan:
         A higher ARC stays once it runs: an ARC that overlaps its slot never starts.
         """
         now_s, table = self._now_s, self._table
+        if not table.usable(arc):
+            return math.inf
         touches, excludes = arc.touches, arc.excludes
         start_s = table.free_s(arc, now_s) if arc.holds and not self._handed_over else now_s
         for holder in self._holders:
@@ -98,7 +175,7 @@ class Plan:
                 continue
             if not (self._among_equals or self._binds(begin_s, other, arc)):
                 continue
-            if rank(other.path, arc.path) > 0:
+            if other.level is not arc.level and rank(other.path, arc.path) > 0:
                 return math.inf
             if end_s > start_s:
                 start_s = end_s

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from backbone.scheduling.entries import ArcEntry
-from backbone.scheduling.priority import higher
 
 Hold = tuple[ArcEntry, float, float]
 """An obstacle to another ARC: the ARC, the begin (minus infinity: it holds its RCs) and end of its time."""
@@ -49,7 +48,7 @@ def in_order_of_revocation(turn: Turn) -> list[ArcEntry]:
 
     A preemption must not look like the reason for the end of another slice.
     """
-    return sorted(turn.in_the_way, key=lambda holder: higher(turn.arc.path, holder.path))
+    return sorted(turn.in_the_way, key=turn.arc.goes_before)
 
 
 class Planner(Protocol):

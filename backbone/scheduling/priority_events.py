@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from backbone.scheduling.entries import Decision
 from backbone.scheduling.events import RenewLeases
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.priority_tree import PriorityTree, carried
-from backbone.scheduling.requests import RequestState, SchedulingRequest
+from backbone.scheduling.requests import RequestState
 from backbone.scheduling.rules import ROUNDING, SchedulingRules
 from backbone.scheduling.transitions import Transitions
 
@@ -23,21 +24,20 @@ class PriorityEvents:
     """Applies changes of the tree."""
 
     def __init__(
-        self, transitions: Transitions, schedule: MasterSchedule, tree: PriorityTree, rules: SchedulingRules
+        self,
+        decision: Decision,
+        transitions: Transitions,
+        schedule: MasterSchedule,
+        tree: PriorityTree,
+        rules: SchedulingRules,
     ) -> None:
+        self._decision = decision
         self._transitions = transitions
+        self._trace = transitions.trace
         self._state = schedule.state
         self._table = schedule.table
         self._tree = tree
         self._aging_s = rules.aging_s
-
-    def place(self, request: SchedulingRequest) -> Place:
-        """Add the nodes of a request; return the names from the root to its owner."""
-        names, renumbered = self._tree.place(request.path, console=request.console)
-        if renumbered:
-            self._renumber()
-        self._transitions.trace.introduce_nodes(self._tree.path(names), self._transitions.now_s)
-        return names
 
     def priority_changed(self, node: str, priority: int) -> None:
         """Set the number of a node or console."""
@@ -49,37 +49,34 @@ class PriorityEvents:
         if self._tree.obstacle(node, parent):
             return
         old, new = self._tree.move(node, parent)
-        self._transitions.trace.nodes_moved(old, new)
+        self._trace.nodes_moved(old, new)
         self._changed(lambda place: carried(place, old, new))
 
     def age(self) -> None:
-        """Raise ARCs that wait long; they keep their level until they are served or idle."""
-        if not self._aging_s:
-            return
+        """Raise ARCs that wait long, if the rules say so; they keep their level until they are served or idle."""
         for arc in self._state.arcs.values():
             if arc.state is RequestState.WAITING:
-                self._state.raise_to(arc, int((self._transitions.now_s - arc.since_s) / self._aging_s + ROUNDING))
-            elif arc.served(self._transitions.now_s) or not arc.active:
+                self._state.raise_to(arc, int((self._decision.now_s - arc.since_s) / self._aging_s + ROUNDING))
+            elif arc.served(self._decision.now_s) or not arc.active:
                 self._state.raise_to(arc, 0)
         if self._tree.age((arc.place_in_tree, arc.raised) for arc in self._state.arcs.values() if arc.raised):
             self._changed()
 
     def next_aging_s(self) -> float | None:
         """Return when the next ARC rises; None if none does."""
-        if not self._aging_s:
-            return None
         waiting = [arc for arc in self._state.arcs.values() if arc.state is RequestState.WAITING]
         return min((arc.since_s + (arc.raised + 1) * self._aging_s for arc in waiting), default=None)
 
     def _changed(self, moved: Callable[[Place], Place] = _stays) -> None:
-        self._renumber(moved)
-        for names in self._transitions.trace.nodes():
-            self._transitions.trace.introduce_nodes(self._tree.path(names), self._transitions.now_s)
+        self.renumber(moved)
+        for names in self._trace.nodes():
+            self._trace.introduce_nodes(self._tree.path(names))
         for rc in self._state.rcs.values():
             for holder in self._table.overloading(rc.name) if rc.sharable else ():
                 self._transitions.revoke(holder, "order", rc.name)
-        self._transitions.instruct(RenewLeases())
+        self._decision.instructions.append(RenewLeases())
 
-    def _renumber(self, moved: Callable[[Place], Place] = _stays) -> None:
+    def renumber(self, moved: Callable[[Place], Place] = _stays) -> None:
+        """Give all ARCs the present numbers of their nodes."""
         places = [(arc, moved(arc.place_in_tree)) for arc in self._state.arcs.values()]
         self._state.set_paths((arc, place, self._tree.path(place)) for arc, place in places)

@@ -5,7 +5,6 @@ An ARC that lost an RC is revoked; the rest of the schedule goes on.
 
 from __future__ import annotations
 
-from backbone.scheduling import trace
 from backbone.scheduling.entries import CONNECTED
 from backbone.scheduling.events import RcKnown
 from backbone.scheduling.master_schedule import MasterSchedule
@@ -17,6 +16,7 @@ class RcEvents:
 
     def __init__(self, transitions: Transitions, schedule: MasterSchedule) -> None:
         self._transitions = transitions
+        self._trace = transitions.trace
         self._state = schedule.state
         self._table = schedule.table
 
@@ -25,7 +25,7 @@ class RcEvents:
         if event.rc not in self._state.rcs:
             rc = self._state.add_rc(event)
             if rc.up:
-                self._transitions.trace.introduce_rc(rc, self._transitions.now_s)
+                self._trace.introduce_rc(rc)
             return
         if event.up:
             self.came_back(event.rc, event.last_epoch)
@@ -39,7 +39,7 @@ class RcEvents:
         if rc is None or not self._state.rc_down(rc, None if lost_by else fault):
             return
         cause = f"it is put aside: {fault} (rule 11)" if fault else "it does not answer"
-        self._transitions.trace.record(trace.rc_state(self._transitions.now_s, name, up=False), cause)
+        self._trace.record("rc_state", cause, id=name, state="down")
         for arc in [*self._state.arcs.values()]:
             if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
                 self._transitions.revoke(arc, "rc", name)
@@ -49,7 +49,7 @@ class RcEvents:
         rc = self._state.rcs.get(name)
         if rc is not None and not rc.up:
             self._state.remove_rc(rc)
-            self._transitions.trace.forget_rc(name)
+            self._trace.forget_rc(name)
 
     def came_back(self, name: str, last_epoch: int) -> None:
         """Count the RC as up: it answers, and has no holder."""
@@ -60,9 +60,9 @@ class RcEvents:
             self.went_down(name)  # it was away for a moment and forgot its holders
         if not self._state.rc_up(rc, last_epoch):
             return
-        if self._transitions.trace.has_introduced(name):
-            self._transitions.trace.record(trace.rc_state(self._transitions.now_s, name, up=True), "it answers")
-        self._transitions.trace.introduce_rc(rc, self._transitions.now_s)
+        if self._trace.has_introduced(name):
+            self._trace.record("rc_state", "it answers", id=name, state="up")
+        self._trace.introduce_rc(rc)
 
     def capacity_changed(self, name: str, capacity: float) -> None:
         """Set the RC's capacity; revoke the last holders in order until the rest fits."""
@@ -70,7 +70,7 @@ class RcEvents:
         if rc is None or rc.capacity == capacity or not 0 <= capacity <= 1:
             return
         self._state.set_capacity(rc, capacity)
-        if self._transitions.trace.has_introduced(name):
-            self._transitions.trace.record(trace.rc_capacity(self._transitions.now_s, name, capacity))
+        if self._trace.has_introduced(name):
+            self._trace.record("rc_cap", id=name, cap=capacity)
         for holder in self._table.overloading(name):
             self._transitions.revoke(holder, "capacity", name)

@@ -1,14 +1,8 @@
 """Schedule manager: carries the master schedule out, one context switch after the other.
 
 Events go in, instructions come out. The caller owns the clock and the bus: it reports events with their times, carries
-the instructions out, and reports their outcomes. A decision has three steps: *apply* the event to the state, *plan* the
-next turn, *switch* to it; the last two repeat until no ARC's time has come.
-
-Rules of this file (numbers as in docs and ``why``):
-
-* 4  Preempted RCs go to the ARC that preempted them: it has a reservation, and comes before its equals.
-* 5  A slice ends only if an entitled ARC can use the RCs.
-* 6  revoke → free → connect → grant. An ARC connects only when all its RCs are free.
+the instructions out, and reports their outcomes. A decision has three steps: *apply* the event, and what is due by now,
+to the state; *plan* the next turn; *switch* to it. The last two repeat until no ARC's time has come.
 
 Source: RAM 2002, "The RC Scheduler", last paragraph.
 """
@@ -19,7 +13,7 @@ from typing import assert_never
 
 from backbone.scheduling.alternatives import choose
 from backbone.scheduling.arc_events import ArcEvents
-from backbone.scheduling.entries import CONNECTED
+from backbone.scheduling.entries import CONNECTED, Decision
 from backbone.scheduling.events import (
     Adopted,
     CapacityChanged,
@@ -47,14 +41,15 @@ from backbone.scheduling.events import (
 from backbone.scheduling.invariants import broken
 from backbone.scheduling.master_schedule import EXACT_UP_TO, MasterSchedule
 from backbone.scheduling.own_planner import PlannerType
-from backbone.scheduling.planner import Turn, in_order_of_revocation
-from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
 from backbone.scheduling.requests import Lease, NotMovable, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.slice_ends import SliceEnds
 from backbone.scheduling.state import ScheduleState
+from backbone.scheduling.timers import Timers
+from backbone.scheduling.trace_writer import TraceWriter
 from backbone.scheduling.transitions import Transitions
 
 
@@ -65,7 +60,6 @@ class ScheduleManager:
         rules: Its rules.
         master_schedule: The plans and the state; only this manager changes them.
         tree: The behavior tree with its priorities.
-        wake_s: Mission time at which it asked to be woken; None: it did not.
     """
 
     def __init__(
@@ -102,11 +96,14 @@ class ScheduleManager:
             planner=planner,
         )
         self.tree = PriorityTree(mission, mission_priority)
-        self._transitions = Transitions(self.master_schedule, rules, tolerance_s=tolerance_s, goes_on=goes_on)
-        self._priorities = PriorityEvents(self._transitions, self.master_schedule, self.tree, rules)
-        self._arcs = ArcEvents(self._transitions, self.master_schedule, self.tree, self._priorities, rules)
-        self._rcs = RcEvents(self._transitions, self.master_schedule)
-        self.wake_s: float | None = None
+        decision, schedule, ends = Decision(), self.master_schedule, SliceEnds(self._state)
+        self._decision = decision
+        self._trace = TraceWriter(decision, goes_on=goes_on)
+        self._transitions = Transitions(decision, schedule, ends, self._trace, rules, tolerance_s=tolerance_s)
+        self._priorities = PriorityEvents(decision, self._transitions, schedule, self.tree, rules)
+        self._arcs = ArcEvents(decision, self._transitions, schedule, self.tree, self._priorities, rules)
+        self._rcs = RcEvents(self._transitions, schedule)
+        self._timers = Timers(decision, self._arcs, ends, self._priorities, rules)
 
     def begun_anew(self, rules: SchedulingRules, planner: PlannerType | None = None) -> ScheduleManager:
         """Return another one that begins as this one began, with these rules."""
@@ -124,7 +121,12 @@ class ScheduleManager:
     @property
     def decided_s(self) -> float:
         """Mission time of the last decision."""
-        return self._transitions.now_s
+        return self._decision.now_s
+
+    @property
+    def wake_s(self) -> float | None:
+        """Mission time at which it asked to be woken; None: it did not."""
+        return self._timers.wake_s
 
     # Events in, instructions out: apply, plan, switch.
 
@@ -136,19 +138,20 @@ class ScheduleManager:
         Returns:
             Instructions, to be carried out in this order.
         """
-        self._transitions.begin(now_s)
+        decision = self._decision
+        decision.now_s, decision.instructions, decision.ended = max(now_s, decision.now_s), [], []
         self._apply(event)
-        self._arcs.retry()
-        self._state.end_slices(self._transitions.now_s)
-        self._priorities.age()
-        self._arcs.ask_anew_where_late()
-        while turn := self.master_schedule.due(self._transitions.now_s):
-            self._switch(turn)
-            self._priorities.age()
-        self._transitions.renew_slices()
-        self._transitions.expect()
-        self._set_alarm(rang=isinstance(event, Woken))
-        return self._transitions.instructions
+        self._timers.ring()
+        while turn := self.master_schedule.due(decision.now_s):
+            if turn.in_the_way:
+                self._transitions.make_way(turn)
+            elif not (self._arcs.understating and self._arcs.ask_anew_beside(turn.arc)):
+                self._transitions.connect(turn.arc)
+            if self.rules.aging_s:
+                self._priorities.age()
+        self._transitions.finish()
+        self._timers.set(rang=isinstance(event, Woken))
+        return decision.instructions
 
     def _apply(self, event: Event) -> None:
         match event:
@@ -195,31 +198,6 @@ class ScheduleManager:
             case _:
                 assert_never(event)
 
-    def _switch(self, turn: Turn) -> None:
-        """Connect the ARC whose turn it is, or first revoke the holders of its RCs."""
-        if not turn.in_the_way:
-            if not self._arcs.ask_anew_beside(turn.arc):
-                self._transitions.connect(turn.arc)
-            return
-        for holder in in_order_of_revocation(turn):
-            overridden = higher(turn.arc.path, holder.path)
-            forced = overridden and not holder.served(self._transitions.now_s)
-            if forced or not self.master_schedule.planner_of(turn.arc).reserves:
-                self._state.reserve(turn.arc, forced=forced)
-            if overridden:
-                self._transitions.revoke(holder, "higher", turn.arc.name)
-            else:
-                self._transitions.end_slice(holder, turn.arc)
-
-    def _set_alarm(self, *, rang: bool) -> None:
-        """Instruct the caller to wake the manager when the next decision can be due without an event."""
-        slice_end_s = self._state.end_slices(self._transitions.now_s)
-        times_s = [self._arcs.next_retry_s(), slice_end_s, self._priorities.next_aging_s()]
-        wake_s = min((time_s for time_s in times_s if time_s is not None), default=None)
-        if rang or wake_s != self.wake_s:
-            self.wake_s = wake_s
-            self._transitions.wake_at(wake_s)
-
     # Views.
 
     def choose(self, request: SchedulingRequest) -> tuple[str, ...]:
@@ -263,7 +241,7 @@ class ScheduleManager:
 
     def opening_lines(self) -> list[Record]:
         """Return the records with which a trace begins."""
-        return [Record(self._transitions.meta())]
+        return [self._transitions.opening_line()]
 
     def check(self) -> None:
         """Make sure that the invariants of the schedule hold.
@@ -271,10 +249,10 @@ class ScheduleManager:
         Raises:
             AssertionError: An invariant is broken; with the story of the ARCs concerned.
         """
-        for invariant, whom in broken(self.master_schedule, self._transitions.now_s):
-            story = self._transitions.trace.story_of({arc.name for arc in whom})
-            raise AssertionError("\n".join([f"broken at {self._transitions.now_s}: {invariant}", *map(str, story)]))
+        for invariant, whom in broken(self.master_schedule, self._decision.now_s):
+            story = self._trace.story_of({arc.name for arc in whom})
+            raise AssertionError("\n".join([f"broken at {self._decision.now_s}: {invariant}", *map(str, story)]))
         for rc in self._state.rcs.values():
-            if self._transitions.trace.says_up(rc.name) not in (None, rc.up):
-                lines = map(str, self._transitions.trace.story_of({rc.name}))
+            if self._trace.says_up(rc.name) not in (None, rc.up):
+                lines = map(str, self._trace.story_of({rc.name}))
                 raise AssertionError("\n".join([f"{rc.name} is {'up' if rc.up else 'down'}, not by the trace", *lines]))

@@ -20,7 +20,7 @@ from backbone.scheduling import requests
 from backbone.scheduling.arc_events import ArcEvents
 from backbone.scheduling.compatibility import Compatibility
 from backbone.scheduling.damping import Damping
-from backbone.scheduling.entries import Afterwards, ArcEntry, RcEntry
+from backbone.scheduling.entries import Afterwards, ArcEntry, Decision, RcEntry
 from backbone.scheduling.events import Requested
 from backbone.scheduling.fairness import EqualTime, Turns
 from backbone.scheduling.groups import Group, Groups
@@ -33,20 +33,22 @@ from backbone.scheduling.rc_events import RcEvents
 from backbone.scheduling.response_time import Stream
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.slice_ends import SliceEnds
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.table import Table
+from backbone.scheduling.timers import Timers
 from backbone.scheduling.trace_writer import TraceWriter
 from backbone.scheduling.transitions import Transitions
 from backbone.scheduling.whole_group import WholeGroupPlanner
 
-FORM = 1
+FORM = 2
 """Grows when a snapshot of an earlier release cannot be read any more."""
 _OBJECTS: dict[str, type[Any]] = {
     kind.__name__: kind
     for kind in (
         *(ScheduleManager, ScheduleState, MasterSchedule, Table, WholeGroupPlanner, LargeGroupPlanner, Transitions),
         *(TraceWriter, PriorityTree, PriorityEvents, ArcEvents, RcEvents, Damping, PacketTimes, Compatibility),
-        *(Turns, EqualTime, Groups, Group, ArcEntry, RcEntry),
+        *(Timers, SliceEnds, Turns, EqualTime, Groups, Group, Decision, ArcEntry, RcEntry),
     )
 }
 _VALUES: dict[str, type[Any]] = {
@@ -61,7 +63,7 @@ _CACHES = {
     "WholeGroupPlanner": {"_plans"},
     "Compatibility": {"_usable", "_admitted", "_roomy"},
     "TraceWriter": {"_story"},
-    "Transitions": {"instructions", "_ended"},
+    "Decision": {"instructions", "ended"},
 }
 """Class → attributes that begin empty: what is computed again, and what only people read."""
 _CONTAINERS: dict[str, type[Any]] = {kind.__name__: kind for kind in (list, dict, set, deque)}

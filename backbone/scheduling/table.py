@@ -15,13 +15,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from operator import attrgetter
 
 from backbone.scheduling.entries import CONNECTED, INSTANT_S, SOON_S, ArcEntry
-from backbone.scheduling.fairness import Seniority
 from backbone.scheduling.planner import Turn
 from backbone.scheduling.priority import by_precedence, rank
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.state import ScheduleState
+
+_PATH = attrgetter("path")
 
 
 class Table:
@@ -52,7 +54,9 @@ class Table:
 
     def in_order(self, arcs: Sequence[ArcEntry]) -> list[ArcEntry]:
         """Return ARCs of one group in the order of rule 2; ARCs with a reservation sort first."""
-        ordered = by_precedence(arcs, lambda arc: arc.path, self._seniority)
+        fairness, now_s = self.state.fairness, self.state.now_s
+        seniority = {arc: fairness.seniority(arc, now_s) for arc in arcs}
+        ordered = by_precedence(arcs, _PATH, seniority.__getitem__)
         for reserved in [arc for arc in ordered if arc.reservation is not None]:
             # A higher ARC that cannot run at all does not keep an ARC from the RCs freed for it.
             if not any(self.usable(other) and other.goes_before(reserved) for other in arcs):
@@ -64,18 +68,16 @@ class Table:
         """Return the first of ARCs of one group, at least one, in the order of rule 2."""
         if any(arc.reservation is not None for arc in arcs):
             return self.in_order(arcs)[0]
-        by_age = sorted(arcs, key=self._seniority)
+        fairness, now_s = self.state.fairness, self.state.now_s
+        by_age = sorted(arcs, key=lambda arc: fairness.seniority(arc, now_s))
         return next(arc for arc in by_age if not any(other.goes_before(arc) for other in arcs))
 
     def must_let_higher_go_first(self, arc: ArcEntry) -> bool:
         """Return whether the policy ``strict`` holds the ARC back: a higher usable one of its group waits."""
         return self.strict and any(
             other.state is RequestState.WAITING and other.goes_before(arc) and self.usable(other)
-            for other in self.state.groups.of(arc).arcs
+            for other in self.state.groups.of[arc].arcs
         )
-
-    def _seniority(self, arc: ArcEntry) -> Seniority:
-        return self.state.fairness.seniority(arc, self.state.now_s)
 
     # Blockers (rule 4).
 
@@ -132,8 +134,8 @@ class Table:
         staying = [holder for holder in holders if holder not in movable] + [
             p for p in pending if p.touches & arc.touches
         ]
-        equals = [holder for holder in movable if not rank(holder.path, arc.path)]
-        latest = by_precedence(equals, lambda holder: holder.path, lambda holder: (-holder.granted_s, *_later(holder)))
+        equals = [holder for holder in movable if holder.level is arc.level or not rank(holder.path, arc.path)]
+        latest = by_precedence(equals, _PATH, lambda holder: (-holder.granted_s, -holder.stamp[0], -holder.stamp[1]))
         lower = self.in_order([holder for holder in movable if holder not in equals])
         return self._without(arc, staying, [*latest, *lower])
 
@@ -176,8 +178,3 @@ class Table:
             kept.remove(holder)
             asked.append(holder)
         return asked
-
-
-def _later(arc: ArcEntry) -> tuple[float, int]:
-    """Return a key by which the ARC with the younger stamp comes first."""
-    return -arc.stamp[0], -arc.stamp[1]

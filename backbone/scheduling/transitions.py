@@ -1,6 +1,17 @@
-"""Transitions: each step of an ARC's life with its line in the trace and its instruction to the loop.
+"""Transitions: each step of an ARC's life, with its line in the trace and its instruction to the loop.
 
-``ScheduleState`` has the new state; this file emits lines and instructions, in the order of the decisions.
+* ``queue``: IDLE → WAITING, with a new stamp
+* ``make_way``: a waiting ARC gets its RCs; their holders are revoked
+* ``connect``: WAITING → CONNECTING, with new epochs
+* ``grant``: CONNECTING → RUNNING; its slice counts from here; ``renew_slices``: it stays for one more
+* ``revoke``, ``lose``: CONNECTING, RUNNING → REVOKING
+* ``free``: REVOKING → WAITING or IDLE
+* ``rest``: WAITING → IDLE
+
+Rules of this file (numbers as in docs and ``why``): no decision on an ARC's turn.
+
+* 4  Preempted RCs go to the ARC that preempted them: it has a reservation, and comes before its equals.
+* 6  revoke → free → connect → grant. An ARC connects only when all its RCs are free.
 """
 
 from __future__ import annotations
@@ -9,13 +20,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from backbone.scheduling import trace
-from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry
-from backbone.scheduling.events import ConnectArc, Instruction, RenewLeases, RevokeArc, WakeAt
+from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry, Decision
+from backbone.scheduling.events import ConnectArc, Record, RenewLeases, RevokeArc
 from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.planner import Turn, in_order_of_revocation
 from backbone.scheduling.priority import higher, rank
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.slice_ends import SliceEnds
+from backbone.scheduling.trace import VERSION
 from backbone.scheduling.trace_writer import TraceWriter
 
 NOT_EXPECTED_S = -1.0
@@ -36,152 +49,228 @@ _CAUSES: Mapping[str, str] = {
 
 
 class Transitions:
-    """Changes the state and collects the instructions for the loop.
+    """Changes the states of ARCs, and adds lines and instructions to the decision.
 
     Attributes:
         trace: Writes the lines.
-        instructions: The decision's instructions so far, in order.
     """
 
-    def __init__(self, schedule: MasterSchedule, rules: SchedulingRules, *, tolerance_s: float, goes_on: bool) -> None:
+    def __init__(
+        self,
+        decision: Decision,
+        schedule: MasterSchedule,
+        ends: SliceEnds,
+        trace: TraceWriter,
+        rules: SchedulingRules,
+        *,
+        tolerance_s: float,
+    ) -> None:
         """Begin with nothing to carry out.
 
         Args:
+            decision: The present one.
             schedule: The plans and the state.
+            ends: The ends of slices.
+            trace: Writes the lines.
             rules: Rules of the decisions.
             tolerance_s: Reaction and timer tolerance of this run.
-            goes_on: True if the trace goes on after that of an earlier RC manager.
         """
-        self.state = schedule.state
-        self.now_s = 0.0
-        self.instructions: list[Instruction] = []
-        self._ended: list[tuple[ArcEntry, str]] = []
-        self.trace = TraceWriter(self.instruct, goes_on=goes_on)
+        self.trace = trace
+        self._decision = decision
         self._schedule = schedule
+        self._state = schedule.state
+        self._ends = ends
         self._rules = rules
         self._tolerance_s = tolerance_s
         self._relaxed = False
+        self._stamped = 0
 
-    def begin(self, now_s: float) -> None:
-        """Begin a decision; time never goes back."""
-        self.now_s = max(now_s, self.now_s)
-        self.instructions = []
-        self._ended = []
+    # It waits.
 
-    def instruct(self, instruction: Instruction) -> None:
-        """Add an instruction after all earlier ones."""
-        self.instructions.append(instruction)
+    def queue(self, arc: ArcEntry) -> None:
+        """Queue the ARC behind its equals; the trace has a line if its group is too large to be planned whole."""
+        arc.stamp = self._stamp()
+        arc.reservation = arc.retry_s = None
+        arc.has_forced = False
+        self._enter(arc, RequestState.WAITING)
+        if not self._relaxed and len(self._state.groups.of[arc].arcs) > self._schedule.planned_whole_up_to:
+            self._relaxed = True
+            self.trace.record("meta", "a group is too big to be planned whole", **self._meta())
 
-    def wake_at(self, time_s: float | None) -> None:
-        """Schedule the next decision for then if no event comes before."""
-        self.instruct(WakeAt(time_s))
+    def _stamp(self) -> tuple[float, int]:
+        self._stamped += 1
+        return self._decision.now_s, self._stamped
 
-    # The life of an ARC.
+    def _enter(self, arc: ArcEntry, state: RequestState) -> None:
+        self._state.enter(arc, state, self._decision.now_s)
+        if state is RequestState.WAITING:
+            for holder in [holder for rc in arc.uses for holder in self._state.rcs[rc].holders]:
+                if holder.state is RequestState.RUNNING:
+                    self._ends.wait_for(holder)
+
+    def rest(self, arc: ArcEntry) -> None:
+        """Idle a waiting ARC."""
+        arc.reservation = None
+        self._enter(arc, RequestState.IDLE)
+
+    # It gets its RCs.
+
+    def make_way(self, turn: Turn) -> None:
+        """Revoke the holders of the RCs of the ARC whose turn it is."""
+        for holder in in_order_of_revocation(turn):
+            served, overridden = holder.served(self._decision.now_s), turn.arc.goes_before(holder)
+            forced = overridden and not served
+            if forced or not self._schedule.planner_of(turn.arc).reserves:
+                self._reserve(turn.arc, forced=forced)
+            if overridden:
+                self.revoke(holder, "higher", turn.arc.name)
+            else:
+                self._decision.ended += [(holder, rc) for rc in holder.shares if rc in turn.arc.shares]
+                self.revoke(holder, "slice", turn.arc.name)
+
+    def _reserve(self, arc: ArcEntry, *, forced: bool) -> None:
+        """Place a waiting ARC before all equals until it is connected; note if others were preempted for it."""
+        arc.has_forced |= forced
+        if arc.reservation is None:
+            arc.reservation = self._stamp()[1]
+            self._state.concerns(arc.uses)
 
     def connect(self, arc: ArcEntry) -> None:
-        """Connect an ARC whose RCs are all free."""
-        self.state.connect(arc, self.now_s)
-        if any(len(self.state.rcs[rc].holders) > 1 for rc in arc.shares):  # the other holders' ranks may change
-            self.instruct(RenewLeases())
-        self.trace.record(
-            trace.connect(self.now_s, arc.name, arc.epochs), "it is next, and all its RCs are free (rule 3)"
+        """Connect an ARC whose RCs are all free, each under a new epoch: they begin to settle."""
+        now_s, rcs = self._decision.now_s, self._state.rcs
+        for rc in arc.uses:
+            rcs[rc].epoch += 1
+        arc.epochs = {rc: rcs[rc].epoch for rc in arc.uses}
+        arc.reservation = None
+        arc.began_s = now_s
+        self._enter(arc, RequestState.CONNECTING)
+        if any(len(rcs[rc].holders) > 1 for rc in arc.shares):  # the other holders' ranks may change
+            self._decision.instructions.append(RenewLeases())
+        cause = "it is next, and all its RCs are free (rule 3)"
+        self.trace.record("connect", cause, arc=arc.name, epoch=dict(arc.epochs))
+        self._decision.instructions.append(
+            ConnectArc(arc.name, dict(arc.epochs), arc.settle_s, now_s + arc.length_s, self.ranks(arc))
         )
-        until_s = self.now_s + arc.length_s
-        self.instruct(ConnectArc(arc.name, dict(arc.epochs), arc.settle_s, until_s, self.ranks(arc)))
 
     def ranks(self, arc: ArcEntry) -> dict[str, int]:
         """Return the ARC's place by user priority among the holders of each sharable RC it uses."""
-
-        def place(rc: str) -> int:
-            holders = self.state.rcs[rc].holders
-            return sum(other.state in CONNECTED and higher(other.path, arc.path) for other in holders)
-
-        return {rc: place(rc) for rc in arc.uses if self.state.rcs[rc].sharable}
+        return {
+            rc: sum(other.state in CONNECTED and higher(other.path, arc.path) for other in self._state.rcs[rc].holders)
+            for rc in arc.uses
+            if self._state.rcs[rc].sharable
+        }
 
     def grant(self, arc: ArcEntry) -> None:
         """Grant an ARC whose RCs have settled: its slice begins."""
-        newest = self.state.grant(arc, self.now_s, self._slice_end_s(arc))
-        self.trace.record(trace.grant(self.now_s, arc.name, newest), "its RCs have settled")
+        arc.granted_s = arc.slice_s = self._decision.now_s
+        arc.has_forced = False
+        arc.turns += 1
+        self._enter(arc, RequestState.RUNNING)
+        self._ends.end_at(arc, self._slice_end_s(arc))
+        # On a sharable RC an ARC of shorter settling time may overtake: the overtaken epoch is in the line of its
+        # connection only, so that a reader sees each RC's numbers grow.
+        newest = {rc: epoch for rc, epoch in arc.epochs.items() if epoch > self._state.rcs[rc].granted_epoch}
+        for rc, epoch in newest.items():
+            self._state.rcs[rc].granted_epoch = epoch
+        self.trace.record("grant", "its RCs have settled", arc=arc.name, epoch=newest)
         self._record_grid(arc)
 
     def adopt(self, arc: ArcEntry, epochs: Mapping[str, int], granted_s: float) -> None:
-        """Adopt the slice that an earlier RC manager began; the trace shows it at its true times."""
+        """Adopt the slice that an earlier RC manager began, for a waiting ARC; the trace shows it at its true times."""
         why = "it held its RCs when this RC manager started"
-        self.trace.record(trace.connect(self.now_s, arc.name, epochs), why)
-        self.trace.record(trace.grant(granted_s, arc.name, epochs), why)
-        self.state.adopt(arc, epochs, granted_s, self.now_s)
+        self.trace.record("connect", why, arc=arc.name, epoch=dict(epochs))
+        self.trace.record("grant", why, t=granted_s, arc=arc.name, epoch=dict(epochs))
+        arc.epochs = dict(epochs)
+        for rc, epoch in epochs.items():
+            entry = self._state.rcs[rc]
+            entry.epoch = max(entry.epoch, epoch)
+            entry.granted_epoch = max(entry.granted_epoch, epoch)
+        arc.turns = 1
+        arc.began_s, arc.granted_s, arc.slice_s = self._decision.now_s, granted_s, granted_s
+        self._enter(arc, RequestState.RUNNING)
+        self._ends.end_at(arc, granted_s + arc.minimum_s)
 
     def extend(self, arc: ArcEntry, until_s: float) -> None:
         """Extend the slice of a running ARC."""
-        self.state.end_at(arc, until_s)
-        self.trace.record(trace.extend(self.now_s, arc.name, until_s), "it asked to go on (rule 14)")
+        self._ends.end_at(arc, until_s)
+        self.trace.record("extend", "it asked to go on (rule 14)", arc=arc.name, until=until_s)
+
+    # It loses its RCs.
 
     def revoke(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
         """Revoke all RCs of a connected ARC."""
         deadline_s = self._rules.grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
         self.lose(arc, why, by, afterwards)
-        self.instruct(RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, NOT_EXPECTED_S))
+        revoked = RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, NOT_EXPECTED_S)
+        self._decision.instructions.append(revoked)
 
     def lose(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
-        """Count the ARC's RCs as being disconnected: that is under way already."""
-        self.trace.record(trace.revoke(self.now_s, arc.name, why, by), because(why, by))
-        self.state.revoke(arc, self.now_s, why, by, afterwards)
+        """Count the ARC's RCs as being disconnected; a served ARC has its next place behind its equals."""
+        cause = because(why, by)
+        if arc.served(self._decision.now_s):
+            arc.stamp = self._stamp()
+        arc.swapped_out, arc.swapped_out_by = why, by
+        arc.afterwards = afterwards
+        self._enter(arc, RequestState.REVOKING)
+        self.trace.record("revoke", cause, arc=arc.name, why=why, **({"by": by} if by else {}))
 
     def free(self, arc: ArcEntry, state: RequestState) -> None:
         """Queue or idle an ARC whose RCs are in their safe states."""
-        self.state.free(arc, self.now_s, state)
+        arc.epochs = {}
+        self._enter(arc, state)
 
-    def end_slice(self, arc: ArcEntry, by: ArcEntry) -> None:
-        """Revoke all RCs of a served ARC, for an equal."""
-        self._ended += [(arc, rc) for rc in arc.shares if rc in by.shares]
-        self.revoke(arc, "slice", by.name)
+    # The end of a decision.
 
-    def renew_slices(self) -> None:
+    def finish(self) -> None:
+        """Begin new slices of ARCs that stay connected, and predict the next grants of revoked ones."""
+        self._renew_slices()
+        self._expect()
+
+    def _renew_slices(self) -> None:
         """Begin a new slice of served equals that stay on a sharable RC where another slice was ended (rule 5)."""
-        for ended, rc in self._ended:
-            for arc in [*self.state.rcs[rc].holders]:
-                if rc in arc.shares and arc.served(self.now_s) and not rank(arc.path, ended.path):
-                    self.state.begin_slice(arc, self.now_s, self._slice_end_s(arc))
-                    cause = "it stays where an equal's slice ended (rule 5)"
-                    self.trace.record(trace.about("slice", self.now_s, arc.name), cause)
+        for ended, rc in self._decision.ended:
+            for arc in [*self._state.rcs[rc].holders]:
+                if rc in arc.shares and arc.served(self._decision.now_s) and not rank(arc.path, ended.path):
+                    arc.stamp = self._stamp()  # its next place is behind its equals
+                    arc.slice_s = self._decision.now_s
+                    arc.turns += 1
+                    self._ends.end_at(arc, self._slice_end_s(arc))
+                    self.trace.record("slice", "it stays where an equal's slice ended (rule 5)", arc=arc.name)
                     self._record_grid(arc)
 
+    def _expect(self) -> None:
+        """Add the predicted next grants of revoked ARCs to the instructions."""
+        for place, instruction in enumerate(self._decision.instructions):
+            if not isinstance(instruction, RevokeArc):
+                continue
+            arc = self._state.arcs.get(instruction.arc)
+            if arc is not None and arc.queued:
+                start_s = self._schedule.planner_of(arc).start_s(arc, self._decision.now_s)
+                if start_s < math.inf:
+                    self._decision.instructions[place] = replace(instruction, expected_s=start_s + arc.settle_s)
+
     def _slice_end_s(self, arc: ArcEntry) -> float:
-        return self._rules.slice_end_s(self.now_s, arc.minimum_s)
+        return self._rules.slice_end_s(self._decision.now_s, arc.minimum_s)
 
     def _record_grid(self, arc: ArcEntry) -> None:
         if self._rules.grid_s:
-            cause = "slices end on a common grid (rule 15)"
-            self.trace.record(trace.extend(self.now_s, arc.name, arc.end_s), cause)
+            self.trace.record("extend", "slices end on a common grid (rule 15)", arc=arc.name, until=arc.end_s)
 
-    def queue(self, arc: ArcEntry) -> None:
-        """Queue it behind its equals; the trace has a line if its group is too large to be planned whole."""
-        self.state.queue(arc, self.now_s)
-        if not self._relaxed and not self._schedule.planner_of(arc).is_exact:
-            self._relaxed = True
-            self.trace.record(self.meta(), "a group is too big to be planned whole")
+    # The rules in the trace.
 
-    def meta(self) -> trace.Line:
+    def opening_line(self) -> Record:
         """Return the line that begins a section of the trace."""
-        return trace.meta(
-            self.now_s,
-            policy=self._rules.policy,
-            discipline=self._rules.discipline,
-            grace_s=self._rules.grace_s,
-            tolerance_s=self._tolerance_s,
-            relaxed=self._relaxed,
-        )
+        return Record({"ev": "meta", "t": self._decision.now_s, **self._meta()})
 
-    def expect(self) -> None:
-        """Add the predicted next grants of revoked ARCs to the instructions."""
-        for place, instruction in enumerate(self.instructions):
-            if not isinstance(instruction, RevokeArc):
-                continue
-            arc = self.state.arcs.get(instruction.arc)
-            if arc is not None and arc.queued:
-                start_s = self._schedule.planner_of(arc).start_s(arc, self.now_s)
-                if start_s < math.inf:
-                    self.instructions[place] = replace(instruction, expected_s=start_s + arc.settle_s)
+    def _meta(self) -> dict[str, object]:
+        return {
+            "v": VERSION,
+            "mode": self._rules.policy,
+            "discipline": self._rules.discipline,
+            "wc": "relaxed" if self._relaxed else "plan",
+            "grace": self._rules.grace_s,
+            "tol": self._tolerance_s,
+        }
 
 
 def because(why: str, by: str) -> str:

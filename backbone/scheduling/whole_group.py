@@ -16,11 +16,11 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 from backbone.scheduling.entries import CONNECTED, ArcEntry
 from backbone.scheduling.groups import Group
-from backbone.scheduling.plan import Plan
+from backbone.scheduling.plan import GroupPlans, Plan
 from backbone.scheduling.planner import Slot, Turn, in_order_of_revocation
 from backbone.scheduling.priority import by_precedence
 from backbone.scheduling.requests import RequestState
@@ -44,7 +44,7 @@ class WholeGroupPlanner:
         self._slack_s = slack_s
         self._among_equals = table.state.fairness.discipline == "turns"
         self._near: dict[str, None] = {}
-        self._plans: dict[Group[ArcEntry], _Plans] = {}
+        self._plans: dict[Group[ArcEntry], GroupPlans] = {}
         self._planned = -1
 
     @property
@@ -60,11 +60,11 @@ class WholeGroupPlanner:
         """Return an ARC whose time is now, and the holders to revoke for it; None if no examined group has one."""
         while self._near:
             rc = next(iter(self._near))
-            users = self._state.users(rc)
+            users = self._state.users.get(rc, ())
             if not users:
                 del self._near[rc]
                 continue
-            group = self._state.groups.of(next(iter(users)))
+            group = self._state.groups.of[next(iter(users))]
             turn = self._due_in(group, now_s)
             if turn is not None:
                 return turn
@@ -82,7 +82,7 @@ class WholeGroupPlanner:
         if runs_on or any(self._table.is_overdue(arc, now_s) for arc in group):
             return None
         self._plans.clear()
-        turn = self._due_in(self._state.groups.of(group[0]), now_s)
+        turn = self._due_in(self._state.groups.of[group[0]], now_s)
         return turn.arc if turn is not None else None
 
     def _due_in(self, group: Group[ArcEntry], now_s: float) -> Turn | None:
@@ -95,56 +95,29 @@ class WholeGroupPlanner:
         last = max(place for place, arc in enumerate(plans.order) if arc in possible)
         queued = plans.order[: last + 1]  # later ARCs change nothing for these
         if self._among_equals:
-            return self._due_of(queued, possible, plans, now_s)
+            return plans.due(queued, possible)
         while queued:
-            by_time = _Plans(self._table, queued, group.arcs, now_s, slack_s=self._slack_s, among_equals=False)
-            turn = self._due_of(queued, possible, by_time, now_s)
+            by_time = GroupPlans(self._table, queued, group.arcs, now_s, slack_s=self._slack_s, among_equals=False)
+            turn = by_time.due(queued, possible)
             if turn is None:
                 break
             if self._in_turn(turn, group, now_s) and not self._table.runs_on(turn):
                 return turn
             queued.remove(turn.arc)
-        in_turns = _Plans(self._table, _in_turns(group), group.arcs, now_s, slack_s=self._slack_s)
-        turn = self._due_of(in_turns.order, possible, in_turns, now_s)
+        in_turns = GroupPlans(self._table, _in_turns(group), group.arcs, now_s, slack_s=self._slack_s)
+        turn = in_turns.due(in_turns.order, possible)
         only_lower = turn is not None and all(turn.arc.goes_before(holder) for holder in turn.in_the_way)
         return turn if only_lower else None  # no equal loses by it: it starts in a gap, or overrides
 
-    def _plans_of(self, group: Group[ArcEntry], now_s: float) -> _Plans:
+    def _plans_of(self, group: Group[ArcEntry], now_s: float) -> GroupPlans:
         if self._planned != self._state.version:
             self._plans.clear()
             self._planned = self._state.version
         plans = self._plans.get(group)
         if plans is None:
             order = self.order(group.arcs)
-            plans = self._plans[group] = _Plans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
+            plans = self._plans[group] = GroupPlans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
         return plans
-
-    def _due_of(
-        self, queued: Sequence[ArcEntry], possible: Collection[ArcEntry], plans: _Plans, now_s: float
-    ) -> Turn | None:
-        """Return the ARC whose time is now of these, given in order.
-
-        A slice is ended only for an ARC that fits without tolerance, for any end of the hand-overs under way: else
-        it might be ended for a gap that closes meanwhile.
-        """
-        now = plans.now
-        if not any(now.starts_now(arc) for arc in queued if arc in possible):
-            return None
-        before: list[ArcEntry] = []
-        for arc in queued:
-            if arc.state is not RequestState.WAITING or self._table.must_let_higher_go_first(arc):
-                continue
-            if arc in possible and (
-                now.starts_now(arc) or (plans.exact.starts_now(arc) and plans.certain.starts_now(arc))
-            ):
-                pending = [other for other in before if plans.certain.starts_now(other)]
-                in_the_way = self._table.in_the_way(arc, pending, plans.group, now_s)
-                if in_the_way and plans.certain.starts_now(arc):
-                    return Turn(arc, in_the_way)
-                if not in_the_way and now.starts_now(arc) and self._table.fits(arc, plans.holders()):
-                    return Turn(arc, [])
-            before.append(arc)
-        return None
 
     def _in_turn(self, turn: Turn, group: Group[ArcEntry], now_s: float) -> bool:
         """Return whether the turn would be right also if equals took turns.
@@ -202,7 +175,7 @@ class WholeGroupPlanner:
 
     def start_s(self, arc: ArcEntry, now_s: float) -> float:
         """Return when the RCs of a queued ARC will begin to settle, as of the present decision."""
-        return self._plans_of(self._state.groups.of(arc), now_s).now.start_s(arc)
+        return self._plans_of(self._state.groups.of[arc], now_s).now.start_s(arc)
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the queued ARCs of its group that come before a queued one, in order."""
@@ -231,43 +204,3 @@ def _in_turns(group: Group[ArcEntry]) -> list[ArcEntry]:
         return (-math.inf, arc.reservation or 0) if is_first else arc.stamp
 
     return by_precedence([arc for arc in group.arcs if arc.queued], lambda arc: arc.path, seniority)
-
-
-class _Plans:
-    """The plans of a decision about one group, each made when it is first needed."""
-
-    def __init__(
-        self,
-        table: Table,
-        order: list[ArcEntry],
-        group: Iterable[ArcEntry],
-        now_s: float,
-        *,
-        slack_s: float,
-        among_equals: bool = True,
-    ) -> None:
-        self.order = order
-        self.group = [*group]
-        self._make = functools.partial(Plan, table, order, self.group, now_s, among_equals=among_equals)
-        self._slack_s = slack_s
-
-    def holders(self) -> list[ArcEntry]:
-        """Return the ARCs of the group that hold their RCs."""
-        return [arc for arc in self.group if arc.holds]
-
-    @functools.cached_property
-    def now(self) -> Plan:
-        """The plan of the present state, with the tolerance of this run."""
-        return self._make(slack_s=self._slack_s)
-
-    @functools.cached_property
-    def exact(self) -> Plan:
-        """The plan in which no ARC overlaps another."""
-        return self._make(slack_s=0.0)
-
-    @functools.cached_property
-    def certain(self) -> Plan:
-        """The same, as if all RCs that are being freed were free already."""
-        if not any(arc.state is RequestState.REVOKING for arc in self.group):
-            return self.exact
-        return self._make(slack_s=0.0, handed_over=True)

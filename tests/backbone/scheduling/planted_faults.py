@@ -32,17 +32,17 @@ FAULTS = [
     ),
     Planted(
         "an aborted slice costs its place",
-        "state.py",
-        "        if arc.served(now_s):\n            arc.stamp = self._stamp(now_s)\n        arc.swapped_out",
-        "        arc.stamp = self._stamp(now_s)\n        arc.swapped_out",
+        "transitions.py",
+        "        if arc.served(self._decision.now_s):\n            arc.stamp = self._stamp()\n        arc.swapped_out",
+        "        arc.stamp = self._stamp()\n        arc.swapped_out",
     ),
     Planted(
         "a served ARC keeps its place",
-        "state.py",
-        "        if arc.served(now_s):\n            arc.stamp = self._stamp(now_s)\n        arc.swapped_out",
+        "transitions.py",
+        "        if arc.served(self._decision.now_s):\n            arc.stamp = self._stamp()\n        arc.swapped_out",
         "        arc.swapped_out",
     ),
-    Planted("an epoch is given twice", "state.py", "self.rcs[rc].epoch += 1", "self.rcs[rc].epoch += 0"),
+    Planted("an epoch is given twice", "transitions.py", "rcs[rc].epoch += 1", "rcs[rc].epoch += 0"),
     Planted(
         "an RC that comes back forgets epochs",
         "state.py",
@@ -51,20 +51,20 @@ FAULTS = [
     ),
     Planted(
         "a reservation lasts after the connection",
-        "state.py",
+        "transitions.py",
         "        arc.reservation = None\n        arc.began_s",
         "        arc.began_s",
     ),
     Planted(
         "a new slice keeps its old place",
-        "state.py",
-        "        arc.stamp = self._stamp(now_s)\n        arc.slice_s",
-        "        arc.slice_s",
+        "transitions.py",
+        "                    arc.stamp = self._stamp()  # its next place is behind its equals\n",
+        "",
     ),
     Planted(
         "leases are not renewed when ranks change",
         "transitions.py",
-        "            self.instruct(RenewLeases())",
+        "            self._decision.instructions.append(RenewLeases())",
         "            pass",
     ),
     Planted(
@@ -74,18 +74,21 @@ FAULTS = [
         "higher(arc.path, other.path) for",
     ),
     Planted("an overridden ARC has time to stop", "transitions.py", 'if why == "slice" and not', "if not"),
-    Planted(
-        "those that stay begin no new slice", "schedule_manager.py", "        self._transitions.renew_slices()\n", ""
-    ),
-    Planted("a revoked ARC hears no expected time", "schedule_manager.py", "        self._transitions.expect()\n", ""),
+    Planted("those that stay begin no new slice", "transitions.py", "        self._renew_slices()\n", ""),
+    Planted("a revoked ARC hears no expected time", "transitions.py", "        self._expect()\n", ""),
     Planted(
         "who is overridden goes before whose slice is over",
         "planner.py",
-        "key=lambda holder: higher(turn.arc.path, holder.path))",
-        "key=lambda holder: not higher(turn.arc.path, holder.path))",
+        "key=turn.arc.goes_before)",
+        "key=lambda holder: not turn.arc.goes_before(holder))",
     ),
-    Planted("nothing is reserved for an ARC that overrides", "schedule_manager.py", "if forced or not", "if not"),
-    Planted("an ARC that could not open is not asked again", "schedule_manager.py", "        self._arcs.retry()\n", ""),
+    Planted("nothing is reserved for an ARC that overrides", "transitions.py", "if forced or not", "if not"),
+    Planted(
+        "an ARC that could not open is not asked again",
+        "timers.py",
+        "            self._arcs.retry()\n",
+        "            pass\n",
+    ),
     Planted("slack eats a short slice", "plan.py", "min(self._slack_s, arc.minimum_s / 2)", "self._slack_s"),
     Planted(
         "slack eats a short slice in a large group",
@@ -94,13 +97,16 @@ FAULTS = [
         "self._slack_s",
     ),
     Planted(
-        "a lower ARC overlaps what a higher one reserved", "plan.py", "if rank(other.path, arc.path) > 0:", "if False:"
+        "a lower ARC overlaps what a higher one reserved",
+        "plan.py",
+        "if other.level is not arc.level and rank(other.path, arc.path) > 0:",
+        "if False:",
     ),
     Planted(
         "an ARC whose RC is down has a start",
         "plan.py",
-        "if self._table.usable(arc) else math.inf",
-        "if arc else math.inf",
+        "        if not table.usable(arc):\n            return math.inf\n",
+        "",
     ),
     Planted(
         "a higher holder stands only until now", "table.py", "return math.inf if before > 0 else now_s", "return now_s"
@@ -117,7 +123,7 @@ FAULTS = [
     Planted(
         "the ARC granted last goes first",
         "table.py",
-        "(-holder.granted_s, *_later(holder))",
+        "(-holder.granted_s, -holder.stamp[0], -holder.stamp[1])",
         "(holder.granted_s, *holder.stamp)",
     ),
     Planted(
@@ -208,21 +214,21 @@ FAULTS = [
     ),
     Planted(
         "a slice ends although it is awaited by none",
-        "state.py",
+        "slice_ends.py",
         "wanted = stands and self._is_waited_for(arc)",
         "wanted = stands",
     ),
     Planted(
         "an ARC is connected beside packets that take longer than declared",
         "schedule_manager.py",
-        "            if not self._arcs.ask_anew_beside(turn.arc):",
-        "            if True:",
+        "elif not (self._arcs.understating and self._arcs.ask_anew_beside(turn.arc)):",
+        "else:",
     ),
     Planted(
         "holders whose packets are late together all stay",
-        "schedule_manager.py",
-        "        self._arcs.ask_anew_where_late()\n",
-        "",
+        "timers.py",
+        "            self._arcs.ask_anew_where_late()\n",
+        "            pass\n",
     ),
     Planted(
         "more holders ask anew than must",
