@@ -6,7 +6,6 @@ It holds the memory of those values alone that it still refers to.
 from __future__ import annotations
 
 import asyncio
-import select
 import time
 from pathlib import Path
 
@@ -85,13 +84,12 @@ class BlackboardReader:
 
     def wait(self, within_s: float) -> Value | None:
         """Wait, in a thread, for the next value and take it; None: none came. Otherwise as ``newest``."""
-        waiting, end_s = select.poll(), time.monotonic() + within_s
-        waiting.register(self._own, select.POLLIN)
+        end_s = time.monotonic() + within_s
         while (value := self.newest()) is None:
             left_s = end_s - time.monotonic()
             if left_s <= 0:
                 return None
-            waiting.poll(left_s * 1000)
+            sealed_memory.wait_readable(self._own, left_s)
         return value
 
     async def next(self) -> Value:

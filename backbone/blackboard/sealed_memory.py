@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import array
 import contextlib
-import fcntl
-import mmap
 import os
 import socket
 import stat
@@ -23,6 +21,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from backbone.errors import Refusal
+
+try:
+    import fcntl
+    import mmap
+    import select
+except ImportError:  # another system
+    fcntl = mmap = select = None  # type: ignore[assignment]
 
 IS_POSSIBLE = hasattr(os, "memfd_create") and hasattr(fcntl, "F_ADD_SEALS") and Path("/proc/self/fd").is_dir()
 _SEALS = (fcntl.F_SEAL_SEAL | fcntl.F_SEAL_WRITE | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW) if IS_POSSIBLE else 0
@@ -147,6 +152,41 @@ def close_all(descriptors: Sequence[int]) -> None:
     """Close descriptors that came with a packet."""
     for descriptor in descriptors:
         os.close(descriptor)
+
+
+class Waits:
+    """A set of sockets, one of which becomes readable."""
+
+    def __init__(self) -> None:
+        self._events = select.epoll()
+
+    def fileno(self) -> int:
+        """Return a descriptor that is readable while one of them is."""
+        return self._events.fileno()
+
+    def add(self, one: socket.socket) -> None:
+        """Take one in."""
+        self._events.register(one, select.EPOLLIN)
+
+    def remove(self, descriptor: int) -> None:
+        """Leave one out; nothing happens if it is closed already."""
+        with contextlib.suppress(OSError):
+            self._events.unregister(descriptor)
+
+    def readable(self) -> list[int]:
+        """Return the descriptors of those that are readable. Never waits."""
+        return [descriptor for descriptor, _event in self._events.poll(0)]
+
+    def close(self) -> None:
+        """Wait for none any more. Idempotent."""
+        self._events.close()
+
+
+def wait_readable(one: socket.socket | Waits, within_s: float) -> bool:
+    """Wait, in a thread, until it is readable; return whether it is."""
+    waiting = select.poll()
+    waiting.register(one, select.POLLIN)
+    return bool(waiting.poll(within_s * 1000))
 
 
 # ---------------------------------------------------------------------- the folder

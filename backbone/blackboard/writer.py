@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import select
 import socket
 import threading
 from contextlib import suppress
@@ -118,8 +117,8 @@ class BlackboardWriter:
         except BaseException:
             os.close(held)
             raise
-        self._events = select.epoll()
-        self._events.register(self._listening, select.EPOLLIN)
+        self._events = sealed_memory.Waits()
+        self._events.add(self._listening)
         self._guard = threading.RLock()
         self._readers: dict[int, _Reader] = {}
         self._newest: _Sent | None = None
@@ -160,7 +159,7 @@ class BlackboardWriter:
     def serve(self) -> None:
         """Admit new readers, who get the newest value at once, and let go those that are gone. Never waits."""
         with self._guard:
-            for descriptor, _event in self._events.poll(0) if self._is_open else ():
+            for descriptor in self._events.readable() if self._is_open else ():
                 if descriptor == self._listening.fileno():
                     self._accept()
                 elif descriptor in self._readers:
@@ -178,10 +177,8 @@ class BlackboardWriter:
         self._is_served = True
 
         def run() -> None:
-            waiting = select.poll()
-            waiting.register(self._events, select.POLLIN)
             while self._is_open:
-                if waiting.poll(_LOOK_FOR_END_MS):
+                if sealed_memory.wait_readable(self._events, _LOOK_FOR_END_S):
                     self.serve()
 
         thread = threading.Thread(target=run, name="blackboard", daemon=True)
@@ -214,7 +211,7 @@ class BlackboardWriter:
                     connection.close()
                     continue
                 self._readers[connection.fileno()] = _Reader(connection)
-                self._events.register(connection, select.EPOLLIN)
+                self._events.add(connection)
                 self._hear(connection.fileno())
 
     def _hear(self, descriptor: int) -> None:
@@ -247,8 +244,7 @@ class BlackboardWriter:
             self._let_go(descriptor)
 
     def _let_go(self, descriptor: int) -> None:
-        with suppress(OSError):
-            self._events.unregister(descriptor)
+        self._events.remove(descriptor)
         self._readers.pop(descriptor).close()
 
     def _forget(self) -> None:
@@ -257,7 +253,7 @@ class BlackboardWriter:
             self._newest = None
 
 
-_LOOK_FOR_END_MS = 200  # chosen: a closed writer's thread ends within it
+_LOOK_FOR_END_S = 0.2  # chosen: a closed writer's thread ends within it
 
 
 def _as_sockets(descriptors: list[int]) -> tuple[socket.socket, socket.socket]:

@@ -49,9 +49,9 @@ class ModuleUnderTest:
     def __init__(self, module: Module) -> None:
         self.module, self.shown = watched(module), dict[str, object]()
         module.debug = Shown(self.shown)
-        self._history: list[tuple[dict[str, Any], Pickles]] = []
+        self._history: list[tuple[dict[str, object], Pickles]] = []
 
-    def update(self, **inputs: Any) -> Any:
+    def update(self, **inputs: object) -> Any:
         """Return the module's outputs for these inputs, which are named as its ``Inputs`` names them.
 
         Raises:

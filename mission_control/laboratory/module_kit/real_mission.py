@@ -35,6 +35,8 @@ MARK = "SCOUT_TEST_MARK"
 BIN = Path(sys.executable).parent
 DOWN_WITHIN_S = 30.0  # chosen: same
 GONE_WITHIN_S = 3.0  # chosen: a process that was killed is gone at once, on a busy machine a moment later
+JsonObject = dict[str, Any]
+
 LAST_LINES, LAST_OF_A_LOG = 60, 15  # chosen: as much as a person reads of a failure
 
 
@@ -72,11 +74,11 @@ class RealMission:
             check=False,
         )
 
-    def status(self) -> dict[str, Any]:
+    def status(self) -> JsonObject:
         """Return ``status --json``."""
         done = self.command("scout-backbone", "status", "--json", "--mission", self.name)
         _must_succeed(done)
-        found: dict[str, Any] = json.loads(done.stdout)
+        found: JsonObject = json.loads(done.stdout)
         return found
 
     def wait_for_components(self, *names: str, within_s: float = 10.0) -> None:
@@ -86,9 +88,9 @@ class RealMission:
             if time.monotonic() > ends_s:
                 raise AssertionError(f"not there within {within_s} s: {', '.join(sorted(missing))}")
 
-    def component(self, name: str) -> dict[str, Any]:
+    def component(self, name: str) -> JsonObject:
         """Return one component of the status."""
-        found: list[dict[str, Any]] = [c for c in self.status()["components"] if c["name"] == name]
+        found: list[JsonObject] = [c for c in self.status()["components"] if c["name"] == name]
         if not found:
             raise AssertionError(f"{name} is not there")
         return found[0]
