@@ -150,7 +150,7 @@ def _limits(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
         case inspect.DictType():
             yield "empty", {}
             yield from ((f"value {name}", {"plain": value}) for name, value in _limits(kind.value_type))
-            yield "longest", {f"a{number}": _honest(kind.value_type) for number in range(kind.max_length or 0)}
+            yield "longest", dict.fromkeys(map("a{}".format, range(kind.max_length or 0)), _honest(kind.value_type))
         case inspect.TupleType():
             yield from _each_item(kind, _limits)
         case inspect.UnionType():
@@ -212,7 +212,8 @@ def _beyond(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
         case inspect.DictType():
             yield from ((f"value {name}", {"plain": value}) for name, value in _beyond(kind.value_type))
             yield "a key of 1 MB", {"a" * A_MEGABYTE: _honest(kind.value_type)}
-            yield "too many", {f"a{n}": _honest(kind.value_type) for n in range((kind.max_length or MOST_ENTRIES) + 1)}
+            names = map("a{}".format, range((kind.max_length or MOST_ENTRIES) + 1))
+            yield "too many", dict.fromkeys(names, _honest(kind.value_type))
             yield from _named("no map", (5, math.nan, "plain", None))
         case inspect.TupleType():
             yield from _each_item(kind, _beyond)

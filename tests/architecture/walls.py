@@ -11,6 +11,7 @@ import graphlib
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +28,18 @@ def modules(top: Path, packages: list[str]) -> dict[str, Path]:
     return found
 
 
+@cache
+def nodes(file: Path) -> list[ast.AST]:
+    """Return all nodes of a file that no test changes."""
+    return [*ast.walk(ast.parse(file.read_bytes(), str(file)))]
+
+
 def imports(found: dict[str, Path], importers: Iterable[str]) -> set[Import]:
     """Return what these of the modules import, also inside functions and for types only."""
     edges = set()
     for name in importers:
         file = found[name]
-        for node in ast.walk(ast.parse(file.read_bytes(), str(file))):
+        for node in nodes(file):
             match node:
                 case ast.Import(names=names):
                     edges.update((name, alias.name) for alias in names)

@@ -10,6 +10,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from examples import share
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -36,7 +37,7 @@ from mission_control.laboratory.simulation.unreliable_network import UnreliableN
 
 CLASSES = message_classes()
 MOST_BYTES = 2**30
-SEEDS = range(20)
+SEEDS = range(share(20))
 ASKED_SEEDS, ASKED = range(4), 50
 
 Beside = Callable[[LocalNetwork], Coroutine[Any, Any, None]]

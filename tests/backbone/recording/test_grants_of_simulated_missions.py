@@ -18,9 +18,10 @@ from backbone.scheduling.events import Record
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.trace import Line
 
-ALL_SEEDS, QUICK_SEEDS = 20, 4
+ALL_SEEDS, THOROUGH_SEEDS, QUICK_SEEDS = 20, 4, 1
+LENGTH = {range(QUICK_SEEDS, THOROUGH_SEEDS): pytest.mark.thorough, range(THOROUGH_SEEDS, ALL_SEEDS): pytest.mark.slow}
 seeds = [
-    pytest.param(seed, chaos, is_supervised, marks=() if seed < QUICK_SEEDS else pytest.mark.slow)
+    pytest.param(seed, chaos, is_supervised, marks=[mark for these, mark in LENGTH.items() if seed in these])
     for seed in range(ALL_SEEDS)
     for chaos in (False, True)
     for is_supervised in (False, True)

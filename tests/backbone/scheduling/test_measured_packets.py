@@ -8,6 +8,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from examples import share
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -296,20 +297,20 @@ def _fits_alone(bench: Bench, happens: list[tuple[float, Event]], arc: str, rc: 
     return True
 
 
-@settings(max_examples=120, derandomize=True)
+@settings(max_examples=share(120))
 @given(seeds, st.sampled_from(RULES))
 def test_no_one_is_admitted_whom_the_measured_times_do_not_let_fit(seed, rules):
     """And the checker, which knows the lines of the trace alone, finds nothing."""
     assert violations(with_measurements(seed, **rules)) == []
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=share(40))
 @given(seeds)
 def test_no_one_is_admitted_so_in_a_group_too_big_to_be_planned_whole(seed):
     with_measurements(seed, exact_up_to=0)
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=share(40))
 @given(seeds)
 def test_the_judge_finds_no_packet_late_and_no_slice_cut(seed):
     lines = [*with_measurements(seed).trace, {"ev": "end", "t": END_S}]
@@ -317,7 +318,7 @@ def test_the_judge_finds_no_packet_late_and_no_slice_cut(seed):
     assert {one.code for one in found} <= {"FAIR", "GRACE"}, "those two differ without measurements, too"
 
 
-@settings(max_examples=60, derandomize=True)
+@settings(max_examples=share(60))
 @given(seeds, st.sampled_from(RULES))
 def test_shorter_packets_change_nothing(seed, rules):
     measuring = with_measurements(seed, factors=(0.01, 0.05, 0.1), **rules)

@@ -9,6 +9,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from examples import share
 from random_missions import play, random_mission
 from simulated_switches import Bench, ask, manager, unit
 from test_scheduling_laws import SAFETY, violations
@@ -53,14 +54,14 @@ def test_the_planner_of_the_guide_lets_the_shortest_slice_go_first() -> None:
 def test_the_planner_of_the_guide_breaks_nothing_but_the_order_of_equals() -> None:
     broken = {
         one.code
-        for seed in range(150)
+        for seed in range(share(150))
         for one in violations(play(*random_mission(Random(seed), planner=SHORTEST_FIRST)))
     }
     assert "DELAY" in broken
     assert not broken & (SAFETY - {"MINRUN", "DEMOTE"})
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(share(60)))
 def test_a_shipped_planner_named_by_its_path_does_what_it_does_unnamed(seed: int) -> None:
     named, unnamed = (play(*random_mission(Random(seed), planner=planner)) for planner in (SHIPPED, ""))
     assert named.trace == unnamed.trace

@@ -10,6 +10,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_missions import END_S, play, random_mission
@@ -37,25 +38,25 @@ def _only_a_hand_over_late(found: Violation) -> bool:
     return times is not None and float(times[1]) - float(times[2]) <= LONGEST_HAND_OVER_S
 
 
-@settings(max_examples=120, derandomize=True)
+@settings(max_examples=share(120))
 @given(seeds)
 def test_the_checker_finds_nothing(seed):
     assert violations(play(*random_mission(Random(seed)))) == []
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=share(40))
 @given(seeds)
 def test_the_checker_finds_nothing_when_processes_react_late(seed):
     assert violations(play(*random_mission(Random(seed), tolerance_s=0.05))) == []
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=share(40))
 @given(seeds)
 def test_the_checker_finds_nothing_under_the_strict_policy(seed):
     assert violations(play(*random_mission(Random(seed), policy="strict"))) == []
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=share(40))
 @given(seeds)
 def test_the_checker_finds_nothing_when_priorities_change(seed):
     rng = Random(seed)
@@ -66,19 +67,19 @@ def test_the_checker_finds_nothing_when_priorities_change(seed):
     assert violations(play(bench, happens)) == []
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=share(40))
 @given(seeds)
 def test_the_checker_finds_nothing_on_a_slice_grid(seed):
     assert violations(play(*random_mission(Random(seed), grid_s=2.0))) == []
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=share(40))
 @given(seeds)
 def test_the_checker_finds_nothing_when_who_waits_long_rises(seed):
     assert violations(play(*random_mission(Random(seed), aging_s=7.0))) == []
 
 
-@settings(max_examples=120, derandomize=True)
+@settings(max_examples=share(120))
 @given(seeds)
 def test_the_checker_finds_nothing_under_equal_time(seed):
     assert violations(play(*random_mission(Random(seed), discipline="time"))) == []
@@ -93,7 +94,7 @@ def test_equal_time_ends_a_slice_and_starts_in_a_gap_only_where_turns_would(seed
 RIVALS = st.lists(st.tuples(st.sampled_from([1.0, 2.0, 2.5, 5.0]), st.integers(0, 12)), min_size=2, max_size=6)
 
 
-@settings(max_examples=60, derandomize=True)
+@settings(max_examples=share(60))
 @given(RIVALS, st.sampled_from([0.0, 0.3]))
 def test_rivals_for_one_rc_get_equal_time_under_the_discipline_time(rivals, settle_s):
     bench = Bench(manager(discipline="time", grace_s=0.2), unit("v", connect_s=settle_s))
@@ -108,7 +109,7 @@ def test_rivals_for_one_rc_get_equal_time_under_the_discipline_time(rivals, sett
 SAFETY = {"FORM", "EXCL", "CAP", "RTA", "DOWN", "MINRUN", "PRIO", "DEMOTE", "GRACE", "SETTLE", "EPOCH"}
 
 
-@settings(max_examples=80, derandomize=True)
+@settings(max_examples=share(80))
 @given(seeds)
 def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardware_safe(seed):
     """The plan may leave a gap or let a younger equal go first; no slice is cut short, no ARC waits for a lower one."""
@@ -128,7 +129,7 @@ def test_in_a_big_group_no_arc_waits_for_rcs_that_are_free_or_served(seed):
     assert violations(play(*random_mission(Random(seed), exact_up_to=0))) == []
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(share(6)))
 def test_in_a_big_group_on_crowded_radios_nobody_is_started_to_be_cut_again_and_again(seed):
     rng = Random(seed)
     rcs = [unit(f"u{n}", 0.1, 0.05) if n % 4 else sharable(f"u{n}", 1.0, 0.1, 0.05) for n in range(12)]
@@ -165,7 +166,7 @@ def cut_most_at_one_instant(bench: Bench) -> int:
     return max(cuts.values(), default=0)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(share(10)))
 def test_in_a_big_group_two_lower_ones_do_not_take_turns_in_being_cut_for_a_higher_one(seed):
     """Found by a bench: what was freed of the one by force went to the other, so the higher one never had both."""
     bench = tree_crowd(seed)
@@ -208,7 +209,7 @@ def test_the_checker_finds_nothing_in_a_hundred_thousand_missions():
     assert [one for _, found in results for one in found] == []
 
 
-@settings(max_examples=30, derandomize=True)
+@settings(max_examples=share(30))
 @given(seeds, seeds)
 def test_one_group_changes_no_time_in_another(seed_a, seed_b):
     """Two missions on one RC manager run as each would alone."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_missions import END_S, play, random_mission
@@ -100,7 +101,7 @@ def test_of_more_than_64_rcs():
     assert read(written(bench.manager)).leases() == bench.manager.leases() != []
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=share(300))
 @given(data=st.data())
 def test_changed_bytes_are_refused_or_read(data: st.DataObject):
     bench, happens = random_mission(Random(5))

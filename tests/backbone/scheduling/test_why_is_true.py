@@ -10,6 +10,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from examples import share
 from random_missions import play, random_mission
 from simulated_switches import Bench
 
@@ -89,7 +90,7 @@ def untrue(count: int, rules: dict[str, Any]) -> list[tuple[int, Why]]:
 
 @pytest.mark.parametrize("rules", RULES, ids=str)
 def test_without_those_that_why_names_a_waiting_arc_is_granted_after_one_hand_over(rules: dict[str, Any]) -> None:
-    assert untrue(60, rules) == []
+    assert untrue(share(60), rules) == []
 
 
 def test_beside_others_a_slice_that_is_over_but_for_rounding_is_over() -> None:
@@ -164,7 +165,7 @@ def predictions(
 @pytest.mark.parametrize("rules", [*RULES, {"aging_s": 7.0}, {"admission": "sum"}], ids=str)
 def test_what_why_predicts_comes_within_a_switch_and_never_is_never(rules: dict[str, Any]) -> None:
     """It is played forward on a copy of the schedule: the order among equals may change with time."""
-    found = predictions(60, rules, of_why)
+    found = predictions(share(60), rules, of_why)
     assert {*found} <= {"within a switch", "not foretold, never"}, found
 
 
@@ -194,7 +195,7 @@ LEAST_SHARE: list[tuple[dict[str, Any], float]] = [
 
 @pytest.mark.parametrize(("rules", "least"), LEAST_SHARE, ids=str)
 def test_a_waiting_arc_is_granted_within_a_switch_of_its_predicted_start(rules: dict[str, Any], least: float) -> None:
-    found = predictions(200, rules)
+    found = predictions(share(200), rules)
     print(rules, dict(found), f"{share_within(found):.1%}")
     assert share_within(found) >= least
 
@@ -209,5 +210,5 @@ def test_a_thousand_predictions_hold_within_a_switch(rules: dict[str, Any], leas
 
 
 def test_who_is_not_given_a_start_is_hardly_ever_granted() -> None:
-    found = predictions(300, {})
+    found = predictions(share(300), {})
     assert found["not foretold, granted"] <= 0.03 * found["not foretold, never"]

@@ -33,7 +33,7 @@ LOW = {"source": "scout1", "message": "Readings", "field": "values.battery_share
 BATTERY = EXAMPLES / "battery.xml"
 HOME_M = (1.0, 1.0)
 WAY_HOME_S = 45.0  # 5 m from the farthest way point at 0.2 m/s, two turns, and starting a patrol
-SEEDS = 20
+SEEDS, QUICK_SEEDS = 20, 2
 
 
 class Scene:
@@ -241,7 +241,9 @@ async def _outing(running: RunningMission) -> BehaviorState:
     return await running.bus.ask("mission_control/outing", AskBehavior(), BehaviorState, within_s=1.0)
 
 
-@pytest.mark.parametrize("seed", range(share(SEEDS)))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=[pytest.mark.thorough] * (seed >= QUICK_SEEDS)) for seed in range(share(SEEDS))]
+)
 def test_a_low_battery_brings_the_robot_home_before_it_is_empty(tmp_path: Path, seed: int) -> None:
     async def main() -> None:
         async with at_work(_battery_mission(tmp_path, seed)) as running:

@@ -82,8 +82,20 @@ def test_there_is_something_to_decide(recording: Recording):
     ("name", "patched", "parameters"),
     [
         pytest.param(PATROL, {}, {"reached_within_m": 0.1}, id="a threshold of a patrol"),
-        pytest.param(PATROL, {"mission_control.behaviors.motion.TURN_PER_S": 2.51}, {}, id="a gain of a patrol"),
-        pytest.param(SERVO, {"mission_control.vision.servo_law.STRAIGHT_RAD": 0.2}, {}, id="a threshold of servoing"),
+        pytest.param(
+            PATROL,
+            {"mission_control.behaviors.motion.TURN_PER_S": 2.51},
+            {},
+            id="a gain of a patrol",
+            marks=pytest.mark.thorough,
+        ),
+        pytest.param(
+            SERVO,
+            {"mission_control.vision.servo_law.STRAIGHT_RAD": 0.2},
+            {},
+            id="a threshold of servoing",
+            marks=pytest.mark.thorough,
+        ),
         pytest.param(SERVO, {"mission_control.vision.servo_law.BEARING_GAIN_HZ": 2.51}, {}, id="a gain of servoing"),
     ],
 )

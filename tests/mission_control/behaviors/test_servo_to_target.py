@@ -145,6 +145,7 @@ def test_parameters_that_mean_nothing_are_refused_with_the_remedy(given: dict[st
         msgspec.convert(given, ServoParameters)
 
 
+@pytest.mark.thorough
 def test_what_it_sees_of_the_landmark_tells_localizers_where_the_robot_is() -> None:
     async def scene() -> None:
         async with at_work(example(NAME)) as running:

@@ -38,6 +38,7 @@ def patrols(rounds: int) -> None:
     run_virtual(main())
 
 
+@pytest.mark.thorough
 def test_one_behavior_patrols_with_a_walker_and_with_a_scout_on_one_radio() -> None:
     patrols(1)
 

@@ -72,18 +72,11 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 # ---------------------------------------------------------------------- what was seen to end a console
+@pytest.mark.usefixtures("quiet")
 @pytest.mark.parametrize("name", [name for name in CONSOLE_SCREENS if name not in NO_DIALOGS])
-@pytest.mark.parametrize("key", ["enter", "escape", "space", "q", "l"])
-async def test_a_dialog_is_answered_once_however_fast_its_key_comes_twice(name: str, key: str) -> None:
-    app = console()
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(*CONSOLE_SCREENS[name])
-        await settle(pilot)
-        burst(pilot, key, key)
-        await pilot.pause()
-        assert key == "q" or app.is_running
-        if app.is_running:
-            await settle(pilot)
+async def test_a_dialog_is_answered_once_however_fast_its_key_comes_twice(name: str) -> None:
+    keys = ["enter", "escape", "space", "l", "q"]
+    await press_all_twice(console(), (80, 24), CONSOLE_SCREENS[name], keys, to_main, state_of, is_dialog=True)
 
 
 @pytest.mark.parametrize("key", ["y", "i"])

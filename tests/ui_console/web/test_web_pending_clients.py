@@ -8,10 +8,13 @@ import socket
 import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import ExitStack, asynccontextmanager
+from functools import cache
+from itertools import product
 
 import pytest
 import trustme
 import uvloop
+from examples import some
 from hypothesis import given
 from hypothesis import strategies as st
 from websockets.asyncio.client import connect
@@ -119,14 +122,19 @@ async def served(encryption: ssl.SSLContext | None, client: ssl.SSLContext | Non
         yield Served(application, port_of(server), client)
 
 
+@cache
+def papers() -> tuple[ssl.SSLContext, ssl.SSLContext]:
+    """Return the contexts of a server and of its clients."""
+    authority = trustme.CA()
+    server, client = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH), ssl.create_default_context()
+    authority.issue_cert("127.0.0.1").configure_cert(server)
+    authority.configure_trust(client)
+    return server, client
+
+
 def at_server(visit: Callable[[Served], Awaitable[None]], *, encrypted: bool, loop: str) -> None:
     """Run this visit at a server, in the loop of tests or of real servers."""
-    server = client = None
-    if encrypted:
-        authority = trustme.CA()
-        server, client = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH), ssl.create_default_context()
-        authority.issue_cert("127.0.0.1").configure_cert(server)
-        authority.configure_trust(client)
+    server, client = papers() if encrypted else (None, None)
 
     async def main() -> None:
         async with served(server, client) as here:
@@ -136,10 +144,9 @@ def at_server(visit: Callable[[Served], Awaitable[None]], *, encrypted: bool, lo
         runner.run(main())
 
 
-@pytest.mark.parametrize("loop", ["asyncio", "uvloop"])
-@pytest.mark.parametrize("encrypted", [False, True])
-@pytest.mark.parametrize("many", [16, 200])
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    ("way", "many", "encrypted", "loop"), some(product(WAYS, [16, 200], [False, True], ["asyncio", "uvloop"]))
+)
 def test_an_operator_gets_in_whatever_strangers_do(way: str, many: int, encrypted: bool, loop: str) -> None:
     async def visit(here: Served) -> None:
         with ExitStack() as stack:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from examples import share, some
 from trace_checker import check
 
 from mission_control.laboratory.experiments.conditions import ALWAYS, EVERYTHING, PAPERS, PUBLISHED, QUARTER, Condition
@@ -41,7 +42,7 @@ def test_other_processes_come_to_the_same() -> None:
 
 
 def test_two_channels_without_noise_miss_nothing() -> None:
-    trials = [sound(run_trial(Condition(channels=2, noise=0.0), 1, number)) for number in range(6)]
+    trials = [sound(run_trial(Condition(channels=2, noise=0.0), 1, number)) for number in range(share(6))]
     assert all(trial.detected for trial in trials)
 
 
@@ -52,13 +53,15 @@ def test_a_person_is_seen_on_the_way_there_or_back() -> None:
 
 @pytest.mark.parametrize(
     "condition",
-    [
-        Condition(extra=2),
-        Condition(extra=2, policy="adaptive"),
-        Condition(extra=3, policy="adaptive", driven=0.25),
-        Condition(extra=2, channels=2),
-        Condition(extra=1, order="interleaved"),
-    ],
+    some(
+        [
+            Condition(extra=2),
+            Condition(extra=2, policy="adaptive"),
+            Condition(extra=3, policy="adaptive", driven=0.25),
+            Condition(extra=2, channels=2),
+            Condition(extra=1, order="interleaved"),
+        ]
+    ),
     ids=lambda condition: f"{condition.title()}, {condition.policy}",
 )
 def test_the_checker_finds_nothing_wrong_with_a_trial_s_decisions(condition: Condition, tmp_path: Path) -> None:
@@ -68,6 +71,7 @@ def test_the_checker_finds_nothing_wrong_with_a_trial_s_decisions(condition: Con
     assert check(lines) == []
 
 
+@pytest.mark.thorough
 def test_consoles_that_nobody_drives_leave_the_air_to_others(tmp_path: Path) -> None:
     def turns(driven: float) -> int:
         file = tmp_path / f"{driven}.jsonl"
@@ -92,6 +96,7 @@ def test_watchers_of_the_adaptive_policy_ask_for_what_they_worked_out(tmp_path: 
     assert lines[0]["discipline"] == "time"
 
 
+@pytest.mark.thorough
 def test_a_small_table_is_what_its_trials_say() -> None:
     conditions = [Condition(extra=0, noise=0.0), Condition(extra=3, noise=0.0)]
     told: list[tuple[int, int]] = []

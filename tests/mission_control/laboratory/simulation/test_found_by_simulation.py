@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import pytest
+from examples import some
 
 from mission_control.laboratory.simulation.faults import Fault, KillFault, MessageFault
 from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
@@ -93,7 +94,7 @@ def run_found(what: str) -> MissionRun:
     return run_mission(seed, chaos=True, faults=faults)
 
 
-@pytest.mark.parametrize("what", FOUND)
+@pytest.mark.parametrize("what", some(FOUND))
 def test_what_was_found_does_not_come_back(what: str) -> None:
     run = run_found(what)
     assert run.broken is None, f"{what}: {run.broken}"
@@ -101,7 +102,8 @@ def test_what_was_found_does_not_come_back(what: str) -> None:
 
 def test_these_missions_still_suffer_what_they_were_found_with() -> None:
     """A message has its name from how many went before it; once most names have changed, the cases prove nothing."""
-    whole = [set(run_found(what).faults) == set(faults) for what, (_, faults) in FOUND.items()]
+    found = {what: FOUND[what][1] for what in some(FOUND)}
+    whole = [set(run_found(what).faults) == set(faults) for what, faults in found.items()]
     assert sum(whole) > len(whole) / 2
 
 
@@ -129,7 +131,7 @@ SUPERVISED: dict[str, tuple[int, list[SupervisionFault]]] = {
 }
 
 
-@pytest.mark.parametrize("what", SUPERVISED)
+@pytest.mark.parametrize("what", some(SUPERVISED))
 def test_what_was_found_in_supervised_missions_does_not_come_back(what: str) -> None:
     seed, faults = SUPERVISED[what]
     run = run_supervised(seed, chaos=True, faults=faults)

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from examples import share
+from examples import share, some
 
 from backbone.errors import Refusal
 from backbone.wire import Envelope, Reader, write
@@ -48,7 +48,7 @@ def test_supervised_missions_are_whole_again_after_whatever_goes_wrong(seed: int
     run_lawfully(seed)
 
 
-@pytest.mark.parametrize("name", CORE)
+@pytest.mark.parametrize("name", some(CORE))
 def test_a_core_service_that_hangs_is_replaced_and_one_that_ends_politely_comes_back(name: str) -> None:
     """Two faults of one mission; the second strikes when the first has long been mended."""
     run = run_lawfully(0, Pause(AT_S, name, 5.0), End(20.0, name, "politely", 0.02))
