@@ -6,12 +6,14 @@ import asyncio
 import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from backbone.bus import host_copies
 from backbone.bus.host_copies import MOST_WAITING_BYTES, HostCopies
+from backbone.bus.inbox import GATHER_S
 from backbone.keys import Conversation
 from backbone.recording.host_ear import HostEar
 
@@ -126,3 +128,18 @@ async def test_nonsense_on_the_socket_ends_that_connection_alone(folder: Path) -
         copies.send(KEY, b"sense")
         await until(lambda: bool(heard), "sense came")
         copies.close()
+
+
+async def test_a_recorder_is_woken_for_many_copies_together(folder: Path) -> None:
+    loop, heard_s = asyncio.get_running_loop(), list[float]()
+    ear = HostEar(folder, pictures_only=False)
+    await ear.open(lambda _key, _raw: heard_s.append(loop.time()), fail)
+    copies, began_s, count = HostCopies(folder), loop.time(), 100
+    for _ in range(count):
+        copies.send(KEY, b"small")
+        await asyncio.sleep(0.003)
+    await until(lambda: len(heard_s) == count, "all came")
+    wakings = 1 + sum(after - before > 0.0015 for before, after in pairwise(heard_s))
+    assert wakings <= 2 + (loop.time() - began_s) / GATHER_S
+    copies.close()
+    await ear.close()
