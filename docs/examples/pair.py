@@ -37,8 +37,7 @@ class Smoothing(Module):
     state: State
 
     def update(self, inputs: Inputs) -> Outputs:
-        before_m, now_m = self.state.height_m, inputs.wave.height_m
-        self.state.height_m += self.parameters.weight * (now_m - before_m)
+        self.state.height_m += self.parameters.weight * (inputs.wave.height_m - self.state.height_m)
         return self.Outputs(Height(self.state.height_m))
 
 
