@@ -40,7 +40,6 @@ class Conversation(StrEnum):
     LEASES = "leases"  # the RC manager's renewals of holds
     BEAT = "beat"  # heartbeats of ARCs: their event loop and their owner's run
     HEALTH = "health"  # the launcher's verdict on the whole mission
-    CLOCK = "clock"
     LOG = "log"
 
 
@@ -55,6 +54,8 @@ NEVER_DROPPED = frozenset(
     }
 )
 """Conversations whose messages are sent once and must arrive: a subscriber that takes none of them blocks senders."""
+LARGE = frozenset({Conversation.FRAMES, Conversation.OUTPUTS, Conversation.VIEWS})
+"""Conversations of large values: listeners on the sender's host read them on its blackboard."""
 
 
 @lru_cache(maxsize=4096)
@@ -87,6 +88,31 @@ def key_of_all(mission: str, conversation: Conversation) -> str:
     if _SEGMENT.fullmatch(mission) is None:
         raise IllegalName(f"{mission!r} cannot be part of a key", name=mission)
     return f"{ROOT}/{mission}/**/{conversation}"
+
+
+def key_of_senders(of: str) -> str:
+    """Return the key expression of the tokens of all senders of one key."""
+    return f"{of}/by/**"
+
+
+def key_of_sender(of: str, source: str) -> str:
+    """Return the key of the token of one sender.
+
+    Example:
+        >>> key_of_sender("scout/iros2001/resource_pool/watch/frames", "resource_pool/framegrabber1")
+        'scout/iros2001/resource_pool/watch/frames/by/resource_pool/framegrabber1'
+    """
+    return f"{of}/by/{source}"
+
+
+def sender_of(of: str, token: str) -> str:
+    """Return the sender of a key whose token it is.
+
+    Example:
+        >>> sender_of("scout/iros2001/backbone/by/frames", "scout/iros2001/backbone/by/frames/by/backbone/by")
+        'backbone/by'
+    """
+    return token.removeprefix(f"{of}/by/")
 
 
 def address_of(key_expression: str) -> str:

@@ -65,6 +65,9 @@ Quoted = Annotated[bytes, Meta(max_length=MOST_QUOTED_BYTES)]
 """A message inside another, as bytes."""
 MOST_PIXEL_BYTES = 8_000_000  # chosen: a frame of 1080p in color is 6.2 MB
 Pixels = Annotated[memoryview, Meta(max_length=MOST_PIXEL_BYTES)]
+MOST_BULK_BYTES = 60_000_000  # chosen: fits a message of the longest kind, see ``wire.MAX_LARGE_MESSAGE_BYTES``
+Bulk = Annotated[memoryview, Meta(max_length=MOST_BULK_BYTES)]
+"""Large data of a module's output, such as a map; over 8 MB it reaches listeners of the same host only."""
 
 # ---------------------------------------------------------------------- counts and ids
 EXACT = 2**53  # up to here integers are exact in a double, a JSON trace and JavaScript

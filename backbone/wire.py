@@ -30,6 +30,9 @@ from backbone.ranges import LONGEST_TEXT, MOST_FEW, Count, Facts, Instant, Menti
 
 WIRE_VERSION = 1
 MAX_MESSAGE_BYTES = 8 * 1024 * 1024  # chosen: a 1080p colour frame (6.2 MB) fits, a runaway list does not
+MAX_LARGE_MESSAGE_BYTES = (
+    64 * 1024 * 1024
+)  # chosen: a 4K picture in color is 25 MB; of ``LARGE`` conversations on a host
 
 
 class Message(
@@ -100,10 +103,13 @@ class MalformedMessage(Refusal):
 
 
 class OversizedMessage(Refusal):
-    """The message is longer than ``MAX_MESSAGE_BYTES``."""
+    """The message is longer than its conversation admits."""
 
     code = "wire.oversized"
-    remedy = f"Keep messages under {MAX_MESSAGE_BYTES} bytes; send large data as frames."
+    remedy = (
+        f"Keep messages under {MAX_MESSAGE_BYTES} bytes; outputs, frames and views under {MAX_LARGE_MESSAGE_BYTES},"
+        " which reach listeners of the same host only."
+    )
 
 
 class UnwritableMessage(Refusal):
@@ -138,18 +144,18 @@ _encoder = msgspec.msgpack.Encoder()
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # all that msgspec raises on bad bytes
 
 
-def write(envelope: Envelope[Message]) -> bytes:
+def write(envelope: Envelope[Message], most_bytes: int = MAX_MESSAGE_BYTES) -> bytes:
     """Return the envelope as bytes.
 
     Raises:
-        OversizedMessage: The message is longer than ``MAX_MESSAGE_BYTES``.
+        OversizedMessage: The message is longer than ``most_bytes``.
         UnwritableMessage: A whole number in it has more than 64 bits.
     """
     try:
         raw = _encoder.encode(envelope)
     except OverflowError as error:
         raise UnwritableMessage(f"{type(envelope.body).__name__} has a whole number of more than 64 bits") from error
-    if len(raw) > MAX_MESSAGE_BYTES:
+    if len(raw) > most_bytes:
         raise OversizedMessage(f"{type(envelope.body).__name__} of {len(raw)} bytes", bytes=len(raw))
     return raw
 
@@ -164,13 +170,13 @@ def kinds_of(accepts: Accepts) -> tuple[type[Message], ...]:
     return typing.get_args(accepts) or (accepts,)
 
 
-def refuse_oversized(length: int) -> None:
+def refuse_oversized(length: int, most_bytes: int = MAX_MESSAGE_BYTES) -> None:
     """Return if a message of this length may be read; called before its bytes are copied out of the bus.
 
     Raises:
-        OversizedMessage: The message is longer than ``MAX_MESSAGE_BYTES``.
+        OversizedMessage: The message is longer than ``most_bytes``.
     """
-    if length > MAX_MESSAGE_BYTES:
+    if length > most_bytes:
         raise OversizedMessage(f"message of {length} bytes", bytes=length)
 
 
@@ -214,16 +220,16 @@ class Reader(Generic[Body]):
             kind for kind in kinds_of(accepts) if holds_values_of_any_kind(cast("Hashable", kind))
         )
 
-    def read(self, raw: bytes) -> Envelope[Body]:
-        """Return the envelope these bytes hold.
+    def read(self, raw: bytes | memoryview, most_bytes: int = MAX_MESSAGE_BYTES) -> Envelope[Body]:
+        """Return the envelope these bytes hold. Its fields of type ``memoryview`` are views of them.
 
         Raises:
-            OversizedMessage: The message is longer than ``MAX_MESSAGE_BYTES``.
+            OversizedMessage: The message is longer than ``most_bytes``.
             WrongVersion: The envelope or the message has another version.
             UnknownMessage: The schema of the message is not accepted here.
             MalformedMessage: The message is not valid; the detail names the field.
         """
-        refuse_oversized(len(raw))
+        refuse_oversized(len(raw), most_bytes)
         try:
             envelope = self._decoder.decode(raw)
         except _UNREADABLE as error:
@@ -235,7 +241,7 @@ class Reader(Generic[Body]):
             raise MalformedMessage(f"{schema}: {wild}", schema=schema)
         return cast("Envelope[Body]", envelope)
 
-    def _diagnose(self, raw: bytes, complaint: str) -> Refusal:
+    def _diagnose(self, raw: bytes | memoryview, complaint: str) -> Refusal:
         try:
             outer = msgspec.msgpack.decode(raw)
         except _UNREADABLE:

@@ -1,164 +1,203 @@
-"""Frames of 320 x 240 grey levels (76.8 kB) from one process through the hub to another.
+"""Pictures of 320 x 240 grey levels (76.8 kB), 30 a second, from one process to 1, 4 and 16 listeners of its host.
 
-Latency at 30 frames a second, then the most that arrives when they are published without a pause.
-The floor is bare zenoh-python with as many bytes and the same bridge into asyncio; frames of both
-alternate, so both see the same machine. Both publish as the bus does pictures: what finds the queue
-full is dropped. Prints one JSON line; ``ratio`` is bus p50 over bare p50 of the latency.
+The bus gives them to its listeners by a blackboard. Beside it, in the same run and in turns of a second: bare
+zenoh-python with shared memory, through the same hub, with as many bytes and the same bridge into asyncio; both drop
+what finds a queue full. Prints one JSON line for each number of listeners: latency of all listeners' pictures, and the
+processor time of sender, hub and listeners together for one picture, without what they use when nothing is sent.
+``ratio`` is bus p50 over bare p50.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import json
+import os
 import struct
+import subprocess
+import sys
+import tempfile
 import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import uvloop
 import zenoh
-from measuring import free_endpoint, helper, percentile, report, summary, wait_for_end_of_input
+from measuring import helper, percentile, report, summary, wait_for_end_of_input
 
+from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
-from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.host_boards import boards_for
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.bus.zenoh_settings import client_settings, hub_settings
 from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
 from resource_pool.messages import Frame
 
-MISSION = "bench"
-GRABBER, WATCHER = "resource_pool/framegrabber", "mission_control/watcher"
+MISSION, CLOCK = "bench", MissionClock(0.0)
+GRABBER = address(Subsystem.RESOURCE_POOL, "framegrabber")
 BARE_KEY = "bare/frames"
 WIDTH_PX, HEIGHT_PX, RATE_HZ = 320, 240, 30.0
-FLOOD = 1000
-SETTLE_S = 1.0  # chosen: what has not arrived a second after the last frame of a flood was dropped
-READY_S = 10.0
+TURN_S, REST_S = 1.0, 0.1  # chosen: a turn of each way, and a rest that no picture of the other way reaches over
+WARM_UP = 10_000_000  # number of the first of those pictures that count for nothing
+READY_S = 30.0
 
 
-def frame(number: int, pixels: memoryview) -> Frame:
-    """Return a frame that says when it was made, on the clock all processes of a machine share."""
-    return Frame("framegrabber", "watch", 1, "scout1", number, time.monotonic(), WIDTH_PX, HEIGHT_PX, pixels)
+def with_shared_memory(settings: dict[str, Any]) -> zenoh.Config:
+    """Return a configuration like the bus's, with shared memory."""
+    settings["transport"] = {**settings["transport"], "shared_memory": {"enabled": True}}
+    return zenoh.Config.from_json5(json.dumps(settings))
 
 
-async def publish(endpoint: str, frames: int) -> None:
-    """Be the publishing process: paced frames, then two floods."""
-    clock = MissionClock.started_now()
-    bus = await ZenohBus.open_when_up(MISSION, GRABBER, clock, client_config(endpoint))
-    bare = zenoh.open(client_config(endpoint))
+def joined(folder: str, source: str) -> tuple[ZenohBus, zenoh.Session]:
+    """Return a component's bus, and a bare session beside it."""
+    endpoint = socket_endpoint(Path(folder))
+    bus = ZenohBus.open(MISSION, source, CLOCK, client_config(endpoint))
+    bus.boards = boards_for(folder)
+    return bus, zenoh.open(with_shared_memory(client_settings(endpoint)))
+
+
+def be_hub(folder: str) -> None:
+    """Be the hub process."""
+    with zenoh.open(with_shared_memory(hub_settings([socket_endpoint(Path(folder))], [], ""))):
+        wait_for_end_of_input()
+
+
+def processor_s(pids: Sequence[int]) -> float:
+    """Return the processor time that these processes have used, all threads; Linux, ``clock_getcpuclockid``."""
+    return sum(time.clock_gettime((~pid << 3) | 2) for pid in pids)
+
+
+async def publish(folder: str, frames: int, pids: list[int]) -> None:
+    """Be the publishing process: turns of both ways; print the processor time of each for a picture."""
+    bus, bare = joined(folder, GRABBER)
     publisher = bare.declare_publisher(
         BARE_KEY, priority=zenoh.Priority.DATA_LOW, congestion_control=zenoh.CongestionControl.DROP
     )
     picture = np.arange(WIDTH_PX * HEIGHT_PX, dtype=np.uint32).astype(np.uint8)
-    as_bytes = picture.tobytes()
-    ready = asyncio.Event()
-    bus.watch_alive(WATCHER, lambda _address, alive: ready.set() if alive else None)
-    await asyncio.wait_for(ready.wait(), READY_S)
+    as_bytes, pixels, here = picture.tobytes(), memoryview(picture), [os.getpid(), *pids]
 
     def on_bus(number: int) -> None:
-        bus.publish(GRABBER, Conversation.FRAMES, frame(number, memoryview(picture)))
+        made = Frame("framegrabber", "watch", 1, "scout1", number, time.monotonic(), WIDTH_PX, HEIGHT_PX, pixels)
+        bus.publish(GRABBER, Conversation.FRAMES, made)
 
     def on_bare(number: int) -> None:
         publisher.put(struct.pack(">id", number, time.monotonic()) + as_bytes)
 
-    cpu = {}
-    for number in range(frames):
-        for say in (on_bus, on_bare):
-            say(number)
-            await clock.sleep_s(0.5 / RATE_HZ)
-    for name, say in (("bus", on_bus), ("bare", on_bare)):
-        cpu_began_s = time.process_time()
-        for number in range(frames, frames + FLOOD):
-            say(number)
-        cpu[name] = (time.process_time() - cpu_began_s) / FLOOD
-        await clock.sleep_s(SETTLE_S)
-    over = struct.pack(">idd", -1, cpu["bus"], cpu["bare"])
-    bare.put(BARE_KEY, over, congestion_control=zenoh.CongestionControl.BLOCK)
+    a_turn = int(TURN_S * RATE_HZ)
+    turns = [range(WARM_UP, WARM_UP + a_turn)] + [range(n, min(n + a_turn, frames)) for n in range(0, frames, a_turn)]
+    began_s = processor_s(here)
+    await CLOCK.sleep_s(TURN_S)
+    idle = (processor_s(here) - began_s) / TURN_S
+    spent = {"bus": 0.0, "bare": 0.0}
+    for turn in turns:
+        for name, say in (("bus", on_bus), ("bare", on_bare)):
+            began_s, turn_began_s = processor_s(here), time.monotonic()
+            for number in turn:
+                say(number)
+                await CLOCK.sleep_s(1 / RATE_HZ)
+            await CLOCK.sleep_s(REST_S)
+            if turn.start < WARM_UP:
+                spent[name] += processor_s(here) - began_s - idle * (time.monotonic() - turn_began_s)
+    print(json.dumps({name: round(spent_s / frames * 1e6) for name, spent_s in spent.items()}), flush=True)
     await asyncio.get_running_loop().run_in_executor(None, wait_for_end_of_input)
     await bus.close()
     bare.close()
 
 
-def be_hub(endpoint: str) -> None:
-    """Be the hub process."""
-    with zenoh.open(hub_config([endpoint])):
-        wait_for_end_of_input()
+async def listen(folder: str, name: str) -> None:
+    """Be a listener; print the latencies of both ways at the end of input."""
+    bus, bare = joined(folder, address(Subsystem.MISSION_CONTROL, name))
+    loop, latencies_s = asyncio.get_running_loop(), {"bus": list[float](), "bare": list[float]()}
 
-
-class Arrivals:
-    """When frames arrived and how old they were."""
-
-    def __init__(self, paced: int) -> None:
-        self._paced = paced
-        self.latencies_s: list[float] = []
-        self.flood_s: list[float] = []
-
-    def note(self, number: int, captured_s: float) -> None:
-        """Take one frame."""
-        now_s = time.monotonic()
-        if number < self._paced:
-            self.latencies_s.append(now_s - captured_s)
-        else:
-            self.flood_s.append(now_s)
-
-    def figures(self) -> dict[str, Any]:
-        """Return what was measured, for the report."""
-        lasted_s = self.flood_s[-1] - self.flood_s[0]
-        return {
-            **summary(self.latencies_s),
-            "paced_arrived": len(self.latencies_s),
-            "flood_arrived_per_s": round((len(self.flood_s) - 1) / lasted_s) if lasted_s > 0 else None,
-            "flood_arrived": len(self.flood_s),
-        }
-
-
-async def measure(endpoint: str, frames: int) -> None:
-    """Be the watching process."""
-    bus = await ZenohBus.open_when_up(MISSION, WATCHER, MissionClock.started_now(), client_config(endpoint))
-    bare = zenoh.open(client_config(endpoint))
-    loop = asyncio.get_running_loop()
-    over: asyncio.Future[tuple[float, float]] = loop.create_future()
-    on_bus, on_bare = Arrivals(frames), Arrivals(frames)
+    def note(way: str, number: int, captured_s: float) -> None:
+        if number < WARM_UP:
+            latencies_s[way].append(time.monotonic() - captured_s)
 
     def bare_in_loop(sample: zenoh.Sample) -> None:
         raw = sample.payload.to_bytes()
-        number = struct.unpack_from(">i", raw)[0]
-        if number < 0:
-            over.set_result(struct.unpack_from(">dd", raw, 4))
-        else:
-            on_bare.note(number, struct.unpack_from(">d", raw, 4)[0])
+        note("bare", *struct.unpack_from(">id", raw))
 
     bare.declare_subscriber(BARE_KEY, lambda sample: loop.call_soon_threadsafe(bare_in_loop, sample))
-    bus.subscribe(GRABBER, Conversation.FRAMES, Frame, lambda e: on_bus.note(e.body.number, e.body.captured_s))
-    bus.declare_alive(WATCHER)
-    cpu_s = await asyncio.wait_for(over, 2 * frames / RATE_HZ + 60.0)
-    report(
-        "frames",
-        frames=frames,
-        bytes=WIDTH_PX * HEIGHT_PX,
-        rate_hz=RATE_HZ,
-        bus=on_bus.figures(),
-        bare=on_bare.figures(),
-        ratio=round(percentile(on_bus.latencies_s, 0.5) / percentile(on_bare.latencies_s, 0.5), 3),
-        publish_cpu_us={"bus": round(cpu_s[0] * 1e6), "bare": round(cpu_s[1] * 1e6)},
+    bus.subscribe(
+        GRABBER,
+        Conversation.FRAMES,
+        Frame,
+        lambda one: note("bus", one.body.number, one.body.captured_s),
+        latest=True,
     )
+    await asyncio.sleep(0.2)  # of the machine: both subscriptions are known to the hub
+    print("ready", flush=True)
+    await loop.run_in_executor(None, wait_for_end_of_input)
+    print(json.dumps(latencies_s), flush=True)
     await bus.close()
     bare.close()
 
 
+def measure(listeners: int, frames: int) -> None:
+    """Run a hub, so many listeners and a publisher, and report."""
+    with tempfile.TemporaryDirectory(prefix="s-") as folder, ExitStack() as running:
+
+        def begin(*arguments: object) -> subprocess.Popen[bytes]:
+            return running.enter_context(helper(__file__, *map(str, arguments), answers=True))
+
+        hub = begin("hub", folder)
+        while not socket_is_there(folder):
+            time.sleep(0.01)
+        crowd = [begin("listener", folder, f"listener-{number}") for number in range(listeners)]
+        assert all(line_of(one) == "ready" for one in crowd)
+        publisher = begin("publisher", folder, frames, *(one.pid for one in (hub, *crowd)))
+        processor_us = json.loads(line_of(publisher))
+        heard: list[dict[str, list[float]]] = []
+        for one in crowd:
+            assert one.stdin is not None
+            one.stdin.close()
+            heard.append(json.loads(line_of(one)))
+    both = {way: [latency for one in heard for latency in one[way]] for way in ("bus", "bare")}
+    report(
+        "frames",
+        listeners=listeners,
+        frames=frames,
+        bytes=WIDTH_PX * HEIGHT_PX,
+        rate_hz=RATE_HZ,
+        **{
+            way: {**summary(all_s), "arrived": round(len(all_s) / listeners / frames, 3)} for way, all_s in both.items()
+        },
+        ratio=round(percentile(both["bus"], 0.5) / percentile(both["bare"], 0.5), 3),
+        processor_us=processor_us,
+    )
+
+
+def socket_is_there(folder: str) -> bool:
+    """Return whether the hub listens."""
+    return Path(socket_endpoint(Path(folder)).partition("/")[2]).exists()
+
+
+def line_of(one: subprocess.Popen[bytes]) -> str:
+    """Return what a process prints next."""
+    assert one.stdout is not None
+    return one.stdout.readline().decode().strip()
+
+
 def main() -> None:
     """Run the role named first, or all of them."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("role", nargs="?", default="all", choices=["all", "hub", "publisher"])
-    parser.add_argument("endpoint", nargs="?", default="")
-    parser.add_argument("--frames", type=int, default=150, help="at 30 a second, each way")
-    chosen = parser.parse_args()
-    if chosen.role == "hub":
-        be_hub(chosen.endpoint)
-    elif chosen.role == "publisher":
-        uvloop.run(publish(chosen.endpoint, chosen.frames))
-    else:
-        endpoint = free_endpoint()
-        publisher = ("publisher", endpoint, "--frames", str(chosen.frames))
-        with helper(__file__, "hub", endpoint), helper(__file__, *publisher):
-            uvloop.run(measure(endpoint, chosen.frames))
+    match sys.argv[1:]:
+        case ["hub", folder]:
+            be_hub(folder)
+        case ["listener", folder, name]:
+            uvloop.run(listen(folder, name))
+        case ["publisher", folder, frames, *pids]:
+            uvloop.run(publish(folder, int(frames), [int(pid) for pid in pids]))
+        case _:
+            parser = argparse.ArgumentParser(description=__doc__)
+            parser.add_argument("listeners", nargs="*", type=int, default=[1, 4, 16])
+            parser.add_argument("--frames", type=int, default=150, help="at 30 a second, each way")
+            chosen = parser.parse_args()
+            for count in chosen.listeners:
+                measure(count, chosen.frames)
 
 
 if __name__ == "__main__":

@@ -70,9 +70,14 @@ def bare_interpreters_s(count: int) -> float:
 
 
 @contextmanager
-def helper(program: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Run ``python program arguments…`` until the block ends; it ends when its standard input closes."""
-    process = subprocess.Popen([sys.executable, program, *arguments], stdin=subprocess.PIPE)
+def helper(program: str, *arguments: str, answers: bool = False) -> Iterator[subprocess.Popen[bytes]]:
+    """Run ``python program arguments…`` until the block ends; it ends when its standard input closes.
+
+    Args:
+        answers: Its standard output can be read.
+    """
+    output = subprocess.PIPE if answers else None
+    process = subprocess.Popen([sys.executable, program, *arguments], stdin=subprocess.PIPE, stdout=output)
     try:
         yield process
     finally:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from threading import Lock
+from typing import TYPE_CHECKING, Any, Protocol
 
-from backbone.bus.interface import Bus, Clock
+from backbone.bus.interface import Clock
 from backbone.debug_views import (
     MOST_VIEWS,
     SHOWN_EVERY_S,
@@ -27,11 +28,23 @@ from backbone.debug_views import (
 from backbone.keys import Conversation
 from backbone.naming import did_you_mean, legal
 from backbone.ranges import LONGEST_LINE, MOST_MEASURE, MOST_PIXEL_BYTES, MOST_PX
+from backbone.wire import Message
 
 if TYPE_CHECKING:  # most behaviors see no pictures and stay without NumPy
     from numpy.typing import NDArray
 
 Shown = float | bool | str
+
+
+class Publisher(Protocol):
+    """What views need of a bus."""
+
+    @property
+    def source(self) -> str:
+        """Address of the component."""
+
+    def publish(self, address: str, conversation: Conversation, message: Message) -> None:
+        """Send the message to all present subscribers."""
 
 
 class LookBook:
@@ -42,14 +55,15 @@ class LookBook:
     """
 
     def __init__(self, every_s: float) -> None:
-        self._every_s = every_s
+        self._every_s, self._lock = every_s, Lock()  # a unit may show in a thread, and answers in its event loop
         self._until_s: dict[str, float] = {}
         self._again_s: dict[str, float] = {}
 
     def look(self, view: str, until_s: float) -> float:
         """Note that a console looks until then; return until when any console looks at the view."""
-        self._until_s[view] = max(until_s, self._until_s.get(view, until_s))
-        return self._until_s[view]
+        with self._lock:
+            self._until_s[view] = until_s = max(until_s, self._until_s.get(view, until_s))
+        return until_s
 
     @property
     def is_empty(self) -> bool:
@@ -58,16 +72,17 @@ class LookBook:
 
     def take(self, view: str, now_s: float) -> bool:
         """Return whether the view is to be shown now; if so, it is not for the next ``every_s``."""
-        until_s = self._until_s.get(view)
-        if until_s is None:
-            return False
-        if now_s >= until_s:
-            del self._until_s[view]
-            return False
-        if now_s < self._again_s.get(view, now_s):
-            return False
-        self._again_s[view] = now_s + self._every_s
-        return True
+        with self._lock:
+            until_s = self._until_s.get(view)
+            if until_s is None:
+                return False
+            if now_s >= until_s:
+                del self._until_s[view]
+                return False
+            if now_s < self._again_s.get(view, now_s):
+                return False
+            self._again_s[view] = now_s + self._every_s
+            return True
 
 
 class DebugViews:
@@ -78,7 +93,7 @@ class DebugViews:
         clock: The mission's.
     """
 
-    def __init__(self, bus: Bus, clock: Clock) -> None:
+    def __init__(self, bus: Publisher, clock: Clock) -> None:
         self._bus, self._clock = bus, clock
         self._book = LookBook(SHOWN_EVERY_S * clock.rate)
         self._kinds: dict[str, ViewKind] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from backbone.mission.behavior_reports import BehaviorStatus, BreakOff, BrokenOff, ChildReport, ReportNoted
-from backbone.ranges import MANY, Count, Instant, Mention, PixelCount, PixelPlace, Pixels, Text, Values
+from backbone.ranges import FEW, MANY, Count, Instant, Mention, PixelCount, PixelPlace, Pixels, Text, Values
 from backbone.wire import Message
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "ChildReport",
     "GreyPicture",
     "MotionSeen",
+    "PictureJudged",
     "Region",
     "ReportNoted",
     "SwappedIn",
@@ -100,6 +101,24 @@ class MotionSeen(Message, frozen=True):
     at_s: Instant
     robot: Mention
     region: Region
+
+
+class PictureJudged(Message, frozen=True):
+    """What a picture shows, said of each picture that is compared with the average of those before it.
+
+    Attributes:
+        captured_s: Mission time of the picture.
+        robot: The robot of the camera.
+        votes: Whether each of the last judged pictures had a region, newest last.
+        region: Where something moves; None: nowhere for certain.
+        is_rejected: Whether the picture is too torn to be used.
+    """
+
+    captured_s: Instant
+    robot: Mention
+    votes: Annotated[list[bool], FEW]
+    region: Region | None = None
+    is_rejected: bool = False
 
 
 class WaypointReached(Message, frozen=True):

@@ -19,7 +19,6 @@ from backbone.keys import Conversation
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.world_messages import (
     AskWorld,
-    ClockTick,
     RadioPacket,
     ReplyOnAir,
     WorldModel,
@@ -55,6 +54,7 @@ class SimulatedWorld(Component[WorldParameters]):
     """Plays robots and room for the simulated drivers, and audits the packets on the air."""
 
     parameters_type = WorldParameters
+    shares_process = False
     given_elsewhere = frozenset({"world"})
     accepts = AskWorld | AskPose | AskHome | AskFloorPlan
 
@@ -191,4 +191,3 @@ class SimulatedWorld(Component[WorldParameters]):
         motors = {robot: motors for robot in transmitting if (motors := round(self._world.motors(robot), 2))}
         state = WorldState(frame, at_s, self._world.state().tobytes(), transmitting, on_since, motors)
         self.bus.publish(self.address, Conversation.TELEMETRY, state)
-        self.bus.publish(self.address, Conversation.CLOCK, ClockTick(frame, at_s, self.clock.rate))

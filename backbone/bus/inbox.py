@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar
 from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Clock, Listener, Overhearer, Subscription
 from backbone.errors import Refusal
-from backbone.wire import Accepts, Message, Reader, Refused, refuse_oversized
+from backbone.wire import Accepts, Envelope, Message, Reader, Refused, refuse_oversized
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -100,10 +100,18 @@ class EachSample:
         try:
             envelope = self._reader.read(bytes_of(sample.payload))
         except Refusal as unreadable:
-            self._bus.unreadable += 1
-            log.warning("unreadable publication on %s: %s", sample.key_expr, unreadable.detail)
+            self.count_unreadable(sample.key_expr, unreadable)
             return
+        self.deliver(envelope)
+
+    def deliver(self, envelope: Envelope[Message]) -> None:
+        """Call the listener."""
         self._bus.hear(self._listener, envelope)
+
+    def count_unreadable(self, key: object, refusal: Refusal) -> None:
+        """Count and log a publication that cannot be read."""
+        self._bus.unreadable += 1
+        log.warning("unreadable publication on %s: %s", key, refusal.detail)
 
 
 class OverheardSamples:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+from backbone.bus.host_boards import boards_for
 from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import (
     Answer,
@@ -27,7 +28,8 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.bus.local_bus import LocalNetwork, Neighbor
-from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session, watch_links
+from backbone.bus.zenoh_bus import ZenohBus
+from backbone.bus.zenoh_sessions import client_config, close_session, open_session, watch_links
 from backbone.keys import NEVER_DROPPED, Conversation
 from backbone.wire import Accepts, Envelope, Message
 
@@ -39,7 +41,7 @@ class SharedSession:
 
     Args:
         secret: Secret of the mission; empty: the hub asks for none.
-        directory: Folder of the mission's files on this host; empty: none, and no recorder of this host.
+        directory: Folder of the mission's files on this host; empty: none, and no recorder or blackboard of this host.
 
     Raises:
         HubUnreachable: No hub listens at the endpoint.
@@ -50,11 +52,14 @@ class SharedSession:
         self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
         self._copies = copies_for(directory)
+        self._directory, self._members = directory, set[str]()
 
     def join(self, source: str, clock: Clock) -> SharedBus:
         """Return a new member's bus. Close it before the session."""
         bus = SharedBus(self._neighbors, source, clock, self._session)
-        bus.copies = self._copies
+        bus.copies, bus.members = self._copies, self._members
+        self._members.add(source)
+        bus.boards = boards_for(self._directory, self._members)
         return bus
 
     async def close(self) -> None:
@@ -71,6 +76,8 @@ class SharedBus(Neighbor, ZenohBus):
         super().__init__(neighbors.mission, source, clock, session, shared=True)
         self.network = neighbors
         self.declared = []
+        self.members = set[str]()
+        """Sources of this process; settable."""
 
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component, a neighbor without leaving the process; see ``Bus.ask``."""
@@ -129,6 +136,11 @@ class SharedBus(Neighbor, ZenohBus):
         """Withdraw all declarations, in this process and on the session."""
         self.take_back_from_neighbors()
         super().take_back()
+
+    async def leave(self) -> None:
+        """Leave the session, which other members use."""
+        self.members.discard(self.source)
+        await super().leave()
 
 
 class _Watch:

@@ -1,4 +1,4 @@
-"""The bus between processes, over Eclipse Zenoh. The only file that imports zenoh.
+"""The bus between processes, over Eclipse Zenoh.
 
 Zenoh's threads never run component code: they put arrivals into an inbox and wake the event loop once for a whole
 burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one, and so are those about
@@ -10,17 +10,16 @@ messages (docs/decisions/0003-zenoh-settings.md).
 
 from __future__ import annotations
 
-import asyncio
-import json
 import logging
-from collections import OrderedDict
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, cast
 
 import zenoh
 
+from backbone.bus.answers import Came, TooLate, read_answer
 from backbone.bus.bus_base import quoted
+from backbone.bus.declared import Both, Declared, FirstReply
+from backbone.bus.host_boards import HostBoards, SentBoard
 from backbone.bus.host_copies import HostCopies
 from backbone.bus.inbox import (
     EachSample,
@@ -29,7 +28,6 @@ from backbone.bus.inbox import (
     OverheardSamples,
     bytes_of,
     reader_of,
-    reply_reader_of,
 )
 from backbone.bus.interface import (
     Answer,
@@ -42,12 +40,24 @@ from backbone.bus.interface import (
     Reply,
     Subscription,
 )
-from backbone.bus.sockets import close_without_waiting
-from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
-from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
-from backbone.keys import NEVER_DROPPED, Conversation, address_of, key, key_of_all
-from backbone.waiting import settle
+from backbone.bus.near_listening import NearListening
+from backbone.bus.zenoh_outlets import Outlet, Outlets
+from backbone.bus.zenoh_questions import DirectQuestion, Query, Ways, new_inbox, query
+from backbone.bus.zenoh_sessions import (
+    client_config,
+    close_session,
+    hub_config,
+    is_hub,
+    open_session,
+    open_when_up,
+    watch_links,
+)
+from backbone.bus.zenoh_settings import LINK_LEASE_MS
+from backbone.errors import Refusal
+from backbone.keys import LARGE, NEVER_DROPPED, Conversation, address_of, key, key_of_all, key_of_senders, sender_of
 from backbone.wire import (
+    MAX_LARGE_MESSAGE_BYTES,
+    MAX_MESSAGE_BYTES,
     Accepts,
     Envelope,
     MalformedMessage,
@@ -56,86 +66,16 @@ from backbone.wire import (
     Reader,
     Refused,
     UnwritableMessage,
+    refuse_oversized,
     write,
 )
+
+__all__ = ["ZenohBus", "client_config", "hub_config"]
 
 log = logging.getLogger(__name__)
 
 _TIMEOUT_PAYLOAD = b"Timeout"
-
-# Priority, and congestion control for a full queue. Never express: without batching a queue holds two messages and
-# dropped up to 360 of a burst of 1000; with batching it dropped none, at a thirtieth of the sender's cost.
-_URGENT = (zenoh.Priority.REAL_TIME, zenoh.CongestionControl.BLOCK)
-_SURE = (zenoh.Priority.DATA, zenoh.CongestionControl.BLOCK)
 TELL_WITHIN_S = 0.01  # chosen: copies for recorders are made after a context switch, not in it; a death loses so much
-MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
-_REPEATED = (zenoh.Priority.DATA, zenoh.CongestionControl.DROP)
-_BULK = (zenoh.Priority.DATA_LOW, zenoh.CongestionControl.DROP)
-_FOR_RECORDERS = (zenoh.Priority.BACKGROUND, zenoh.CongestionControl.DROP)
-_QUALITY = {
-    Conversation.COMMAND: _URGENT,
-    Conversation.LEASES: _URGENT,
-    Conversation.STATUS: _SURE,
-    Conversation.EVENTS: _SURE,
-    Conversation.OPERATORS: _SURE,
-    Conversation.SCHEDULE: _SURE,
-    Conversation.FRAMES: _BULK,
-    Conversation.LOG: _BULK,
-    Conversation.TOLD: _FOR_RECORDERS,
-    Conversation.DECISIONS: _FOR_RECORDERS,
-}
-
-
-def client_config(endpoint: str, secret: str = "") -> zenoh.Config:
-    """Return the configuration of a client; see ``client_settings``."""
-    return _config(client_settings(endpoint, secret))
-
-
-def hub_config(listen: list[str], connect: list[str] | None = None, *, dictionary_file: str = "") -> zenoh.Config:
-    """Return the configuration of a hub; see ``hub_settings``."""
-    return _config(hub_settings(listen, connect or [], dictionary_file))
-
-
-def _config(settings: dict[str, object]) -> zenoh.Config:
-    return zenoh.Config.from_json5(json.dumps(settings))
-
-
-def _is_hub(config: zenoh.Config) -> bool:
-    return bool(json.loads(config.get_json("mode")) == "router")
-
-
-def _unreachable(config: zenoh.Config, error: zenoh.ZError) -> HubUnreachable:
-    """Return the error of a session that did not open; zenoh's own text names lines of its source."""
-    if _is_hub(config):
-        return HubUnreachable(str(error))
-    return HubUnreachable(f"no hub answers at {', '.join(json.loads(config.get_json('connect/endpoints')))}")
-
-
-def open_session(config: zenoh.Config) -> zenoh.Session:
-    """Return a new session.
-
-    Raises:
-        HubUnreachable: No hub listens at the endpoint, or (for a hub) the port is taken.
-    """
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        raise _unreachable(config, error) from error
-
-
-def watch_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None]:
-    """Keep the close of this session's TCP links from blocking, while the result is kept."""
-
-    def changed(event: zenoh.LinkEvent) -> None:
-        if event.kind == zenoh.SampleKind.PUT and event.link.src.startswith("tcp/"):
-            close_without_waiting()
-
-    return session.info.declare_link_events_listener(zenoh.handlers.Callback(changed, indirect=False), history=True)
-
-
-async def close_session(session: zenoh.Session) -> None:
-    """Close the session; return when its threads have ended."""
-    await asyncio.get_running_loop().run_in_executor(None, session.close)
 
 
 class ZenohBus(InboxBus):
@@ -160,11 +100,15 @@ class ZenohBus(InboxBus):
         super().__init__(mission, source, clock)
         self.copies: HostCopies | None = None
         """For the recorder of this host; settable. A bus with a session of its own closes them."""
+        self.boards: HostBoards | None = None
+        """For large values to and from this host; settable before they are used."""
         self._session, self._is_hub, self._shared = session, is_hub, shared
         self._links = None if shared else watch_links(session)
-        self._declared: set[_Declared] = set()
-        self._publishers: OrderedDict[tuple[str, Conversation], zenoh.Publisher] = OrderedDict()
-        self._publisher(source, Conversation.TOLD)  # knows who overhears before the first question is answered
+        self._declared: set[Declared] = set()
+        self._outlets = Outlets(session, mission, source, only_elsewhere=shared)
+        self.ways = Ways(self, session, mission, source, only_elsewhere=shared)
+        """To whom it asks again and again."""
+        self._outlet(source, Conversation.TOLD)  # knows who overhears before the first question is answered
 
     @classmethod
     def open(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -173,7 +117,7 @@ class ZenohBus(InboxBus):
         Raises:
             HubUnreachable: No hub listens at the endpoint, or (for a hub) the port is taken.
         """
-        return cls(mission, source, clock, open_session(config), is_hub=_is_hub(config))
+        return cls(mission, source, clock, open_session(config), is_hub=is_hub(config))
 
     @classmethod
     async def open_when_up(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -182,17 +126,8 @@ class ZenohBus(InboxBus):
         Raises:
             HubUnreachable: The hub did not listen within ``OPEN_TIMEOUT_MS``.
         """
-        pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="zenoh_open")
-        opening = pool.submit(zenoh.open, config)
-        pool.shutdown(wait=False)
-        try:
-            session = await asyncio.shield(asyncio.wrap_future(opening))
-        except asyncio.CancelledError:
-            opening.add_done_callback(_close_unwanted)
-            raise
-        except zenoh.ZError as error:
-            raise _unreachable(config, error) from error
-        return cls(mission, source, clock, session, is_hub=_is_hub(config))
+        session = await open_when_up(config)
+        return cls(mission, source, clock, session, is_hub=is_hub(config))
 
     # ------------------------------------------------------------------ questions
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
@@ -200,76 +135,67 @@ class ZenohBus(InboxBus):
         asked_key = key(self._mission, address, Conversation.ASK)
         answered = self.open_question()
         self.asked += 1
-        arrived = _Arrived(self, answered)
-        cancel = zenoh.CancellationToken()
         try:
-            payload = write(self.envelope(question))
-            self._session.get(
-                asked_key,
-                zenoh.handlers.Callback(arrived.reply, arrived.end, indirect=False),
-                payload=payload,
-                timeout=max(0.0, within_s),
-                express=True,
-                cancellation_token=cancel,
-            )
-            got = await answered
-        except asyncio.CancelledError:
-            cancel.cancel()  # type: ignore[no-untyped-call]
-            raise
+            payload, way = write(self.envelope(question)), self.ways.way_to(address)
+            if way is not None:
+                came = await self.ways.ask(way, payload, answered, within_s)
+            else:
+                with self.ways.querying(address):
+                    got = await query(self, self._session, asked_key, payload, answered, within_s)
+                came = self._came_of(address, got)
         finally:
             self.end_question(answered)
-        return self._read_reply(address, question, reply, got, within_s)
+        try:
+            return read_answer(came, address, question, reply, within_s)
+        except MalformedMessage:
+            self.unreadable += 1
+            raise
 
-    def _read_reply(
-        self, address: str, question: Message, reply: type[Reply], got: zenoh.Reply | None, within_s: float
-    ) -> Reply:
-        what = type(question).__name__
+    def _came_of(self, address: str, got: zenoh.Reply | None) -> Came:
         if got is None:
-            raise NoResponder(f"no component answered {what} at {address}")
+            return None
         if got.err is not None:
             payload = got.err.payload.to_bytes()
-            if payload == _TIMEOUT_PAYLOAD:
-                raise ReplyTimeout(f"{address} did not answer {what} within {within_s:g} s")
-        else:
-            payload = cast("zenoh.Sample", got.ok).payload.to_bytes()
-        try:
-            body = reply_reader_of(reply).read(payload).body
-        except Refusal as unreadable:
-            self.unreadable += 1
-            raise MalformedMessage(
-                f"{address} answered {what} with something else: {unreadable.detail}"
-            ) from unreadable
-        if isinstance(body, Refused):
-            raise body.revive()
-        return cast("Reply", body)
+            return TooLate if payload == _TIMEOUT_PAYLOAD else payload
+        sample = cast("zenoh.Sample", got.ok)
+        self.ways.answered(address, sample.attachment)
+        return sample.payload.to_bytes()
 
     def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
         reader = reader_of(accepts)
-        own = key(self._mission, address, Conversation.ASK)
+        own, inbox = key(self._mission, address, Conversation.ASK), new_inbox(self._mission, address)
 
-        def arrived(query: zenoh.Query) -> None:
-            self.start(self._answer(reader, answer, own, query))
+        def asked(came: zenoh.Query) -> None:
+            self.start(self._answer(reader, answer, Query(came, own, inbox)))
 
-        return self._declare(self._session.declare_queryable(own, lambda query: self.push(arrived, query)))
+        def asked_directly(sample: zenoh.Sample) -> None:
+            if (question := DirectQuestion.of(self._session, self._mission, sample)) is None:
+                self.unreadable += 1
+            else:
+                self.start(self._answer(reader, answer, question))
 
-    async def _answer(self, reader: Reader[Message], answer: Answer, own: str, query: zenoh.Query) -> None:
+        direct = self._session.declare_subscriber(inbox, lambda sample: self.push(asked_directly, sample))
+        queries = self._session.declare_queryable(own, lambda came: self.push(asked, came))
+        return self._declare(Both(direct, queries))
+
+    async def _answer(self, reader: Reader[Message], answer: Answer, asked: Query | DirectQuestion) -> None:
         try:
-            question = reader.read(bytes_of(query.payload))
+            question = reader.read(bytes_of(asked.payload))
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
-                query.reply(own, self._write_reply(envelope), express=True)
+                asked.answer(self._write_reply(envelope))
                 self.tell(self.source, Conversation.ASK, question, envelope)
         except Refusal as unreadable:
             self.unreadable += 1
-            query.reply_err(write(self.envelope(Refused.of(unreadable))))
+            asked.refuse(write(self.envelope(Refused.of(unreadable))))
         except zenoh.ZError as error:  # the requester or the link is gone
-            log.info("reply on %s not sent: %s", own, error)
+            log.info("a reply of %s was not sent: %s", self.source, error)
         except Exception as bug:  # the reply cannot be encoded
             self.on_bug(bug)
         finally:
-            query.drop()  # type: ignore[no-untyped-call]
+            asked.drop()
 
     def _write_reply(self, envelope: Envelope[Message]) -> bytes:
         try:
@@ -286,15 +212,41 @@ class ZenohBus(InboxBus):
                 self.tell(address, conversation, envelope)
 
     def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Message]:
-        """Publish over the session and return the envelope."""
-        publisher = self._publisher(address, conversation)
+        """Publish over the session, or over the board of a large conversation, and return the envelope."""
+        outlet = self._outlet(address, conversation)
         self.published += 1
         envelope = self.envelope(message)
+        is_copied = self.copies is not None and self.copies.wants(conversation)
+        copies = self.copies if is_copied and conversation is not Conversation.TOLD else None
+        if outlet.board is not None:
+            self._send_large(outlet, outlet.board, envelope, copies)
+            return envelope
+        if copies is None and conversation is Conversation.OUTPUTS and outlet.is_unheard(self._loop.time()):
+            return envelope  # the next output follows soon; other messages may be the last for long
         raw = write(envelope)
-        publisher.put(raw)
-        if self.copies is not None and self.copies.wants(conversation) and conversation is not Conversation.TOLD:
-            self.copies.send(key(self._mission, address, conversation), raw)
+        outlet.publisher.put(raw)
+        if copies is not None:
+            copies.send(outlet.key, raw)
         return envelope
+
+    def _send_large(
+        self, outlet: Outlet, board: SentBoard, envelope: Envelope[Message], copies: HostCopies | None
+    ) -> None:
+        """Leave the message on the board, and send it by the network if a subscriber is there."""
+        is_heard = outlet.is_heard(self._loop.time())
+        if not (is_heard or copies is not None or board.is_read):
+            return
+        raw = write(envelope, MAX_LARGE_MESSAGE_BYTES)
+        if board.put(raw):
+            outlet.raise_token(self._session, self.source)
+        if len(raw) > MAX_MESSAGE_BYTES:
+            if not board.is_open:
+                refuse_oversized(len(raw))
+            return
+        if is_heard:
+            outlet.publisher.put(raw)
+        if copies is not None:
+            copies.send(outlet.key, raw)
 
     def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
         """Publish copies if a component overhears; questions with answers go to the recorder of this host, too."""
@@ -306,47 +258,46 @@ class ZenohBus(InboxBus):
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender; see ``Bus.pass_on``."""
         if not self.closed:
-            self._publisher(address, conversation).put(write(envelope))
+            self._outlet(address, conversation).publisher.put(write(envelope))
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether another process hears this conversation of its own address; 0.5 µs."""
-        publisher = cast("Any", self._publisher(self.source, conversation))  # zenoh's stubs say bool of its status
-        return bool(publisher.matching_status.matching)
+        return self._outlet(self.source, conversation).has_subscriber
 
     def tell_later(self, act: Callable[[], None]) -> None:
         """Call a function when the copies of ``TELL_WITHIN_S`` have gathered."""
         self._loop.call_later(TELL_WITHIN_S, act)
 
-    def _publisher(self, address: str, conversation: Conversation) -> zenoh.Publisher:
-        publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
-        self._publishers.move_to_end((address, conversation))
-        return publisher
-
-    def _declare_publisher(self, address: str, conversation: Conversation) -> zenoh.Publisher:
-        priority, congestion_control = _QUALITY.get(conversation, _REPEATED)
-        publisher = self._publishers[address, conversation] = self._session.declare_publisher(
-            key(self._mission, address, conversation),
-            priority=priority,
-            congestion_control=congestion_control,
-            allowed_destination=zenoh.Locality.REMOTE if self._shared else zenoh.Locality.ANY,
-        )
-        while len(self._publishers) > MOST_PUBLISHERS:
-            _, longest_silent = self._publishers.popitem(last=False)
-            longest_silent.undeclare()  # type: ignore[no-untyped-call]
-        return publisher
+    def _outlet(self, address: str, conversation: Conversation) -> Outlet:
+        return self._outlets.outlet(address, conversation, self._loop.time(), self.boards)
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Subscription:
         """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
-        pattern = key(self._mission, address, conversation)
-        receive = (
-            LatestSample(self, reader_of(accepts), listener)
-            if latest
-            else EachSample(self, reader_of(accepts), listener)
-        )
+        pattern, reader = key(self._mission, address, conversation), reader_of(accepts)
+        if latest and self.boards is not None and conversation in LARGE and "*" not in address:
+            return self._declare(self._listen_near(self.boards, pattern, reader, listener))
+        receive = LatestSample(self, reader, listener) if latest else EachSample(self, reader, listener)
         return self._declare(self._session.declare_subscriber(pattern, receive))
+
+    def _listen_near(self, boards: HostBoards, own: str, reader: Reader[Message], listener: Listener) -> NearListening:
+        """Listen to one key, by the boards of this host where its senders have some."""
+
+        def declare(receive: Callable[[zenoh.Sample], None]) -> Any:
+            return self._session.declare_subscriber(own, receive)
+
+        near = NearListening(self, reader, listener, boards, own, declare)
+
+        def changed(sample: zenoh.Sample) -> None:
+            near.sender_changed(sender_of(own, str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
+
+        at_once: Any = zenoh.handlers.Callback(lambda sample: self.push(changed, sample), indirect=False)
+        near.tokens = cast(
+            "Any", self._session.liveliness().declare_subscriber(key_of_senders(own), at_once, history=True)
+        )
+        return near
 
     def overhear(
         self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
@@ -372,7 +323,7 @@ class ZenohBus(InboxBus):
             NoResponder: The bus is closed already.
         """
         answered = self.open_question()
-        arrived = _Arrived(self, answered)
+        arrived = FirstReply(self, answered)
         try:
             self._session.liveliness().get(
                 key(self._mission, address, Conversation.ALIVE),
@@ -398,7 +349,7 @@ class ZenohBus(InboxBus):
         at_once = zenoh.handlers.Callback(heard, indirect=False)
         return self._declare(self._session.liveliness().declare_subscriber(pattern, at_once, history=True))
 
-    def watch_link(self, listener: LinkListener) -> _Declared:
+    def watch_link(self, listener: LinkListener) -> Declared:
         """Report the loss and return of this session's link; see ``Bus.watch_link``.
 
         The link of a hub is always up.
@@ -430,61 +381,16 @@ class ZenohBus(InboxBus):
     async def leave(self) -> None:
         """Close the session unless other buses use it; return when its threads have ended."""
         self.empty_inbox()  # pending questions: their requesters get ``NoResponder``
+        self.ways.close()
         if not self._shared:
+            self._outlets.close_boards()
             if self.copies is not None:
                 self.copies.close()
             await close_session(self._session)
             return
-        for publisher in self._publishers.values():
-            publisher.undeclare()  # type: ignore[no-untyped-call]
-        self._publishers.clear()
+        self._outlets.close()
 
-    def _declare(self, entity: Any) -> _Declared:
-        declared = _Declared(entity, self._declared)
+    def _declare(self, entity: Any) -> Declared:
+        declared = Declared(entity, self._declared)
         self._declared.add(declared)
         return declared
-
-
-class _Declared:
-    """A zenoh entity that can be withdrawn once; None if no entity was needed."""
-
-    def __init__(self, entity: Any, register: set[_Declared]) -> None:
-        self._entity, self._register = entity, register
-
-    @property
-    def stands(self) -> bool:
-        """True until it is withdrawn."""
-        return self in self._register
-
-    def close(self) -> None:
-        """Withdraw the declaration."""
-        if self.stands:
-            self._register.remove(self)
-            if self._entity is not None:
-                self._entity.undeclare()
-
-
-class _Arrived:
-    """Passes a question's first reply to the loop, or None if there was none."""
-
-    __slots__ = ("_answered", "_bus", "_replied")
-
-    def __init__(self, bus: ZenohBus, answered: asyncio.Future[zenoh.Reply | None]) -> None:
-        self._bus, self._answered, self._replied = bus, answered, False
-
-    def reply(self, got: zenoh.Reply) -> None:
-        self._replied = True  # exactly one component answers, so the end that follows adds nothing
-        self._bus.push(self._settle, got)
-
-    def end(self) -> None:
-        if not self._replied:
-            self._bus.push(self._settle, None)
-
-    def _settle(self, got: zenoh.Reply | None) -> None:
-        settle(self._answered, got)
-
-
-def _close_unwanted(opening: Future[zenoh.Session]) -> None:
-    """Close a session that opened after its opener was cancelled, because an open session keeps the process alive."""
-    if opening.exception() is None:
-        opening.result().close()  # type: ignore[no-untyped-call]

@@ -144,13 +144,19 @@ def up(
     record_to: Annotated[
         Path | None, typer.Option("--record", metavar="FILE.mcap", help="Record all from the first message on.")
     ] = None,
+    pack: Annotated[
+        int,
+        typer.Option(
+            "--pack", metavar="N", min=0, max=64, help="Pack components into N processes a host; 0: each has its own."
+        ),
+    ] = 0,
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
     description, text = read_or_exit(mission_file)
     from backbone.launcher.core_launches import UpOptions
 
-    options = UpOptions(speed=speed, trace=trace, for_s=for_s, text=text, record=record_to)
+    options = UpOptions(speed=speed, trace=trace, for_s=for_s, text=text, record=record_to, pack=pack)
     if detach:
         from backbone.launcher.detached import up_detached
 

@@ -21,6 +21,7 @@ import msgspec
 
 from backbone.addresses import NAMESERVER
 from backbone.authentication import secret_of
+from backbone.bus.host_boards import boards_for
 from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -104,6 +105,8 @@ class Component(Generic[P_co]):
     """Its own questions, besides the common ones: a message class or a union of them."""
     is_robot: ClassVar[bool] = False
     """True for the RC of a robot, which operators can stop."""
+    shares_process: ClassVar[bool] = True
+    """False for a class that computes for long; where the mission file names no process, it then has one of its own."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
 
@@ -131,7 +134,7 @@ class Component(Generic[P_co]):
         """Open the component's bus: a client of the hub, unless the class is the hub."""
         config = client_config(launch.endpoint, secret_of(launch.run_directory))
         bus = ZenohBus.open(launch.mission, launch.address, clock, config)
-        bus.copies = copies_for(launch.run_directory)
+        bus.copies, bus.boards = copies_for(launch.run_directory), boards_for(launch.run_directory)
         return bus
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

@@ -33,6 +33,7 @@ class ComponentType(Message, frozen=True, tag="ComponentType/2"):
             for a new start.
         needs: Role → kind of RC that an ARC holds; empty if it is no ARC type.
         abilities: What its components can be commanded to do, and what they report.
+        shares_process: Whether the placer may put its components into a process with others.
     """
 
     name: Mention
@@ -44,6 +45,7 @@ class ComponentType(Message, frozen=True, tag="ComponentType/2"):
     restart: bool = True
     needs: Annotated[dict[Mention, Mention], FEW] = {}
     abilities: Abilities = NO_ABILITIES
+    shares_process: bool = True
 
 
 class Admit(Message, frozen=True):

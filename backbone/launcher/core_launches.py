@@ -12,7 +12,7 @@ from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.component.launch import Launch
 from backbone.creator.messages import RestartPolicy, creator_name
-from backbone.creator.preload import arc_modules
+from backbone.creator.preload import preloaded_modules
 from backbone.mission.model import Host, MissionDescription
 from backbone.naming import Subsystem
 
@@ -31,6 +31,7 @@ class UpOptions:
         for_s: Mission seconds from readiness to the end; None: until an order ends it.
         text: What the mission file holds: its tree is changed there. Empty: its tree cannot be changed.
         record: File of the recording, or None.
+        pack: Number of processes of a host into which the placer packs components; 0: each has its own.
     """
 
     speed: float = 1.0
@@ -38,6 +39,7 @@ class UpOptions:
     for_s: float | None = None
     text: bytes = b""
     record: Path | None = None
+    pack: int = 0
 
 
 def core_launches(description: MissionDescription, own: Launch, options: UpOptions) -> list[Launch]:
@@ -51,10 +53,10 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
     trace = str(options.trace.absolute()) if options.trace else ""
     parameters: dict[str, Callable[[Host], dict[str, object]]] = {
         "component_database": lambda _: {"types": types},
-        "placer": lambda _: {},
+        "placer": lambda _: {"packs": options.pack},
         "creator": lambda host: {
             "tags": list(host.tags),
-            "preload": arc_modules(description.types),
+            "preload": preloaded_modules(description.types, description.placed_types()),
             "types": types,
         },
         "dependency_database": lambda _: {"resources": resources, "kinds": kinds},

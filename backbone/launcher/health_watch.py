@@ -33,6 +33,7 @@ class HealthWatch:
         self.picture = MissionPicture(bus.mission, clock.now_s(), rate=clock.rate)
         """The mission in the last round."""
         self._components: Mapping[str, ComponentState] = {}
+        self._listed_s = clock.now_s()
         self._said: MissionHealth | None = None
         self._said_s = 0.0
 
@@ -52,7 +53,7 @@ class HealthWatch:
     async def _look_again_and_again(self) -> None:
         while True:
             missed, now_s, rate = self.absences(), self._clock.now_s(), self._clock.rate
-            await look(self._bus, now_s, before=self.picture, rate=rate, schedule=False)
+            await look(self._bus, now_s, before=self.picture, rate=rate, schedule=False, listed=self._listed)
             if self.absences() != missed:
                 self._changed()
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
@@ -60,10 +61,17 @@ class HealthWatch:
     async def _list_again_and_again(self) -> None:
         """Collect the components' reports of absences, also while a round waits for a creator that is cut off."""
         while True:
+            await self._clock.sleep_until_s(self._listed_s + 1.5 * LOOK_EVERY_S * self._clock.rate)
+            if self._clock.now_s() < self._listed_s + LOOK_EVERY_S * self._clock.rate:
+                continue
             with suppress(LinkError, Refusal):  # the round reports it
-                listed = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=LOOK_TIME_S)
-                self._components = {state.address: state for state in printable_all(listed.components)}
-            await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
+                answer = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=LOOK_TIME_S)
+                self._listed(printable_all(answer))
+            self._listed_s = self._clock.now_s()
+
+    def _listed(self, listing: Components) -> None:
+        self._listed_s = self._clock.now_s()
+        self._components = {state.address: state for state in listing.components}
 
     def _health(self) -> MissionHealth:
         # The launcher's own state in the list is one round old: its absences may have ended.

@@ -16,7 +16,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Absence
 from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
 from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPolicy, creator_name
-from backbone.creator.preload import arc_modules
+from backbone.creator.preload import preloaded_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.launcher.mission_recorder import MissionRecorder
@@ -117,7 +117,7 @@ class KeptCreator:
             class_path=_creator_class(types),
             parameters={
                 "tags": list(self._offered.tags),
-                "preload": arc_modules(types),
+                "preload": preloaded_modules(types),
                 "types": [msgspec.to_builtins(one) for one in types],
             },
             requester=self._launch.address,

@@ -9,10 +9,19 @@ from collections.abc import Iterable
 from enum import Enum, auto
 
 from backbone.component.messages import StoryEvent
+from backbone.component_database.messages import ComponentType
 from backbone.mission.model import LastBranchDescription
-from backbone.naming import component_of
+from backbone.mission.tables import EXECUTION_UNIT
+from backbone.naming import Subsystem, component_of
 
 _FINISHED = {"success": "succeeded", "failure": "failed"}
+
+
+def ends_before(types: Iterable[ComponentType]) -> frozenset[str]:
+    """Return the types whose components end before the last branch: behaviors, not the units that it may see with."""
+    return frozenset(
+        one.name for one in types if one.subsystem is Subsystem.MISSION_CONTROL and one.name != EXECUTION_UNIT
+    )
 
 
 class LastStage(Enum):

@@ -26,7 +26,7 @@ from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.ending_messages import AwaitLastBranch, EndMission, LastBranchOver, MissionEnding
 from backbone.launcher.health_watch import HealthWatch
-from backbone.launcher.last_branch import LastBranch
+from backbone.launcher.last_branch import LastBranch, ends_before
 from backbone.launcher.last_run import run_last
 from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
 from backbone.launcher.mission_recorder import MissionRecorder
@@ -351,7 +351,7 @@ class Launcher(Component[NoParameters]):
         """Stop consoles and behaviors, run the last branch, then end."""
         order = last_order(self._tree.description)
         assert order is not None  # noqa: S101  the decision is to run it
-        behaviors = {each.name for each in self._description.types if each.subsystem is Subsystem.MISSION_CONTROL}
+        behaviors = ends_before(self._description.types)
         async with self._step("stop consoles"):
             await self._stop_consoles()
         async with self._step("stop behaviors"):

@@ -100,6 +100,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
         failure: Why the facts are unknown; empty: they are known.
         abilities: What its components can be commanded to do, and what they report.
         given: Parameters that other elements and attributes of the mission file set.
+        shares_process: Whether the placer may put its components into a process with others.
     """
 
     doc: str = ""
@@ -111,6 +112,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     failure: str = ""
     abilities: Abilities = NO_ABILITIES
     given: tuple[str, ...] = ()
+    shares_process: bool = True
 
     def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
         """Return all that can be given while this driver is used; None if nothing is known of the driver."""

@@ -36,6 +36,7 @@ def facts_of(class_path: str) -> ClassFacts:
         may_claim=getattr(found, "may_claim", True),
         abilities=found.abilities(),
         given=tuple(sorted(found.given_elsewhere)),
+        shares_process=found.shares_process,
     )
 
 

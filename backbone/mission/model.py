@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
@@ -134,3 +135,12 @@ class MissionDescription(_Part):
     def core_parameters(self, service: str) -> dict[str, object]:
         """Return what the file sets of a core service's parameters, of the first of this type."""
         return next((dict(core.parameters) for core in self.core if core.type == service), {})
+
+    def placed_types(self) -> Iterator[str]:
+        """Yield the type of each component, unit and behavior of the file; resources and ARCs are others."""
+        yield from (one.type for one in (*self.components, *self.units))
+        waiting = [*self.behaviors]
+        while waiting:
+            behavior = waiting.pop()
+            yield behavior.type
+            waiting += behavior.children

@@ -24,6 +24,7 @@ def check_modules(tables: Tables, report: Report) -> None:
     modules = [module for unit in tables.units for module in unit.all("module")]
     check_unique(section.all("given"), "key", "given key", report)
     check_unique(modules, "name", "module", report)
+    check_unique([choice for unit in tables.units for choice in unit.all("choose")], "key", "choice of", report)
     for element in (*section.all("given"), *modules):
         if CLASS_PATH.fullmatch(element.text("class")):
             check_class_path(element, "class", report)
@@ -72,6 +73,9 @@ def _unit(unit: Element) -> dict[str, object]:
         "name": unit.text("name"),
         "frequency_hz": unit.number("frequency-hz") or 0.0,
         "on_input": unit.text("on-input"),
+        "own_thread": bool(unit.flag("own-thread")),
+        "nice": int(unit.text("nice") or 0),
+        "cpus": [int(number) for number in unit.text("cpus").split()],
         "modules": [
             {
                 "name": module.text("name"),
@@ -81,6 +85,10 @@ def _unit(unit: Element) -> dict[str, object]:
                 "outputs": {one.text("name"): one.text("key") for one in module.all("output")},
             }
             for module in unit.all("module")
+        ],
+        "choices": [
+            {"key": one.text("key"), "source": one.text("from"), "others": one.text("or").split()}
+            for one in unit.all("choose")
         ],
     }
 
@@ -101,6 +109,9 @@ def _places(tables: Tables, fault: UnitFault) -> Iterator[Place]:
                     if part.text("name") == fault.port:
                         yield part.place_of("value" if part.tag == "parameter" else "key")
                 yield module.place_of("name")
+        for choice in unit.all("choose"):
+            if fault.module == f"choose-{choice.text('key')}":
+                yield choice.place_of("from" if fault.port.startswith("from") else "key")
         if fault.unit and unit.text("name") == fault.unit:
             yield unit.place_of("name")
     if section is not None:

@@ -7,7 +7,7 @@ picture's ``problems`` name the gaps.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import msgspec
 
@@ -33,7 +33,13 @@ NAMES_SHOWN = 8  # chosen: a line of a terminal
 
 
 async def look(
-    bus: Bus, now_s: float, *, before: MissionPicture | None = None, rate: float = 1.0, schedule: bool = True
+    bus: Bus,
+    now_s: float,
+    *,
+    before: MissionPicture | None = None,
+    rate: float = 1.0,
+    schedule: bool = True,
+    listed: Callable[[Components], None] = lambda _listing: None,
 ) -> MissionPicture:
     """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of their answers.
 
@@ -41,6 +47,7 @@ async def look(
         before: The picture to update: an absence keeps its begin, and if the nameserver does not answer the picture
             stays as it was, marked as stale. None: a new one.
         schedule: False: only check that the RC manager answers.
+        listed: Called with the nameserver's answer, which comes first.
 
     Raises:
         LinkError: The nameserver did not answer, and there is no earlier picture.
@@ -53,6 +60,7 @@ async def look(
         silence = Absence("nameserver", now_s, f"no answer: {error}", "the launcher restarts it", vital=True)
         _gone_stale(before, printable_all(silence), now_s)
         return before
+    listed(listing)
     picture = before or MissionPicture(bus.mission, rate=rate)
     keepers = sorted({LAUNCHER, *(one.address for one in listing.components if one.type == CREATOR)})
     answers = await asyncio.gather(

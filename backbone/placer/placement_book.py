@@ -26,12 +26,15 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
+import msgspec
+
 from backbone.component.messages import Absence, NameTaken
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
 from backbone.creator.messages import HostLoad, ProcessState, Spawn
 from backbone.naming import Subsystem, did_you_mean
 from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase, PlacementRecord
 from backbone.placer.messages import NotPlaced
+from backbone.placer.packing import is_packed, pack
 from backbone.placer.placement import CandidateHost, Choice, obstacle, place
 
 STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; no mission stops so many in that time
@@ -48,9 +51,14 @@ class _Host:
 
 
 class PlacementBook:
-    """All placements and hosts of one mission."""
+    """All placements and hosts of one mission.
 
-    def __init__(self) -> None:
+    Args:
+        packs: Into how many shared processes a host packs components, see ``packing``.
+    """
+
+    def __init__(self, packs: int = 0) -> None:
+        self._packs = max(1, packs)
         self._hosts: dict[str, _Host] = {}
         self._records: dict[str, PlacementRecord] = {}
         self._numbers: dict[str, int] = {}
@@ -190,6 +198,9 @@ class PlacementBook:
         record = self.record(name)
         record.host = ""  # it must not count on the host that it leaves
         choice = place(name, record.spawn.tags, record.pin, self.hosts(), colocation=self._colocation(record))
+        if is_packed(record.spawn.process):
+            there = [one.spawn.process for one in self.records() if one is not record and one.host == choice.host]
+            record.spawn = msgspec.structs.replace(record.spawn, process=pack(there, self._packs))
         record.phase, record.host, record.reasons, record.since_s = (
             PlacementPhase.STARTING,
             choice.host,
@@ -333,7 +344,7 @@ class PlacementBook:
     # ------------------------------------------------------------------
     def _colocation(self, record: PlacementRecord) -> str:
         """Return the host of the other members of its process; empty if they have none or there are none."""
-        if not record.spawn.process:
+        if not record.spawn.process or is_packed(record.spawn.process):
             return ""
         hosts = [
             other.host

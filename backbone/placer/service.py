@@ -13,14 +13,14 @@ from collections.abc import Callable
 from contextlib import AsyncExitStack
 from functools import partial
 from itertools import chain, repeat
-from typing import Any, assert_never
+from typing import Annotated, Any, assert_never
 
 import msgspec
 
 from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
-from backbone.component.component import Component, NoParameters
+from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
 from backbone.component_database.messages import Admit, Admitted, ComponentType, Multiplicity
@@ -51,6 +51,7 @@ from backbone.placer.messages import (
     StoppedMeanwhile,
 )
 from backbone.placer.news import News
+from backbone.placer.packing import MOST_PACKS, WANTS_PACK
 from backbone.placer.placement_book import PlacementBook
 from backbone.wire import Envelope, Message, UnknownMessage
 
@@ -58,14 +59,25 @@ AGAIN_PAUSES_S = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)  # chosen: before each try to p
 COMPARE_EVERY_S = 5.0  # chosen: wishes without an owner are rare: the owner and the placer died at the same time
 
 
-class Placer(Component[NoParameters]):
+class PlacerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of ``Placer``.
+
+    Attributes:
+        packs: Number of shared processes a host into which components without a process are packed; 0: none.
+    """
+
+    packs: Annotated[int, msgspec.Meta(ge=0, le=MOST_PACKS)] = 0
+
+
+class Placer(Component[PlacerParameters]):
     """Places components, and places them again when they are missing."""
 
+    parameters_type = PlacerParameters
     accepts = PlacerQuestion
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._book = PlacementBook()
+        self._book = PlacementBook(self.parameters.packs)
         self._queue: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
         self._happened = News(clock)
         self._creators = Creators(bus, clock, self._book, self._happened)
@@ -164,7 +176,10 @@ class Placer(Component[NoParameters]):
             self._book.refuse_second(component_type, name)
             if component_type.multiplicity is Multiplicity.MANY:
                 await alone.aclose()
-            record = self._book.reserve(_spawn(name, order, component_type, requester), order.host, self.clock.now_s())
+            spawn = _spawn(name, order, component_type, requester)
+            if not spawn.process and component_type.shares_process and self.parameters.packs:
+                spawn = msgspec.structs.replace(spawn, process=WANTS_PACK)
+            record = self._book.reserve(spawn, order.host, self.clock.now_s())
             try:
                 return await self._start_up.bring_up(record)
             except Refusal:

@@ -5,7 +5,7 @@ Source: RAM 2002, "Experiments": Scouts watch a room for motion.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from random import Random
 from typing import Annotated
 
@@ -17,15 +17,19 @@ from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
 from backbone.spoken import counted
+from backbone.wire import Message
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.behavior_hooks import suspended_because
 from mission_control.behavior_tree import ArcNeed
 from mission_control.behaviors.run_times import RunTimes, useful_run_times
-from mission_control.messages import MotionSeen, Region
+from mission_control.messages import GreyPicture, MotionSeen, PictureJudged, Region, SwappedIn
+from mission_control.modules.orders import output_address
 from mission_control.vision.motion_detection import FAST_FRAMES, VOTES, MotionDetector
 from resource_pool.arc_client import Frame
 
+PICTURE, SWAPPED_IN, JUDGED = "picture", "swapped_in", "judged"  # keys, as the modules' classes declare them
 BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is well seen
 REPORT_EVERY_FRAMES = 30  # chosen: about once a second
 
@@ -42,6 +46,7 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
         frame_rate_hz: Pictures a second; for that.
         clean_share: Share of usable pictures, above 0 to 1; for that.
         seed: Seed of the drawn run times.
+        vision: Name of the execution unit that judges its pictures; empty: the behavior does so itself.
     """
 
     again_after_s: float = 1.0
@@ -51,16 +56,22 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
     frame_rate_hz: Annotated[float, msgspec.Meta(gt=0)] = 15.0
     clean_share: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.75
     seed: int = 0
+    vision: str = ""
 
 
 class WatchForMotion(Behavior[WatchParameters]):
-    """Publishes ``MotionSeen`` under its own address; keeps its view while it is suspended."""
+    """Publishes ``MotionSeen`` under its own address; keeps its view while it is suspended.
+
+    With a unit for its vision, it publishes its pictures for modules (``GreyPicture`` under ``picture``, ``SwappedIn``
+    under ``swapped_in``) and acts on what they say of each, ``PictureJudged`` under the unit's ``judged``.
+    """
 
     parameters_type = WatchParameters
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._detector = MotionDetector()
+        self._pictures = self._rejected = 0
         self._robot, self._events, self._last_told_s = "", 0, -float("inf")
         self._certain_frames, self._told_in_slice = 0, False
         self._times: RunTimes | None = None
@@ -81,10 +92,19 @@ class WatchForMotion(Behavior[WatchParameters]):
         self._maximum_s = need.maximum_runtime_s if need is not None else 0.0
         return need
 
+    async def connect(self) -> None:
+        """Listen to the unit that judges the pictures."""
+        await super().connect()
+        if self.parameters.vision:
+            at = output_address(address(Subsystem.MISSION_CONTROL, self.parameters.vision), JUDGED)
+            self.bus.subscribe(at, Conversation.OUTPUTS, PictureJudged, lambda judged: self._take_in(judged.body))
+
     async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002
         """Adapt to changes since the last grant, and draw the next run time."""
         self._robot = self.robot or self._robot
         self._detector.swapped_in()
+        if self.parameters.vision:
+            self._publish(SWAPPED_IN, SwappedIn(self.clock.now_s()))
         self._certain_frames, self._told_in_slice = 0, False
         self._longest_until_s = self.clock.now_s() + self._maximum_s
         granted = self.arc.granted if self.arc is not None else None
@@ -98,30 +118,43 @@ class WatchForMotion(Behavior[WatchParameters]):
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def see(self, frame: Frame) -> None:
-        """Detect motion in the picture; publish it when it is certain, and again while it continues."""
-        pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
-        self._robot = frame.robot
-        blob = self._detector.look(pixels)
+        """Have the picture judged, by the modules or here."""
+        self._robot, self._pictures = frame.robot, self._pictures + 1
+        if self._pictures % REPORT_EVERY_FRAMES == 0:
+            self._say()
+        if self.parameters.vision:
+            size = frame.width_px, frame.height_px
+            self._publish(PICTURE, GreyPicture(frame.robot, frame.captured_s, *size, frame.pixels))
+            return
+        rejected = self._detector.rejected
+        blob = self._detector.look(np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px))
         self._show_stages()
-        self._certain_frames += blob is not None
-        is_certain = blob is not None and self._certain_frames >= self.parameters.frames_wanted
-        if blob is not None and is_certain and frame.captured_s >= self._last_told_s + self.parameters.again_after_s:
-            self._last_told_s, self._told_in_slice = frame.captured_s, True
-            self._events += 1
-            region = Region(blob.x_px, blob.y_px, blob.width_px, blob.height_px)
-            self.bus.publish(self.address, Conversation.EVENTS, MotionSeen(frame.captured_s, frame.robot, region))
-            self.publish_event(
-                frame.robot, f"motion seen through {frame.robot} at x {blob.x_px}, y {blob.y_px}", LogLevel.NOTICE
-            )
-            self.tell_parent(self._found())
-            self._say()
-        elif self._detector.frames % REPORT_EVERY_FRAMES == 0:
-            self._say()
-        self._ask_for_more(frame.captured_s)
+        region = None if blob is None else Region(blob.x_px, blob.y_px, blob.width_px, blob.height_px)
+        is_rejected = self._detector.rejected > rejected
+        self._take_in(PictureJudged(frame.captured_s, frame.robot, list(self._detector.votes), region, is_rejected))
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, the events, and the pictures that were too torn to use."""
-        return {**super().statistics(), "events": self._events, "frames_rejected": self._detector.rejected}
+        return {**super().statistics(), "events": self._events, "frames_rejected": self._rejected}
+
+    def _publish(self, key: str, message: Message) -> None:
+        self.bus.publish(output_address(self.address, key), Conversation.OUTPUTS, message)
+
+    def _take_in(self, judged: PictureJudged) -> None:
+        """Publish motion when it is certain, and again while it continues; extend the slice after a glimpse."""
+        region, at_s = judged.region, judged.captured_s
+        self._rejected += judged.is_rejected
+        self._certain_frames += region is not None
+        is_certain = region is not None and self._certain_frames >= self.parameters.frames_wanted
+        if region is not None and is_certain and at_s >= self._last_told_s + self.parameters.again_after_s:
+            self._last_told_s, self._told_in_slice = at_s, True
+            self._events += 1
+            self.bus.publish(self.address, Conversation.EVENTS, MotionSeen(at_s, judged.robot, region))
+            what = f"motion seen through {judged.robot} at x {region.x_px}, y {region.y_px}"
+            self.publish_event(judged.robot, what, LogLevel.NOTICE)
+            self.tell_parent(self._found())
+            self._say()
+        self._ask_for_more(at_s, judged.votes)
 
     def _show_stages(self) -> None:
         stages, views = self._detector.stages, self.views
@@ -131,9 +164,8 @@ class WatchForMotion(Behavior[WatchParameters]):
             views.value("threshold", stages.bar)
             views.value("votes", sum(self._detector.votes))
 
-    def _ask_for_more(self, captured_s: float) -> None:
+    def _ask_for_more(self, captured_s: float, votes: Sequence[bool]) -> None:
         """Extend the slice until motion is certain, if there was a glimpse that is not published yet."""
-        votes = self._detector.votes
         if self._told_in_slice or not votes or not votes[-1]:
             return
         missing = max(0, VOTES - 1 - sum(votes)) + max(1, self.parameters.frames_wanted - self._certain_frames)
@@ -160,7 +192,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         return {"robot": self._robot, "events": self._events, "last_event_s": self._last_told_s}
 
     def _seen(self) -> str:
-        return f"{counted(self._detector.frames, 'frame')}, {counted(self._events, 'event')}"
+        return f"{counted(self._pictures, 'frame')}, {counted(self._events, 'event')}"
 
     def _say(self) -> None:
         self.report(f"watching through {self._robot or 'no robot yet'}: {self._seen()}")

@@ -6,16 +6,19 @@ The same modules in other units are another arrangement, and nothing else change
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import msgspec
 
 from backbone.errors import Refusal
 from backbone.mission.arranged import CLASS, Arranged, UnitFault, UnitsQuestion
 from backbone.naming import Subsystem, address
-from mission_control.modules.graph import OUTSIDE, Graph, GraphRefused, WiringFault
+from mission_control.modules.choice import CLASS_PATH as CHOICE
+from mission_control.modules.choice import ChoiceOrder, choice_faults
+from mission_control.modules.graph import OUTSIDE, Graph, GraphRefused, Member, WiringFault
 from mission_control.modules.orders import (
     ModuleOrder,
+    Running,
     Source,
     UnitParameters,
     is_message,
@@ -23,21 +26,22 @@ from mission_control.modules.orders import (
     output_address,
 )
 from mission_control.modules.ports import kinds_of_ports, type_name
-from mission_control.modules.unit_schedule import Trigger
 
 _NAMED = re.compile(r"`(?:\$\.)?(\w+)`")  # the parameter that msgspec speaks of
 
 
-class UnitOrder(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class UnitOrder(Running, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A unit.
 
     Attributes:
         name: Of the component that runs it.
         modules: What it runs; where nothing else orders them, in this order.
+        choices: Keys that get the values of one of several others.
     """
 
     name: str
     modules: list[ModuleOrder]
+    choices: list[ChoiceOrder] = []
 
 
 class GivenKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -63,39 +67,63 @@ class NoRounds(WiringFault):
 def arranged(units: Sequence[UnitOrder], given: Mapping[str, GivenKey]) -> dict[str, UnitParameters]:
     """Return unit → parameters of the component that runs it.
 
-    What another unit takes is published, and what no other module takes, if it is a message: it is there for others.
+    What another unit takes is published, and what no other module takes, if it is a message: it is there for others. So
+    are all algorithms that a choice can choose from.
 
     Raises:
         WrongModule: A class path leads to no module.
         GraphRefused: The modules cannot be connected; it says everything at once.
     """
-    loaded = {unit.name: [(one, one.load()) for one in unit.modules] for unit in units}
-    members = {unit: [one.member(module) for one, module in of] for unit, of in loaded.items()}
-    kinds = {key: load_at(one.type) for key, one in given.items()}
-    graph = Graph(members, {key: type_name(kind) for key, kind in kinds.items()})
-    for unit, of in loaded.items():
-        for member, (_order, module) in zip(members[unit], of, strict=True):
-            declared = kinds_of_ports(module.Outputs)
-            kinds |= {key: declared[port.name] for key, port in member.keyed_outputs}
+    given_kinds = {key: load_at(one.type) for key, one in given.items()}
+    kinds = dict(given_kinds)
+    members: dict[str, list[Member]] = {}
+    for unit in units:
+        members[unit.name] = [_member(one, kinds) for one in unit.modules]
+    if found := [fault for unit in units for fault in choice_faults(unit.choices, kinds)]:
+        raise GraphRefused(found)
+    units = [_with_choices(unit, kinds, members[unit.name]) for unit in units]
+    graph = Graph(members, {key: type_name(kind) for key, kind in given_kinds.items()})
     if found := [*_no_messages(graph, kinds), *_no_rounds(graph, units)]:
         raise GraphRefused(found)
-    return {unit.name: _parameters(unit, graph, kinds, given) for unit in units}
+    final = _final(units, members, kinds)
+    return {unit.name: _parameters(unit, graph, given, final) for unit in units}
 
 
-def _parameters(
-    unit: UnitOrder, graph: Graph, kinds: Mapping[str, object], given: Mapping[str, GivenKey]
-) -> UnitParameters:
-    every = [member for of in graph.units.values() for member in of]
-    final = [
+def _member(order: ModuleOrder, kinds: dict[str, object]) -> Member:
+    """Return a module's place in the graph; the classes of its outputs are among the kinds from now on."""
+    module = order.load()
+    member, declared = order.member(module), kinds_of_ports(module.Outputs)
+    for key, port in member.keyed_outputs:
+        kinds.setdefault(key, declared[port.name])
+    return member
+
+
+def _with_choices(unit: UnitOrder, kinds: dict[str, object], members: list[Member]) -> UnitOrder:
+    """Return the unit with modules that choose; they have a place among the members from now on."""
+    orders = [choice.order(kinds[choice.source]) for choice in unit.choices]
+    members += [_member(order, kinds) for order in orders]
+    return msgspec.structs.replace(unit, modules=[*unit.modules, *orders], choices=[])
+
+
+def _final(
+    units: Sequence[UnitOrder], members: Mapping[str, Sequence[Member]], kinds: Mapping[str, object]
+) -> set[str]:
+    """Return the keys that are published although no other unit takes them."""
+    chooses = {one.name for unit in units for one in unit.modules if one.class_path == CHOICE}
+    every = [member for of in members.values() for member in of]
+    taken = {key: {one.name for one in every if key in dict(one.keyed_inputs)} for key in kinds}
+    return {
         key
-        for member in graph.units[unit.name]
+        for member in every
         for key, _port in member.keyed_outputs
-        if is_message(kinds[key])
-        and not any(key == taken for other in every if other is not member for taken, _ in other.keyed_inputs)
-    ]
+        if is_message(kinds[key]) and (taken[key] & chooses or not taken[key] - {member.name})
+    }
+
+
+def _parameters(unit: UnitOrder, graph: Graph, given: Mapping[str, GivenKey], final: Collection[str]) -> UnitParameters:
+    made = {key for member in graph.units[unit.name] for key, _port in member.keyed_outputs}
     return UnitParameters(
-        frequency_hz=unit.frequency_hz,
-        on_input=unit.on_input,
+        **{name: getattr(unit, name) for name in Running.__struct_fields__},
         modules=unit.modules,
         sources={
             key: given[key].source
@@ -103,7 +131,7 @@ def _parameters(
             else Source(output_address(address(Subsystem.MISSION_CONTROL, producer), key))
             for key, producer in graph.into(unit.name).items()
         },
-        published=sorted({*graph.out_of(unit.name), *final}),
+        published=sorted({*graph.out_of(unit.name), *(made & set(final))}),
     )
 
 
@@ -134,7 +162,8 @@ def judged(question: UnitsQuestion) -> Arranged:
         try:
             units.append(msgspec.convert(declared, UnitOrder))
         except msgspec.ValidationError as error:
-            found.append(UnitFault(str(error), "Give the unit a frequency or an input", unit=str(declared["name"])))
+            remedy = "Give the unit a frequency or an input, and a thread of its own if it needs one"
+            found.append(UnitFault(str(error), remedy, unit=str(declared["name"])))
     given = {key: msgspec.convert(one, GivenKey) for key, one in question.given.items()}
     found += [fault for unit in units for order in unit.modules for fault in _of_class(order)]
     found += [fault for key, one in given.items() for fault in _of_given(key, one)]

@@ -220,13 +220,18 @@ class ExecutionUnit:
         """Time of the next round of the frequency; infinite without one."""
         return self._schedule.due_s
 
-    def put(self, key: str, value: object) -> bool:
-        """Take a value from outside the unit; return whether a round is due because of it."""
+    def put(self, key: str, value: object, overwritten: int = 0) -> bool:
+        """Take a value from outside the unit; return whether a round is due because of it.
+
+        Args:
+            overwritten: How many values of the key came since the last ``put`` and were not put.
+        """
         if key not in self._into:
             return False
         slot = self._slots[key]
-        if any(one.seen < slot.number for one in self._fresh[key]):
-            self._overwritten[key] = self._overwritten.get(key, 0) + 1
+        overwritten += any(one.seen < slot.number for one in self._fresh[key])
+        if overwritten and self._fresh[key]:
+            self._overwritten[key] = self._overwritten.get(key, 0) + overwritten
         slot.put(value)
         return self._schedule.arrived(key)
 

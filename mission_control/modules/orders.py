@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from typing import TypeGuard
+import operator
+from typing import Annotated, TypeGuard
 
 import msgspec
 
@@ -72,18 +73,39 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     conversation: Conversation = Conversation.OUTPUTS
 
 
-class UnitParameters(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Running(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """When and where a unit has its rounds.
+
+    Attributes:
+        own_thread: Whether the rounds run in a thread of their own, beside the event loop.
+        nice: Added to the niceness of that thread.
+        cpus: Processors that it may run on; empty: all.
+    """
+
+    own_thread: bool = False
+    nice: Annotated[int, msgspec.Meta(ge=-20, le=19)] = 0
+    cpus: list[Annotated[int, msgspec.Meta(ge=0)]] = []
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.nice or self.cpus) and not self.own_thread:
+            raise ValueError("niceness and processors are those of a thread; let the unit have a thread of its own")
+
+
+class UnitParameters(Running, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Parameters of the component that runs a unit.
 
     Attributes:
         modules: What it runs.
         sources: Key → where its values come from, for what the unit does not produce itself.
         published: Keys of the outputs that others get.
+        chosen: Key → chosen source, where it is another than the first one of a ``Choice``; settable.
     """
 
     modules: list[ModuleOrder]
     sources: dict[str, Source] = {}
     published: list[str] = []
+    chosen: dict[str, str] = {}
 
 
 def output_address(unit: str, key: str) -> str:
@@ -109,7 +131,7 @@ def load_at(class_path: str) -> object:
     """
     file, _, name = class_path.partition(":")
     try:
-        return getattr(importlib.import_module(file), name)
+        return operator.attrgetter(name)(importlib.import_module(file))
     except Exception as error:  # a file that is being written raises anything
         raise WrongModule(f"{class_path}: {type(error).__name__}: {error}", class_path=class_path) from error
 

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from mission_control.messages import GreyPicture, MotionSeen, Region, SwappedIn
+from mission_control.messages import GreyPicture, MotionSeen, PictureJudged, Region, SwappedIn
 from mission_control.modules.module import Module
 from mission_control.modules.ports import LATEST
 from mission_control.vision.frame_averaging import AVERAGED, FrameAveraging
@@ -136,8 +136,9 @@ class Tracking(Module):
         judgment: Judgment
 
     class Outputs(Module.Outputs):
-        """Motion, in pictures that have some."""
+        """What each picture shows, and motion, in pictures that have some."""
 
+        judged: PictureJudged
         motion: MotionSeen | None = None
 
     def reset(self) -> None:
@@ -151,10 +152,13 @@ class Tracking(Module):
             self._view = comparison.view
             self._vote.last.clear()
         blob = None if judged.sound is None else self._vote.count(judged.blob)
-        self.debug.value("votes", sum(self._vote.last))
-        if blob is None:
-            return self.Outputs()
-        return self.Outputs(_motion(comparison.captured_s, comparison.robot, blob))
+        votes, at_s, robot = list(self._vote.last), comparison.captured_s, comparison.robot
+        self.debug.value("votes", sum(votes))
+        region = None if blob is None else region_of(blob)
+        return self.Outputs(
+            PictureJudged(at_s, robot, votes, region, judged.sound is None),
+            None if region is None else MotionSeen(at_s, robot, region),
+        )
 
 
 class FrameDifference(Module):
@@ -192,12 +196,15 @@ class FrameDifference(Module):
             self._frames.swapped_in()
         given = inputs.picture
         blob = self._frames.look(_pixels(given))
-        return self.Outputs() if blob is None else self.Outputs(_motion(given.captured_s, given.robot, blob))
+        if blob is None:
+            return self.Outputs()
+        return self.Outputs(MotionSeen(given.captured_s, given.robot, region_of(blob)))
 
 
 def _pixels(picture: GreyPicture) -> NDArray[np.uint8]:
     return np.frombuffer(picture.pixels, np.uint8).reshape(picture.height_px, picture.width_px)
 
 
-def _motion(at_s: float, robot: str, blob: Blob) -> MotionSeen:
-    return MotionSeen(at_s, robot, Region(blob.x_px, blob.y_px, blob.width_px, blob.height_px))
+def region_of(blob: Blob) -> Region:
+    """Return the rectangle of a blob as a message."""
+    return Region(blob.x_px, blob.y_px, blob.width_px, blob.height_px)

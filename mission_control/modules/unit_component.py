@@ -1,4 +1,4 @@
-"""The component that runs one execution unit on the bus: a thin loop around ``ExecutionUnit``.
+"""The component that runs one execution unit on the bus: a thin loop around ``ExecutionUnit``; see ``unit_thread``.
 
 * another unit, or any component → it: the values of its inputs, published under the addresses that its parameters name.
 * an operator → it: the exchange of a module (``exchange``).
@@ -14,6 +14,8 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
+import msgspec
+
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, WrongParameter
 from backbone.component.launch import Launch
@@ -24,12 +26,15 @@ from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.debug_views import DebugViews
 from mission_control.modules.arrangement import judged
-from mission_control.modules.execution_unit import ExecutionUnit
+from mission_control.modules.choice import Choice
+from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.graph import Graph
-from mission_control.modules.orders import UnitParameters, WrongModule, is_message, output_address
+from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, is_message, output_address
+from mission_control.modules.os_threads import ThreadPlace
 from mission_control.modules.ports import kinds_of_ports, type_name
 from mission_control.modules.unit_exchanges import UnitExchanges
 from mission_control.modules.unit_schedule import Trigger
+from mission_control.modules.unit_thread import LoopPublisher, UnitThread
 
 if TYPE_CHECKING:  # most modules see no pictures and stay without NumPy
     import numpy as np
@@ -40,9 +45,10 @@ REPORT_EVERY_S = 1.0  # chosen: a person reads no faster; seconds of the mission
 
 
 class UnitComponent(Component[UnitParameters]):
-    """Runs the modules of one unit in the component's event loop."""
+    """Runs the modules of one unit in the component's event loop, or in a thread of their own beside it."""
 
     parameters_type = UnitParameters
+    shares_process = False
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(UnitParameters.__struct_fields__)
     accepts: ClassVar[Accepts | None] = ListViews | LookAt | SwapModule
 
@@ -65,11 +71,15 @@ class UnitComponent(Component[UnitParameters]):
         self._graph = Graph({self.name: members}, {key: type_name(kind) for key, kind in into.items()})
         self._into = {key: _message_kind(key, kind) for key, kind in into.items()}
         self._published = {key: _message_kind(key, made.get(key)) for key in given.published}
-        self._views = DebugViews(bus, clock)
+        self._views = DebugViews(LoopPublisher(bus) if given.own_thread else bus, clock)
         for name, module in self._modules.items():
             module.debug = ViewsOfModule(name, self._views)
         self._unit: ExecutionUnit = self._new_unit()
-        self._exchanges = UnitExchanges(self, self._modules, self._graph, lambda: self._unit)
+        self._as_started = msgspec.structs.replace(given, chosen={})
+        self._choose()
+        self._thread: UnitThread | None = None
+        self._place: ThreadPlace | None = None
+        self._exchanges = UnitExchanges(self, self._modules, self._graph, lambda: self._unit, self._exchanged)
         self._missed, self._report_again_s = 0, -math.inf
 
     def _new_unit(self) -> ExecutionUnit:
@@ -77,14 +87,20 @@ class UnitComponent(Component[UnitParameters]):
         return ExecutionUnit(self.name, self._graph, self._modules, trigger, self.clock.now_s())
 
     async def connect(self) -> None:
-        """Listen to the sources."""
+        """Have the thread, if it is to have one, and listen to the sources."""
         self._unit = self._new_unit()
+        if self.parameters.own_thread:
+            self._thread = UnitThread(self._unit, self.clock, self._publish)
+            self._place = await self._thread.place(self.parameters.nice, self.parameters.cpus)
+            self.report(self._thread_text())
         for key, kind in self._into.items():
             source = self.parameters.sources[key]
             self.bus.subscribe(source.address, source.conversation, kind, self._listener(key), latest=True)
 
     async def serve(self) -> None:
         """Have the rounds of the frequency; those of inputs begin when these arrive."""
+        if self._thread is not None:
+            await self._thread.keep()
         while self._unit.due_s < math.inf:
             await self.clock.sleep_until_s(self._unit.due_s)
             now_s = self.clock.now_s()
@@ -104,10 +120,34 @@ class UnitComponent(Component[UnitParameters]):
                 raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 
     def parameters_changed(self) -> None:
-        """Refuse: modules and connections are those of the start."""
-        raise WrongParameter(
-            f"{self.name} runs the modules it was started with", remedy="Change the mission file and start it again."
-        )
+        """Choose sources; all else is as at the start.
+
+        Raises:
+            WrongParameter: Something else is to change, or there is no such choice.
+        """
+        if msgspec.structs.replace(self.parameters, chosen={}) != self._as_started:
+            raise WrongParameter(
+                f"{self.name} runs the modules it was started with",
+                remedy="Change the mission file and start it again.",
+            )
+        self._choose()
+
+    def _exchanged(self, modules: list[ModuleOrder]) -> None:
+        self.parameters = msgspec.structs.replace(self.parameters, modules=modules)
+        self._as_started = msgspec.structs.replace(self._as_started, modules=modules)
+
+    def _choose(self) -> None:
+        choices = {one.parameters.key: one for one in self._modules.values() if isinstance(one, Choice)}
+        for key, source in self.parameters.chosen.items():
+            known = choices[key].parameters.sources if key in choices else []
+            if source not in known:
+                told = [f"{one} from {' or '.join(each.parameters.sources)}" for one, each in choices.items()]
+                raise WrongParameter(
+                    f"{self.name} cannot choose {source} as {key}",
+                    remedy=f"Choose {'; '.join(told)}." if told else "Write <choose> in the mission file.",
+                )
+        for key, choice in choices.items():
+            choice.chosen = self.parameters.chosen.get(key, choice.parameters.sources[0])
 
     def statistics(self) -> dict[str, float]:
         """Return rates, lateness and misses of the unit, and the times of each module."""
@@ -119,17 +159,26 @@ class UnitComponent(Component[UnitParameters]):
             for module, one in told.modules.items()
             for name in one.__struct_fields__
         }
-        return {**own, **missed, **times}
+        place = self._place
+        thread = (
+            {} if place is None else {"thread_nice": float(place.nice), "thread_processors": float(len(place.cpus))}
+        )
+        return {**own, **missed, **times, **thread}
 
     def _listener(self, key: str) -> Callable[[Envelope[Message]], None]:
         def heard(envelope: Envelope[Message]) -> None:
-            if self._unit.put(key, envelope.body):
+            if self._thread is not None:
+                self._thread.put(key, envelope.body)
+            elif self._unit.put(key, envelope.body):
                 self._run(self.clock.now_s())
 
         return heard
 
     def _run(self, now_s: float) -> None:
-        for key, value in self._unit.run(now_s):
+        self._publish(now_s, self._unit.run(now_s))
+
+    def _publish(self, now_s: float, produced: list[Produced]) -> None:
+        for key, value in produced:
             if key in self._published:
                 assert isinstance(value, Message)  # noqa: S101  its class was checked at the start
                 self.bus.publish(output_address(self.address, key), Conversation.OUTPUTS, value)
@@ -143,7 +192,11 @@ class UnitComponent(Component[UnitParameters]):
             self._missed, self._report_again_s = missed, now_s + REPORT_EVERY_S
             ticks = [f"{told.missed} rounds missed, the latest {told.most_late_s:.3f} s late"] if told.missed else []
             values = [f"{count} values of {key} came too early" for key, count in told.overwritten.items()]
-            self.report("; ".join([*ticks, *values]))
+            self.report("; ".join([*ticks, *values, *filter(None, [self._thread_text()])]))
+
+    def _thread_text(self) -> str:
+        given = self.parameters
+        return str(self._place) if self._place is not None and (given.nice or given.cpus) else ""
 
 
 class ViewsOfModule:

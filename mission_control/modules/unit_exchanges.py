@@ -15,6 +15,7 @@ from backbone.errors import LinkError, Refusal
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
 from backbone.naming import did_you_mean
 from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from mission_control.modules.choice import Choice
 from mission_control.modules.exchange import UNPROVED, Exchange, ExchangeRules, Phase, complaint
 from mission_control.modules.exchangeable import graph_with, judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
@@ -46,6 +47,7 @@ class UnitExchanges:
         modules: Name → module; kept up to date.
         graph: The unit's at its start.
         unit: Returns the unit.
+        exchanged: Called with the orders of all modules that run after an exchange; they become its parameters.
     """
 
     def __init__(
@@ -54,8 +56,10 @@ class UnitExchanges:
         modules: dict[str, Module],
         graph: Graph,
         unit: Callable[[], ExecutionUnit],
+        exchanged: Callable[[list[ModuleOrder]], None],
     ) -> None:
         self._component, self._modules, self._graph, self._unit = component, modules, graph, unit
+        self._exchanged = exchanged
         self._kinds: dict[str, object] = {}
         """Key → class of the values; of the start, because a file that is read anew declares the classes again."""
         for one in component.parameters.modules:
@@ -66,7 +70,7 @@ class UnitExchanges:
         """Exchange the module; return when the new one has proved itself, or the old one has come back.
 
         Raises:
-            UnknownModule: The unit has no such module.
+            UnknownModule: The unit has no such module, or it is a choice.
             ExchangeRunning: Another exchange of this unit is not over.
             WrongModule: The class cannot be read or made.
             ValuesChanged: Its file declares values otherwise.
@@ -75,6 +79,9 @@ class UnitExchanges:
         if asked.module not in self._modules:
             meant = did_you_mean(asked.module, self._modules)
             raise UnknownModule(f"{self._component.name} has no module {asked.module!r}{meant}")
+        if isinstance(self._modules[asked.module], Choice):
+            remedy = f"Choose another source: 'scout-backbone set {self._component.name} chosen …'."
+            raise UnknownModule(f"{asked.module} chooses between sources and cannot be exchanged", remedy=remedy)
         if self._running:
             raise ExchangeRunning(f"{self._component.name} is exchanging {self._running}")
         self._running = asked.module
@@ -160,7 +167,7 @@ class UnitExchanges:
         name, component, exchange = candidate.asked.module, self._component, wanted.exchange
         self._modules[name], self._graph = candidate.new, wanted.graph
         modules = [candidate.order if one.name == name else one for one in component.parameters.modules]
-        component.parameters = msgspec.structs.replace(component.parameters, modules=modules)
+        self._exchanged(modules)
         after = f": {exchange.cause}" if exchange.cause else ""
         state = "with the state of" if exchange.keeps_state else "from a fresh state instead of"
         told = f"{candidate.order.class_path} goes on {state} {candidate.before.class_path}{after}"

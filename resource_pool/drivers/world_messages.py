@@ -15,7 +15,6 @@ from backbone.ranges import (
     Meters,
     Number,
     Payload,
-    Rate,
     Share,
     StateVector,
 )
@@ -105,11 +104,3 @@ class WorldState(Message, frozen=True):
     transmitting: Annotated[dict[Mention, Mention], MANY]
     on_since: Annotated[dict[Mention, Count], MANY] = {}
     motors: Annotated[dict[Mention, Share], MANY] = {}
-
-
-class ClockTick(Message, frozen=True):
-    """The mission's time, published by the world once a frame, for hosts without a shared monotonic clock."""
-
-    frame: Count
-    at_s: Instant
-    rate: Rate

@@ -58,6 +58,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     """Delivers pictures of its frequency to the ARC that holds it."""
 
     parameters_type = FramegrabberParameters
+    shares_process = False
     commands = Tune
     driver_kind = "framegrabber"
     driver_parameters = frozenset({"options", "frame_rate_hz"})

@@ -64,7 +64,7 @@ class Answerer(Module):
 """
 MISSION = f"""<mission name="m" priority="1"><modules>
 <given key="asked" class="{FILE}:Asked" address="{TESTER}" conversation="events"/>
-<unit name="answering"><module name="answerer" class="{FILE}:Answerer"/></unit>
+<unit name="answering" own-thread="{{thread}}"><module name="answerer" class="{FILE}:Answerer"/></unit>
 </modules></mission>"""
 
 
@@ -134,9 +134,9 @@ async def talk_with(mission: RunningMission) -> AsyncIterator[Talk]:
 
 
 @pytest.fixture
-def mission(source: Path, tmp_path: Path) -> Iterator[RunningMission]:
+def mission(source: Path, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[RunningMission]:
     file = tmp_path / "m.xml"
-    file.write_text(MISSION)
+    file.write_text(MISSION.format(thread=getattr(request, "param", "false")))
     with mission_up(mission_xml=file) as up:
         yield up
 
@@ -181,6 +181,7 @@ async def test_a_person_exchanges_a_module_and_a_new_start_has_the_new_class(
         await talk.until_answered_by("second")
 
 
+@pytest.mark.parametrize("mission", ["false", "true"], indirect=True, ids=["in the event loop", "in a thread"])
 @pytest.mark.parametrize("count", [10, pytest.param(100, marks=pytest.mark.slow)])
 async def test_swaps_at_thirty_hertz_lose_one_message_at_most(
     mission: RunningMission, source: Path, count: int

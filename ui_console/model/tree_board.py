@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.mission.tables import EXECUTION_UNIT
 from backbone.mission_log.people import People
 from backbone.naming import Subsystem, component_of
 from backbone.picture.words import because
@@ -62,12 +63,12 @@ class TreeBoard:
         """Return the nodes, parents before children, siblings of higher priority first.
 
         Args:
-            components: Of the mission; behaviors among them are nodes.
+            components: Of the mission; behaviors among them are nodes, and execution units, which run modules, are not.
             lost: Address of each lost node → since when.
             schedule: The newest.
         """
         requests = {component_of(request.owner): request for request in (schedule.requests if schedule else [])}
-        nodes = {node.address: node for node in components if node.address.startswith(f"{Subsystem.MISSION_CONTROL}/")}
+        nodes = {node.address: node for node in components if is_behavior(node)}
         below: dict[str, list[ComponentState]] = {}
         for node in nodes.values():
             below.setdefault(node.requester if node.requester in nodes else "", []).append(node)
@@ -113,6 +114,11 @@ class TreeBoard:
             return -self._priorities.get(component_of(node.address), 0), node.address
 
         return sorted(nodes, key=order)
+
+
+def is_behavior(component: ComponentState) -> bool:
+    """Return whether a component is a node of the behavior tree."""
+    return component.address.startswith(f"{Subsystem.MISSION_CONTROL}/") and component.type != EXECUTION_UNIT
 
 
 def _priorities(requests: Iterable[RequestView]) -> dict[str, int]:

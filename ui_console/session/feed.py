@@ -45,6 +45,7 @@ from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_readings, watch_stops
 from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said, failed
+from ui_console.model.tree_board import is_behavior
 
 log = logging.getLogger(__name__)
 
@@ -220,8 +221,7 @@ class ConsoleFeed:
         with self._showing_failure():
             listing = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
             self._hear(listing)
-            at = [component.address for component in listing.components]
-            behaviors = [one for one in at if one.startswith(f"{Subsystem.MISSION_CONTROL}/")]
+            behaviors = [one.address for one in listing.components if is_behavior(one)]
             robots = [component_of(one.address) for one in listing.components if one.is_robot]
             await asyncio.gather(
                 *map(self._ask_how_it_went, behaviors),

@@ -6,7 +6,18 @@ from pydantic import Field
 
 from backbone.keys import Conversation as ConversationWord
 from backbone.mission.declaration.parts import Declared, ParameterElement
-from backbone.mission.declaration.values import ClassPath, Conversation, Frequency, Name, OnInput, SourceAddress
+from backbone.mission.declaration.values import (
+    ClassPath,
+    Conversation,
+    Flag,
+    Frequency,
+    Name,
+    Names,
+    Nice,
+    OnInput,
+    Processors,
+    SourceAddress,
+)
 
 
 class InputElement(Declared):
@@ -35,6 +46,18 @@ class ModuleElement(Declared):
     output: tuple[OutputElement, ...] = ()
 
 
+class ChooseElement(Declared):
+    """A choice: algorithms for one task run side by side, and one of them is the source of a key."""
+
+    key: Name = Field(description="The key that gets the values; unique in the mission.")
+    source: Name = Field(alias="from", description="The key whose values it gets at first.")
+    others: Names = Field(
+        default=(),
+        alias="or",
+        description="Keys of the same class that can be chosen instead while the mission runs, separated by blanks.",
+    )
+
+
 class UnitElement(Declared):
     """An execution unit: a component whose modules run one after the other, in rounds.
 
@@ -51,6 +74,18 @@ class UnitElement(Declared):
             "When an input from outside the unit begins a round: any of them, all of them since they last did, or none."
         ),
     )
+    own_thread: Flag = Field(
+        default=False,
+        description="Whether its rounds run in a thread of their own, where they delay nothing else of its process.",
+    )
+    nice: Nice = Field(
+        default=0,
+        description="Added to the niceness of its own thread, -20 to 19; above 0: other threads come first.",
+    )
+    cpus: Processors = Field(
+        default="",
+        description="Processors that its own thread may run on, as numbers separated by blanks; left out: all.",
+    )
     host: Name = Field(default="", description="The host it runs on; left out: any.")
     process: Name = Field(
         default="",
@@ -58,6 +93,7 @@ class UnitElement(Declared):
         "names; left out: a process of its own.",
     )
     module: tuple[ModuleElement, ...] = ()
+    choose: tuple[ChooseElement, ...] = ()
 
 
 class GivenElement(Declared):

@@ -129,6 +129,14 @@ File = Annotated[
 Text = Annotated[str, Field(json_schema_extra=_kind("xs:string"))]
 Flag = Annotated[bool, BeforeValidator(_read_flag), Field(json_schema_extra=_kind("xs:boolean"))]
 
+Processors = Annotated[
+    str,
+    Field(
+        pattern=r"^([0-9]{1,4}( [0-9]{1,4})*)?$",
+        json_schema_extra=_kind("processors", "Numbers of processors, separated by one blank each, as in '0 1'."),
+    ),
+]
+
 Subsystem = Annotated[SubsystemWord, Field(json_schema_extra=_kind("subsystem"))]
 Multiplicity = Annotated[MultiplicityWord, Field(json_schema_extra=_kind("multiplicity"))]
 Conversation = Annotated[ConversationWord, Field(json_schema_extra=_kind("conversation"))]
@@ -137,6 +145,7 @@ Shape = Annotated[Literal["pioneer", "person", "carrier"], Field(json_schema_ext
 FurnitureShape = Annotated[Literal["box", "table"], Field(json_schema_extra=_kind("furniture-shape"))]
 
 Priority = Annotated[int, Field(ge=LEAST_WHOLE, le=MOST_WHOLE, json_schema_extra=_kind("priority")), _WHOLE_TEXT]
+Nice = Annotated[int, Field(ge=-20, le=19, json_schema_extra=_kind("nice")), _WHOLE_TEXT]
 Seed = Annotated[int, Field(ge=0, le=MOST_WHOLE, json_schema_extra=_kind("seed")), _WHOLE_TEXT]
 Port = Annotated[int, Field(ge=1, le=65535, json_schema_extra=_kind("port")), _WHOLE_TEXT]
 

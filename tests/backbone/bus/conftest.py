@@ -1,12 +1,16 @@
 """All buses, so that what holds on one is shown to hold on the others.
 
 The local bus runs in virtual time. The others run over a real hub on the loopback interface: the Zenoh bus with a
-session for each component; the shared bus with one session for all components (neighbors), and with two sessions that
-take the components in turn (neighbors and strangers).
+session for each component, without and with blackboards on which large conversations leave all values, however small;
+the shared bus with one session for all components (neighbors), and with two sessions that take the components in turn
+(neighbors and strangers, who have blackboards, too).
 """
 
 import asyncio
 import itertools
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,35 +23,51 @@ from bus_laws import (
 )
 from free_ports import free_endpoint
 
+from backbone.bus import host_boards
 from backbone.bus.clock import MissionClock, VirtualClock, VirtualLoop
+from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.bus.shared_bus import SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 
 
-@pytest.fixture(params=["local", "zenoh", "shared", "shared by turns"])
-def on_bus(request: pytest.FixtureRequest) -> Runner:
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """Return the folder of a mission's files; its path is short, as a mission's is."""
+    with tempfile.TemporaryDirectory(prefix="s-") as name:
+        yield Path(name)
+
+
+@pytest.fixture(params=["local", "zenoh", "boards", "shared", "shared by turns"])
+def on_bus(request: pytest.FixtureRequest, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Runner:
     """Return what runs a law on one of the buses."""
 
     async def on_local(law: Law) -> None:
         network = LocalNetwork("conformance")
         await run_and_close(law, Net(network.join, VirtualClock()))
 
-    async def on_zenoh(law: Law) -> None:
+    monkeypatch.setattr(host_boards, "LARGE_BYTES", 0)
+
+    async def on_zenoh(law: Law, directory: str) -> None:
         endpoint = free_endpoint()
         clock = MissionClock.started_now()
         hub = ZenohBus.open("conformance", "backbone/hub", clock, hub_config([endpoint]))
         try:
-            net = Net(lambda source, own: ZenohBus.open("conformance", source, own, client_config(endpoint)), clock)
-            await run_and_close(law, net)
+
+            def join(source: str, own: Clock) -> Bus:
+                bus = ZenohBus.open("conformance", source, own, client_config(endpoint))
+                bus.boards = host_boards.boards_for(directory)
+                return bus
+
+            await run_and_close(law, Net(join, clock))
         finally:
             await hub.close()
 
-    async def on_shared(law: Law, processes: int) -> None:
+    async def on_shared(law: Law, processes: int, directory: str) -> None:
         endpoint = free_endpoint()
         clock = MissionClock.started_now()
         hub = ZenohBus.open("conformance", "backbone/hub", clock, hub_config([endpoint]))
-        sessions = [SharedSession("conformance", endpoint) for _ in range(processes)]
+        sessions = [SharedSession("conformance", endpoint, "", directory) for _ in range(processes)]
         turns = itertools.cycle(sessions)
         try:
             await run_and_close(law, Net(lambda source, own: next(turns).join(source, own), clock))
@@ -58,9 +78,10 @@ def on_bus(request: pytest.FixtureRequest) -> Runner:
 
     runs: dict[str, Any] = {
         "local": on_local,
-        "zenoh": on_zenoh,
-        "shared": lambda law: on_shared(law, 1),
-        "shared by turns": lambda law: on_shared(law, 2),
+        "zenoh": lambda law: on_zenoh(law, ""),
+        "boards": lambda law: on_zenoh(law, str(folder)),
+        "shared": lambda law: on_shared(law, 1, ""),
+        "shared by turns": lambda law: on_shared(law, 2, str(folder)),
     }
 
     def run(law: Law) -> None:

@@ -17,6 +17,7 @@ from hostile_messages import enveloped, honest, hostile_messages
 from backbone.bus import zenoh_bus, zenoh_settings
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.zenoh_outlets import MOST_PUBLISHERS
 from backbone.component.messages import AskState, CommonQuestion, SetParameter, Stop, Stopping
 from backbone.errors import HubUnreachable, NoResponder
 from backbone.keys import Conversation, key
@@ -347,7 +348,7 @@ async def test_who_publishes_under_ever_new_addresses_does_not_grow() -> None:
         try:
             for number in [*range(300), 0]:
                 bus.publish(f"resource_pool/arc-{number}", Conversation.FRAMES, Stop(str(number)))
-            assert session.standing == zenoh_bus.MOST_PUBLISHERS
+            assert session.standing == MOST_PUBLISHERS
             async with asyncio.timeout(DEADLINE_S):
                 while len(heard) < 301:
                     bus.publish("resource_pool/arc-0", Conversation.FRAMES, Stop("again"))

@@ -13,11 +13,13 @@ from hypothesis import strategies as st
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import AskStory, LogLevel, Story, StoryEvent
+from backbone.component_database.messages import ComponentType
 from backbone.keys import Conversation
-from backbone.launcher.last_branch import LastBranch, LastStage, how_it_finished
+from backbone.launcher.last_branch import LastBranch, LastStage, ends_before, how_it_finished
 from backbone.launcher.last_run import run_last
 from backbone.mission.behavior_orders import last_order
 from backbone.mission.model import BehaviorDescription, LastBranchDescription, MissionDescription
+from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost
 from backbone.wire import Envelope
 
@@ -31,6 +33,12 @@ def finished_event(status: str = "success", where: str = AT) -> StoryEvent:
 
 
 # ---------------------------------------------------------------------- the decision
+def test_behaviors_end_before_it_and_what_it_sees_with_does_not() -> None:
+    kinds = {"patrol": Subsystem.MISSION_CONTROL, "execution_unit": Subsystem.MISSION_CONTROL}
+    kinds["scout"] = Subsystem.RESOURCE_POOL
+    assert ends_before([ComponentType(name, "x:Y", of) for name, of in kinds.items()]) == {"patrol"}
+
+
 def test_a_mission_without_one_goes_down_at_once_and_has_nothing_to_tell() -> None:
     last = LastBranch(None)
     assert last.ordered(1.0, is_up=True)

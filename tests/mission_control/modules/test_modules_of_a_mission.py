@@ -62,6 +62,24 @@ def test_units_are_described_with_their_connections(tmp_path: Path) -> None:
     }
     assert (then.parameters["frequency_hz"], then.parameters["on_input"]) == (5.0, "none")
     assert then.parameters["published"] == ["sum"]
+    assert not then.parameters["own_thread"]
+
+
+def test_a_unit_with_a_thread_is_described_with_its_place(tmp_path: Path) -> None:
+    place = ' own-thread="true" nice="-5" cpus="0 3"'
+    [one] = read(tmp_path, mission(unit("one", DOUBLER, attributes=place))).units
+    assert [one.parameters[name] for name in ("own_thread", "nice", "cpus")] == [True, -5, [0, 3]]
+
+
+SIDE_BY_SIDE = module("doubler", "sample_modules:Doubler", '<output name="twice" key="by-two"/>')
+
+
+def test_a_choice_is_described_as_a_module(tmp_path: Path) -> None:
+    chosen = '<choose key="twice" from="by-two" or="number"/>'
+    [one] = read(tmp_path, mission(unit("one", SIDE_BY_SIDE, SUMMING, chosen))).units
+    assert one.parameters["published"] == ["by-two", "sum"]
+    [*_, choice] = one.parameters["modules"]  # type: ignore[misc]
+    assert (choice["name"], choice["parameters"]["sources"]) == ("choose-twice", ["by-two", "number"])
 
 
 def test_who_must_not_import_anything_reads_the_file_without_connections() -> None:
@@ -104,6 +122,22 @@ HOST = '<hosts><host name="base" address="127.0.0.1"/></hosts>'
         (mission(unit("one", module("no", "sample_modules:Number"))), ["5:19 sample_modules:Number is no module"]),
         (mission(unit("one", module("plain", "test_unit_component:Plain"))), ["4:7 unit one never runs"]),
         (
+            mission(unit("one", SIDE_BY_SIDE, SUMMING, '<choose key="twice" from="by-tow"/>')),
+            ["7:21 twice can be chosen from by-tow, and no module produces it (did you mean 'by-two'?)"],
+        ),
+        (
+            mission(unit("one", SIDE_BY_SIDE, '<choose key="by-two" from="number"/>')),
+            ["6:9 choose-by-two produces by-two, and so does doubler"],
+        ),
+        (
+            mission(unit("one", DOUBLER, attributes=' cpus="0"')),
+            ["4:7 niceness and processors are those of a thread; let the unit have a thread of its own"],
+        ),
+        (
+            mission(unit("one", DOUBLER, attributes=' own-thread="maybe" nice="20" cpus="0,1"')),
+            ["4:18 own-thread='maybe'", "4:37 nice='20'", "4:47 cpus='0,1'"],
+        ),
+        (
             mission(unit("one", DOUBLER), given=GIVEN.replace("sample_modules:Number", "sample_modules:Counter")),
             ["3:21 sample_modules:Counter, the class of number, is no message"],
         ),
@@ -145,7 +179,7 @@ def test_an_execution_unit_is_no_behavior(tmp_path: Path) -> None:
 
 
 def test_the_guide_shows_the_example() -> None:
-    [shown] = re.findall(r"```xml\n(.*?)```", (TOP / "docs/how-to/write-a-module.md").read_text(), re.DOTALL)
+    shown, *_ = re.findall(r"```xml\n(.*?)```", (TOP / "docs/how-to/write-a-module.md").read_text(), re.DOTALL)
     assert textwrap.indent(shown, "  ") in (TOP / "docs/examples/pair.xml").read_text()
 
 
@@ -181,4 +215,4 @@ def test_two_algorithms_stand_side_by_side_as_the_explanation_of_the_vision_show
         for key, kind in (("picture", "GreyPicture"), ("swapped_in", "SwappedIn"))
     )
     [vision] = read(tmp_path, mission(shown, given=given)).units
-    assert vision.parameters["published"] == ["motion", "motion-by-difference"]
+    assert vision.parameters["published"] == ["judged", "motion", "motion-by-difference"]

@@ -156,7 +156,7 @@ def test_the_three_are_one_unit_of_a_mission_and_large_pictures_stay_in_it() -> 
         for key, of in (("picture", type_name(GreyPicture)), ("swapped_in", type_name(SwappedIn)))
     }
     whole = arranged([UnitOrder(name="vision", modules=orders)], given)["vision"]
-    assert whole.published == ["motion"]
+    assert whole.published == ["judged", "motion"]
     apart = [UnitOrder(name=order.name, modules=[order]) for order in orders]
     with pytest.raises(GraphRefused, match=r"its class .*:BackgroundComparison is no message"):
         arranged(apart, given)

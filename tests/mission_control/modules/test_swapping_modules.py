@@ -16,8 +16,18 @@ from backbone.addresses import PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.bus.local_bus import LocalNetwork
+from backbone.component.component import WrongParameter
 from backbone.component.launch import Launch
-from backbone.component.messages import AskParameters, AskState, AskStory, ComponentState, LogLevel, Parameters, Story
+from backbone.component.messages import (
+    AskParameters,
+    AskState,
+    AskStory,
+    ComponentState,
+    LogLevel,
+    Parameters,
+    SetParameter,
+    Story,
+)
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
@@ -347,6 +357,9 @@ def test_one_exchange_at_a_time_and_only_of_modules_that_there_are(stage: Stage,
         with pytest.raises(ExchangeRunning, match="exchanging counter"):
             await stage.swap()
         assert (await running).is_proved
+        with pytest.raises(WrongParameter):
+            await stage.bus.ask(UNIT, SetParameter("frequency_hz", 3.0), Message, within_s=1.0)
+        await stage.bus.ask(UNIT, SetParameter("chosen", {}), Parameters, within_s=1.0)
         with pytest.raises(UnknownModule, match="did you mean"):
             await stage.bus.ask(UNIT, SwapModule("countre", stage.path), Swapped, within_s=1.0)
 

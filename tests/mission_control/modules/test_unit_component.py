@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any
@@ -40,8 +41,10 @@ ARRANGEMENTS = [
 ]
 
 
-def orders(units: Mapping[str, Sequence[str]]) -> list[UnitOrder]:
-    return [UnitOrder(name=name, modules=[MODULES[one] for one in of]) for name, of in units.items()]
+def orders(units: Mapping[str, Sequence[str]], own_thread: bool = False) -> list[UnitOrder]:
+    return [
+        UnitOrder(name=name, modules=[MODULES[one] for one in of], own_thread=own_thread) for name, of in units.items()
+    ]
 
 
 def launch_of(name: str, parameters: UnitParameters) -> Launch:
@@ -87,7 +90,7 @@ def listen(bus: Bus, address: str, kind: type[Message], heard: list[Any]) -> Non
 
 def test_the_same_modules_say_the_same_in_every_arrangement_on_the_bus(local_mission: Any, beside: Any) -> None:
     said: list[bytes] = []
-    for units in ARRANGEMENTS:
+    for units, own_thread in itertools.product(ARRANGEMENTS, (False, True)):
 
         async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
             places: list[Number] = []
@@ -98,8 +101,8 @@ def test_the_same_modules_say_the_same_in_every_arrangement_on_the_bus(local_mis
             assert len(places) == 10
             said.append(msgspec.msgpack.encode(places))
 
-        play(local_mission, beside, arranged(orders(units), NUMBERS), scene)
-    assert said[0] == said[1] == said[2]
+        play(local_mission, beside, arranged(orders(units, own_thread), NUMBERS), scene)
+    assert len(set(said)) == 1
 
 
 def test_only_what_another_unit_or_no_other_module_takes_is_published(local_mission: Any, beside: Any) -> None:
@@ -136,7 +139,8 @@ class Passing(Module):
         return self.Outputs(inputs.number)
 
 
-def test_a_frequency_is_kept_and_counted(local_mission: Any, beside: Any) -> None:
+@pytest.mark.parametrize("own_thread", [False, True])
+def test_a_frequency_is_kept_and_counted(local_mission: Any, beside: Any, own_thread: bool) -> None:
     async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
         heard: list[Any] = []
         listen(bus, "mission_control/one/number", Number, heard)
@@ -149,7 +153,8 @@ def test_a_frequency_is_kept_and_counted(local_mission: Any, beside: Any) -> Non
         assert (heard[1].value - heard[0].value) == 3.0
 
     counter = ModuleOrder("counter", "sample_modules:Counter", {"step": 3.0})
-    play(local_mission, beside, arranged([UnitOrder(name="one", frequency_hz=20.0, modules=[counter])], {}), scene)
+    order = UnitOrder(name="one", frequency_hz=20.0, modules=[counter], own_thread=own_thread)
+    play(local_mission, beside, arranged([order], {}), scene)
 
 
 def test_misses_are_named_in_status_and_statistics(local_mission: Any, beside: Any) -> None:

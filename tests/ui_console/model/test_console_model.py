@@ -122,6 +122,12 @@ def test_a_node_that_finished_says_how_and_one_that_is_lost_keeps_its_place() ->
     assert [(n.name, n.state) for n in nodes[1:]] == [("watch1", NodeState.LOST), ("watch2", NodeState.FAILURE)]
 
 
+def test_a_unit_that_runs_modules_is_no_node_of_the_tree() -> None:
+    found = [component("mission_control/vision", "execution_unit"), component("mission_control/hide", "hide")]
+    nodes = model(Heard(1.0, Components(found, True, 0.0))).team.tree()
+    assert [node.name for node in nodes] == ["hide"]
+
+
 def test_a_node_whose_arc_waits_says_why() -> None:
     waiting = request("watch2-capture", "mission_control/watch2", RequestState.WAITING, priority="watch2:1")
     schedule = Schedule(9.0, [], [waiting], [])

@@ -1,0 +1,243 @@
+"""What the blackboard needs of the operating system: sealed memory files, and sockets that carry their descriptors.
+
+A *sealed memory file* is a file without a name that exists in memory only. Its content is written before it is sealed,
+and it is sealed before it is sent, so a reader never sees a part of a value, and no lock is needed. The file ends with
+its last descriptor and mapping, however its processes end.
+
+The rest of the project does not call these functions of the system. Where ``IS_POSSIBLE`` is False (a system other than
+Linux), there is no blackboard, and the bus sends everything by zenoh.
+"""
+
+from __future__ import annotations
+
+import array
+import contextlib
+import fcntl
+import mmap
+import os
+import socket
+import stat
+import struct
+import weakref
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from backbone.errors import Refusal
+
+IS_POSSIBLE = hasattr(os, "memfd_create") and hasattr(fcntl, "F_ADD_SEALS") and Path("/proc/self/fd").is_dir()
+_SEALS = (fcntl.F_SEAL_SEAL | fcntl.F_SEAL_WRITE | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW) if IS_POSSIBLE else 0
+MOST_MAPPED = 256  # chosen: Python keeps a descriptor for each mapping, and a process may have 1024 by default
+MOST_DESCRIPTORS = 2  # of one packet
+_PEER = struct.Struct("3i")  # pid, uid, gid
+_mapped: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
+
+
+class NotSealed(Refusal):
+    """A descriptor is no sealed memory file of the stated length."""
+
+    code = "blackboard.not_sealed"
+    remedy = "Write with BlackboardWriter of the same release."
+
+
+class ForeignFolder(Refusal):
+    """The folder of a blackboard can be entered by other users."""
+
+    code = "blackboard.folder"
+    remedy = "Name a folder of your own with mode 0700."
+
+
+# ---------------------------------------------------------------------- memory
+def sealed(value: bytes | memoryview) -> int:
+    """Return the descriptor of a new sealed memory file with this content."""
+    descriptor = os.memfd_create("scout-value", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+    try:
+        rest = memoryview(value).cast("B")
+        at = 0
+        while at < len(rest):
+            at += os.pwrite(descriptor, rest[at:], at)
+        fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, _SEALS)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    return descriptor
+
+
+def mapped(descriptor: int, length: int) -> memoryview:
+    """Return the content of a sealed memory file, read-only and without a copy; the descriptor is closed.
+
+    The memory stays until the last view of it is gone. A process that keeps ``MOST_MAPPED`` of them gets copies.
+
+    Raises:
+        NotSealed: It is not sealed, so that it might change or shrink under its reader, or has another length.
+    """
+    try:
+        try:
+            is_sealed = fcntl.fcntl(descriptor, fcntl.F_GET_SEALS) & _SEALS == _SEALS
+        except OSError:  # no memory file
+            is_sealed = False
+        if not is_sealed or os.fstat(descriptor).st_size != length or not length:
+            raise NotSealed(f"descriptor of no sealed memory file of {length} bytes")
+        if len(_mapped) >= MOST_MAPPED:
+            return memoryview(_read(descriptor, length))
+        content = mmap.mmap(descriptor, length, access=mmap.ACCESS_READ)
+        _mapped.add(content)
+        return memoryview(content)
+    finally:
+        os.close(descriptor)
+
+
+def _read(descriptor: int, length: int) -> bytes:
+    with os.fdopen(os.dup(descriptor), "rb") as file:
+        file.seek(0)
+        return file.read(length)
+
+
+# ---------------------------------------------------------------------- packets
+def packet_pair() -> tuple[socket.socket, socket.socket]:
+    """Return two connected sockets whose packets arrive whole or not at all; neither ever blocks."""
+    pair = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    for one in pair:
+        one.setblocking(False)
+    return pair
+
+
+def send(to: socket.socket, parts: Sequence[bytes | memoryview], descriptors: Sequence[int] = ()) -> None:
+    """Send one packet; the descriptors stay open here.
+
+    Raises:
+        OSError: The packet is not sent; ``BlockingIOError``: the socket is full.
+    """
+    rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
+    to.sendmsg(parts, rights, socket.MSG_NOSIGNAL)
+
+
+def receive(source: socket.socket, most_bytes: int) -> tuple[bytes, list[int]]:
+    """Return one packet and its descriptors, which are closed when another program begins; b"": the sender is gone.
+
+    Raises:
+        OSError: There is no packet now (``BlockingIOError``), or the socket is broken.
+    """
+    space = socket.CMSG_SPACE(MOST_DESCRIPTORS * array.array("i").itemsize)
+    raw, ancillary, flags, _ = source.recvmsg(most_bytes, space, socket.MSG_CMSG_CLOEXEC)
+    descriptors = array.array("i")
+    for level, kind, content in ancillary:
+        if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
+            descriptors.frombytes(content[: len(content) - len(content) % descriptors.itemsize])
+    if flags & (socket.MSG_TRUNC | socket.MSG_CTRUNC):
+        close_all(descriptors)
+        raise ConnectionError("a packet that is too long")
+    return raw, list(descriptors)
+
+
+def peek(undelivered_at: socket.socket, length: int) -> bytes:
+    """Return the begin of the oldest packet that waits in a socket, which stays there; b"": none waits."""
+    with contextlib.suppress(OSError):
+        return undelivered_at.recv(length, socket.MSG_PEEK)
+    return b""
+
+
+def take_back(undelivered_at: socket.socket, length: int) -> bytes:
+    """Return the begin of the oldest packet that waits in a socket and drop it; the system closes its descriptors."""
+    with contextlib.suppress(OSError):
+        return undelivered_at.recv(length)
+    return b""
+
+
+def close_all(descriptors: Sequence[int]) -> None:
+    """Close descriptors that came with a packet."""
+    for descriptor in descriptors:
+        os.close(descriptor)
+
+
+# ---------------------------------------------------------------------- the folder
+@contextlib.contextmanager
+def _place(directory: Path, name: str) -> Iterator[str]:
+    """Give a path of this name that fits a socket, however long the folder's own path is.
+
+    Raises:
+        ForeignFolder: Another user could enter the folder.
+        OSError: There is no folder.
+    """
+    folder = os.open(directory, os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        status = os.fstat(folder)
+        if status.st_uid != os.geteuid() or stat.S_IMODE(status.st_mode) & 0o077:
+            raise ForeignFolder(f"{directory} belongs to user {status.st_uid}, mode {status.st_mode & 0o777:o}")
+        yield f"/proc/self/fd/{folder}/{name}"
+    finally:
+        os.close(folder)
+
+
+def lock(directory: Path, name: str) -> int | None:
+    """Return a descriptor that holds the lock of this name while it is open; None: another process holds it.
+
+    A lock of a process that ended, however it ended, is free. The folder is made if there is none.
+
+    Raises:
+        ForeignFolder: Another user could enter the folder.
+        OSError: The system refuses the file.
+    """
+    directory.mkdir(mode=0o700, exist_ok=True)
+    with _place(directory, name) as path:
+        while True:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if os.path.exists(path) and os.path.samestat(os.fstat(descriptor), os.stat(path)):
+                    return descriptor
+            except BlockingIOError:
+                os.close(descriptor)
+                return None
+            os.close(descriptor)  # its holder removed it meanwhile
+
+
+def remove(directory: Path, name: str) -> None:
+    """Remove a file of the folder, if it is there."""
+    with contextlib.suppress(OSError):
+        (directory / name).unlink()
+
+
+def listen(directory: Path, name: str) -> socket.socket:
+    """Return a socket that accepts connections at a name of the folder; a socket of a dead process is replaced.
+
+    Raises:
+        ForeignFolder: Another user could enter the folder.
+        OSError: The system refuses the socket.
+    """
+    made = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    try:
+        made.setblocking(False)
+        remove(directory, name)
+        with _place(directory, name) as path:
+            made.bind(path)
+        made.listen()
+    except BaseException:
+        made.close()
+        raise
+    return made
+
+
+def connect(directory: Path, name: str) -> socket.socket:
+    """Return a connection to the process that listens at a name of the folder. Never waits.
+
+    Raises:
+        ForeignFolder: Another user could enter the folder, or listens there.
+        OSError: No process listens there.
+    """
+    made = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    try:
+        made.setblocking(False)
+        with _place(directory, name) as path:
+            made.connect(path)
+        if not is_own(made):
+            raise ForeignFolder(f"{directory / name} is the socket of another user")
+    except BaseException:
+        made.close()
+        raise
+    return made
+
+
+def is_own(connected: socket.socket) -> bool:
+    """Return whether the process at the other end belongs to this user."""
+    _pid, user, _group = _PEER.unpack(connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
+    return bool(user == os.geteuid())

@@ -1,0 +1,280 @@
+"""The writer of a board: it never waits for a reader, and each reader finds the newest whole value.
+
+A reader makes a pair of sockets and gives the writer both ends' descriptors: one to send by, and a second handle of its
+own end. By that one the writer takes back what the reader has not taken yet, so the newest value is the only one that
+waits. A reader's death ends its connection, and the system frees what waited for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import select
+import socket
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from backbone.blackboard import sealed_memory
+from backbone.blackboard.values import (
+    HEADER,
+    MOST_IN_PACKET,
+    MOST_VALUE_BYTES,
+    NoBlackboard,
+    WriterStands,
+    files_of,
+    require_short,
+)
+
+
+@dataclass(slots=True)
+class _Sent:
+    """A value as it is sent; the descriptor of its memory file is -1 if it travels in the packet."""
+
+    head: bytes
+    content: bytes = b""
+    descriptor: int = -1
+
+    @classmethod
+    def of(cls, number: int, value: bytes | memoryview) -> _Sent:
+        length = memoryview(value).nbytes
+        head = HEADER.pack(number, length)
+        return cls(head, bytes(value)) if length <= MOST_IN_PACKET else cls(head, b"", sealed_memory.sealed(value))
+
+    def send(self, way: socket.socket) -> None:
+        sealed_memory.send(way, (self.head, self.content), [self.descriptor] if self.descriptor >= 0 else [])
+
+    def close(self) -> None:
+        if self.descriptor >= 0:
+            os.close(self.descriptor)
+            self.descriptor = -1
+
+
+@dataclass(slots=True)
+class _Reader:
+    """A connected reader; before its first packet it has no sockets yet."""
+
+    connection: socket.socket
+    way: socket.socket | None = None
+    undelivered: socket.socket | None = None
+
+    def send(self, newest: _Sent) -> None:
+        """Leave the value as the only undelivered one; until it is sent, the one before it can be taken.
+
+        Raises:
+            OSError: It cannot be sent.
+        """
+        if self.way is None or self.undelivered is None:
+            return
+        is_behind = bool(sealed_memory.peek(self.undelivered, 1))
+        try:
+            newest.send(self.way)
+        except BlockingIOError:  # the one before it fills the socket
+            sealed_memory.take_back(self.undelivered, 1)
+            newest.send(self.way)
+            return
+        if is_behind and sealed_memory.take_back(self.undelivered, HEADER.size) == newest.head:
+            newest.send(self.way)  # the reader was quicker: this was the newest
+
+    def close(self) -> None:
+        for one in (self.connection, self.way, self.undelivered):
+            if one is not None:
+                one.close()
+
+
+class BlackboardWriter:
+    """The one writer of a named board. Its methods may be called from any thread.
+
+    Readers are admitted with each ``put``. To admit them between two values, too, call ``serve_in_loop`` or
+    ``serve_in_thread`` once.
+
+    Args:
+        directory: Folder of the boards; made if there is none. Only this user may be able to enter it.
+        name: A legal name.
+        most_bytes: Longest value.
+        keeps: False: without a reader nothing is kept, so a newcomer never gets an old value.
+
+    Raises:
+        WriterStands: Another writer of this name lives.
+        NoBlackboard: The system has no sealed memory files.
+        ForeignFolder: Other users can enter the folder.
+        OSError: The system refuses the files.
+    """
+
+    def __init__(self, directory: Path, name: str, *, most_bytes: int = MOST_VALUE_BYTES, keeps: bool = True) -> None:
+        if not sealed_memory.IS_POSSIBLE:
+            raise NoBlackboard("sealed memory files need Linux")
+        self._directory, self._most = directory, most_bytes
+        self.keeps = keeps
+        """False: without a reader nothing is kept; settable."""
+        self._socket_name, self._lock_name = files_of(name)
+        held = sealed_memory.lock(directory, self._lock_name)
+        if held is None:
+            raise WriterStands(f"another writer of {name} lives", name=name)
+        self._held = held
+        try:
+            self._listening = sealed_memory.listen(directory, self._socket_name)
+        except BaseException:
+            os.close(held)
+            raise
+        self._events = select.epoll()
+        self._events.register(self._listening, select.EPOLLIN)
+        self._guard = threading.RLock()
+        self._readers: dict[int, _Reader] = {}
+        self._newest: _Sent | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._is_open, self._is_served = True, False
+        self.number = 0
+        """Number of the newest value; 0: none yet."""
+
+    @property
+    def has_readers(self) -> bool:
+        """Whether a reader is connected."""
+        return any(reader.way is not None for reader in self._readers.values())
+
+    def put(self, value: bytes | memoryview) -> int:
+        """Give all readers this value, whole, in place of those that they have not taken; return its number.
+
+        Never waits for a reader. The bytes are copied once.
+
+        Raises:
+            ValueTooLong: It is longer than ``most_bytes``.
+        """
+        require_short(memoryview(value).nbytes, self._most)
+        with self._guard:
+            if not self._is_served:
+                self.serve()
+            if not self._is_open:
+                return self.number
+            self.number += 1
+            if not (self.keeps or self._readers):
+                return self.number
+            sent = _Sent.of(self.number, value)
+            self._forget()
+            self._newest = sent
+            for descriptor in tuple(self._readers):
+                self._send_to(descriptor, sent)
+        return self.number
+
+    def serve(self) -> None:
+        """Admit new readers, who get the newest value at once, and let go those that are gone. Never waits."""
+        with self._guard:
+            for descriptor, _event in self._events.poll(0) if self._is_open else ():
+                if descriptor == self._listening.fileno():
+                    self._accept()
+                elif descriptor in self._readers:
+                    self._hear(descriptor)
+            if not (self.keeps or self._readers):
+                self._forget()
+
+    def serve_in_loop(self) -> None:
+        """Call ``serve`` whenever it has something to do, in the running event loop; close the writer there."""
+        self._is_served, self._loop = True, asyncio.get_running_loop()
+        self._loop.add_reader(self._events.fileno(), self.serve)
+
+    def serve_in_thread(self) -> threading.Thread:
+        """Call ``serve`` whenever it has something to do, in a thread of its own, until the writer is closed."""
+        self._is_served = True
+
+        def run() -> None:
+            waiting = select.poll()
+            waiting.register(self._events, select.POLLIN)
+            while self._is_open:
+                if waiting.poll(_LOOK_FOR_END_MS):
+                    self.serve()
+
+        thread = threading.Thread(target=run, name="blackboard", daemon=True)
+        thread.start()
+        return thread
+
+    def close(self) -> None:
+        """Let all readers go and leave the place to another writer. Idempotent."""
+        with self._guard:
+            if not self._is_open:
+                return
+            self._is_open = False
+            if self._loop is not None:
+                self._loop.remove_reader(self._events.fileno())
+            for descriptor in tuple(self._readers):
+                self._let_go(descriptor)
+            self._forget()
+            self._listening.close()
+            self._events.close()
+            sealed_memory.remove(self._directory, self._socket_name)
+            sealed_memory.remove(self._directory, self._lock_name)
+            os.close(self._held)
+
+    def _accept(self) -> None:
+        with suppress(BlockingIOError):
+            while True:
+                connection, _ = self._listening.accept()
+                connection.setblocking(False)
+                if not sealed_memory.is_own(connection):
+                    connection.close()
+                    continue
+                self._readers[connection.fileno()] = _Reader(connection)
+                self._events.register(connection, select.EPOLLIN)
+                self._hear(connection.fileno())
+
+    def _hear(self, descriptor: int) -> None:
+        """Take the two sockets of a new reader, or notice the end of one."""
+        reader = self._readers[descriptor]
+        try:
+            _packet, came = sealed_memory.receive(reader.connection, 1)
+        except BlockingIOError:
+            return
+        except OSError:
+            came = []
+        if len(came) != 2 or reader.way is not None:
+            sealed_memory.close_all(came)
+            self._let_go(descriptor)
+            return
+        try:
+            reader.way, reader.undelivered = _as_sockets(came)
+        except OSError:
+            self._let_go(descriptor)
+            return
+        if self._newest is not None:
+            self._send_to(descriptor, self._newest)
+
+    def _send_to(self, descriptor: int, sent: _Sent) -> None:
+        try:
+            self._readers[descriptor].send(sent)
+        except BlockingIOError:
+            pass  # its socket is smaller than a packet
+        except OSError:
+            self._let_go(descriptor)
+
+    def _let_go(self, descriptor: int) -> None:
+        with suppress(OSError):
+            self._events.unregister(descriptor)
+        self._readers.pop(descriptor).close()
+
+    def _forget(self) -> None:
+        if self._newest is not None:
+            self._newest.close()
+            self._newest = None
+
+
+_LOOK_FOR_END_MS = 200  # chosen: a closed writer's thread ends within it
+
+
+def _as_sockets(descriptors: list[int]) -> tuple[socket.socket, socket.socket]:
+    """Return two sockets that own these descriptors; all are closed on an error.
+
+    Raises:
+        OSError: One is no socket.
+    """
+    made: list[socket.socket] = []
+    try:
+        for descriptor in descriptors:
+            one = socket.socket(fileno=descriptor)
+            made.append(one)
+            one.setblocking(False)
+    except OSError:
+        for one in made:
+            one.close()
+        sealed_memory.close_all(descriptors[len(made) :])
+        raise
+    return made[0], made[1]

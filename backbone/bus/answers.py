@@ -1,0 +1,42 @@
+"""What came of a question over zenoh, read: a reply, a refusal that is raised again, or no answer."""
+
+from __future__ import annotations
+
+from typing import TypeVar, cast
+
+from backbone.bus.inbox import reply_reader_of
+from backbone.errors import NoResponder, Refusal, ReplyTimeout
+from backbone.wire import MalformedMessage, Message, Refused
+
+Reply = TypeVar("Reply", bound=Message)
+
+
+class TooLate:
+    """No answer came in time."""
+
+
+Came = bytes | type[TooLate] | None
+"""The bytes of an answer; None: there is none, because the component is gone or a bug ended its answer."""
+
+
+def read_answer(came: Came, address: str, question: Message, reply: type[Reply], within_s: float) -> Reply:
+    """Return the reply in what came of a question.
+
+    Raises:
+        Refusal: The component refused.
+        NoResponder: It is gone.
+        ReplyTimeout: No answer came in time.
+        MalformedMessage: The answer is another one.
+    """
+    what = type(question).__name__
+    if came is None:
+        raise NoResponder(f"no component answered {what} at {address}")
+    if not isinstance(came, bytes):
+        raise ReplyTimeout(f"{address} did not answer {what} within {within_s:g} s")
+    try:
+        body = reply_reader_of(reply).read(came).body
+    except Refusal as unreadable:
+        raise MalformedMessage(f"{address} answered {what} with something else: {unreadable.detail}") from unreadable
+    if isinstance(body, Refused):
+        raise body.revive()
+    return cast("Reply", body)

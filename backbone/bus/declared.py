@@ -1,0 +1,62 @@
+"""What a bus on a session holds of it: declarations that it can withdraw, and answers that it waits for."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from backbone.bus.inbox import InboxBus
+from backbone.waiting import settle
+
+
+class Declared:
+    """A zenoh entity that can be withdrawn once; None if no entity was needed."""
+
+    def __init__(self, entity: Any, register: set[Declared]) -> None:
+        self._entity, self._register = entity, register
+
+    @property
+    def stands(self) -> bool:
+        """True until it is withdrawn."""
+        return self in self._register
+
+    def close(self) -> None:
+        """Withdraw the declaration."""
+        if self.stands:
+            self._register.remove(self)
+            if self._entity is not None:
+                self._entity.undeclare()
+
+
+class Both:
+    """Two zenoh entities that are withdrawn together."""
+
+    def __init__(self, first: Any, second: Any) -> None:
+        self._first, self._second = first, second
+
+    def undeclare(self) -> None:
+        """Withdraw both."""
+        self._first.undeclare()
+        self._second.undeclare()
+
+
+class FirstReply:
+    """Passes a question's first reply to the loop, or None if there was none."""
+
+    __slots__ = ("_answered", "_bus", "_replied")
+
+    def __init__(self, bus: InboxBus, answered: asyncio.Future[Any]) -> None:
+        self._bus, self._answered, self._replied = bus, answered, False
+
+    def reply(self, got: Any) -> None:
+        """Take an answer; called from another thread."""
+        self._replied = True  # exactly one component answers, so the end that follows adds nothing
+        self._bus.push(self._settle, got)
+
+    def end(self) -> None:
+        """Take the end of all answers; called from another thread."""
+        if not self._replied:
+            self._bus.push(self._settle, None)
+
+    def _settle(self, got: Any) -> None:
+        settle(self._answered, got)

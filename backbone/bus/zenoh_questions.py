@@ -1,0 +1,280 @@
+"""Direct questions: a component that is asked repeatedly is asked by publication, which is quicker than a query.
+
+A query costs a third message and an entry in the hub's table of open queries. So the answer to a query names the inbox
+of the component that gave it. From the third question on the asker publishes its questions there, and the answers are
+published to the inbox of the asker.
+
+* An inbox belongs to one life of one component. A component that begins anew has another one, and is found by a query.
+* The hub reports whether an inbox has its owner. When it loses the owner, open questions end without an answer, as
+  queries do, but ``STILL_COME_S`` later, because such a report may overtake the owner's last answer.
+* While a query to a component is open, the next question is a query, too. So no question overtakes an earlier one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import re
+import struct
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, cast
+
+import zenoh
+
+from backbone.bus.answers import Came, TooLate
+from backbone.bus.declared import FirstReply
+from backbone.bus.inbox import InboxBus
+from backbone.keys import ROOT
+from backbone.waiting import settle
+
+MOST_WAYS = 64  # chosen: a component asks few others again and again; each way is a declaration at the hub
+STILL_COME_S = (
+    0.1  # measured: one in a hundred reports of an owner's end overtakes the owner's last answer, by milliseconds
+)
+_NUMBER = struct.Struct("<Q")
+_ANSWERED, _UNANSWERED = b"\1", b"\0"
+_EXPRESS: dict[str, Any] = {  # as queries and their replies
+    "priority": zenoh.Priority.DATA,
+    "congestion_control": zenoh.CongestionControl.BLOCK,
+    "express": True,
+}
+
+log = logging.getLogger(__name__)
+
+
+class Way:
+    """The way to the inbox of one life of a component.
+
+    Args:
+        lost: Called when the inbox has lost its owner.
+    """
+
+    def __init__(self, bus: InboxBus, publisher: zenoh.Publisher, inbox: str, lost: Callable[[Way], None]) -> None:
+        self.inbox, self.publisher, self._lost = inbox, publisher, lost
+        self.waiting: dict[int, asyncio.Future[Came]] = {}
+        """Number → open question."""
+        self.is_open = False
+        """Whether the hub knows the owner of the inbox."""
+
+        def changed(status: zenoh.MatchingStatus) -> None:
+            bus.push(self._changed, bool(cast("Any", status).matching))
+
+        self._listener = publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
+
+    def close(self) -> None:
+        """Withdraw it. Questions that wait still do."""
+        self.is_open = False
+        self._listener.undeclare()  # type: ignore[no-untyped-call]
+        self.publisher.undeclare()  # type: ignore[no-untyped-call]
+
+    def _changed(self, has_owner: bool) -> None:
+        was_open, self.is_open = self.is_open, has_owner
+        if was_open and not has_owner:
+            self._lost(self)
+
+
+class Ways:
+    """The ways of one bus to those whom it asks again and again.
+
+    Args:
+        own: Address of the bus's component.
+        only_elsewhere: True: questions do not reach inboxes of the same session.
+    """
+
+    def __init__(self, bus: InboxBus, session: zenoh.Session, mission: str, own: str, *, only_elsewhere: bool) -> None:
+        self._bus, self._session, self._mission = bus, session, mission
+        self._destination = zenoh.Locality.REMOTE if only_elsewhere else zenoh.Locality.ANY
+        self.answers = _new_key(mission, own, "answers")
+        """Key of the inbox for answers."""
+        self._subscriber: zenoh.Subscriber[None] | None = None
+        self._number = 0
+        self._querying = Counter[str]()
+        self._answered_by: OrderedDict[str, str] = OrderedDict()  # address → inbox of who answered the last query
+        self._ways: OrderedDict[str, Way] = OrderedDict()
+        self._open: dict[int, Way] = {}
+
+    def way_to(self, address: str) -> Way | None:
+        """Return the way to this component, if there is one now."""
+        way = self._ways.get(address)
+        if way is None or not way.is_open or self._querying[address]:
+            return None
+        self._ways.move_to_end(address)
+        return way
+
+    async def ask(self, way: Way, payload: bytes, answered: asyncio.Future[Came], within_s: float) -> Came:
+        """Return what came of the question; None, too, if the bus is closed meanwhile."""
+        self._number += 1
+        number = self._number
+        self._open[number], way.waiting[number] = way, answered
+        late = asyncio.get_running_loop().call_later(max(0.0, within_s), settle, answered, TooLate)
+        try:
+            way.publisher.put(payload, attachment=_NUMBER.pack(number) + self.answers.encode())
+            return await answered
+        finally:
+            late.cancel()
+            del self._open[number], way.waiting[number]
+
+    @contextmanager
+    def querying(self, address: str) -> Iterator[None]:
+        """Count a query as open."""
+        self._querying[address] += 1
+        try:
+            yield
+        finally:
+            self._querying[address] -= 1
+            if not self._querying[address]:
+                del self._querying[address]
+
+    def answered(self, address: str, attached: zenoh.ZBytes | None) -> None:
+        """Note who answered a query to this address; the second answer of one life makes a way to it."""
+        inbox = b"" if attached is None or len(attached) > _LONGEST else attached.to_bytes()
+        name = inbox.decode(errors="replace")
+        if not _is_key(name, self._mission, "asked", address):
+            return
+        way = self._ways.get(address)
+        if way is not None and way.inbox == name:
+            return
+        if self._answered_by.pop(address, "") == name:
+            self._make_way(address, name)
+            return
+        self._answered_by[address] = name
+        while len(self._answered_by) > MOST_WAYS:
+            self._answered_by.popitem(last=False)
+
+    def close(self) -> None:
+        """Withdraw all."""
+        while self._ways:
+            self._ways.popitem()[1].close()
+        if self._subscriber is not None:
+            self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+            self._subscriber = None
+
+    def _make_way(self, address: str, inbox: str) -> None:
+        if self._subscriber is None:
+            self._subscriber = self._session.declare_subscriber(
+                self.answers, lambda sample: self._bus.push(self._arrived, sample)
+            )
+        if (former := self._ways.pop(address, None)) is not None:
+            self._leave(former)
+        publisher = self._session.declare_publisher(inbox, allowed_destination=self._destination, **_EXPRESS)
+        self._ways[address] = Way(self._bus, publisher, inbox, lambda way: self._lost(address, way))
+        while len(self._ways) > MOST_WAYS:
+            self._ways.popitem(last=False)[1].close()  # its questions are answered all the same
+
+    def _lost(self, address: str, way: Way) -> None:
+        if self._ways.get(address) is way:
+            del self._ways[address]
+            self._leave(way)
+
+    def _leave(self, way: Way) -> None:
+        """Close a way whose inbox has no owner; its questions end when their answers can have arrived."""
+        way.close()
+        for answered in way.waiting.values():
+            asyncio.get_running_loop().call_later(STILL_COME_S, settle, answered, None)
+
+    def _arrived(self, sample: zenoh.Sample) -> None:
+        attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        if len(attached) != _NUMBER.size + 1:
+            return
+        number = _NUMBER.unpack_from(attached)[0]
+        if (way := self._open.get(number)) is not None:
+            settle(way.waiting[number], sample.payload.to_bytes() if attached.endswith(_ANSWERED) else None)
+
+
+class DirectQuestion:
+    """A question that came to an inbox, with what its answer needs."""
+
+    def __init__(self, session: zenoh.Session, payload: zenoh.ZBytes, number: bytes, answers: str) -> None:
+        self._session, self._number, self._answers = session, number, answers
+        self.payload = payload
+        self._is_answered = False
+
+    @classmethod
+    def of(cls, session: zenoh.Session, mission: str, sample: zenoh.Sample) -> DirectQuestion | None:
+        """Return the question in a sample; None: it names no asker of this mission, who could be answered."""
+        attached = sample.attachment
+        raw = b"" if attached is None or len(attached) > _LONGEST else attached.to_bytes()
+        answers = raw[_NUMBER.size :].decode(errors="replace")
+        if not _is_key(answers, mission, "answers"):
+            log.warning("a question on %s without an inbox for its answer", sample.key_expr)
+            return None
+        return cls(session, sample.payload, raw[: _NUMBER.size], answers)
+
+    def answer(self, payload: bytes) -> None:
+        """Publish the answer."""
+        self._is_answered = True
+        self._session.put(self._answers, payload, attachment=self._number + _ANSWERED, **_EXPRESS)
+
+    def refuse(self, payload: bytes) -> None:
+        """Publish the refusal of a question that cannot be read."""
+        self.answer(payload)
+
+    def drop(self) -> None:
+        """Say that there is no answer, unless there was one."""
+        if not self._is_answered:
+            self._session.put(self._answers, b"", attachment=self._number + _UNANSWERED, **_EXPRESS)
+
+
+class Query:
+    """A question that came by a query."""
+
+    def __init__(self, query: zenoh.Query, own: str, inbox: str) -> None:
+        self._query, self._own, self._inbox = query, own, inbox
+        self.payload = query.payload
+
+    def answer(self, payload: bytes) -> None:
+        """Send the answer, and the name of the inbox for further questions."""
+        self._query.reply(self._own, payload, express=True, attachment=self._inbox)
+
+    def refuse(self, payload: bytes) -> None:
+        """Send the refusal of a question that cannot be read."""
+        self._query.reply_err(payload)
+
+    def drop(self) -> None:
+        """End the query; without an answer the asker is told that there is none."""
+        self._query.drop()  # type: ignore[no-untyped-call]
+
+
+def new_inbox(mission: str, address: str) -> str:
+    """Return the key of an inbox for one life of the component at this address."""
+    return _new_key(mission, address, "asked")
+
+
+_LONGEST = 1024  # chosen: bytes of a key
+_OWN = re.compile(r"(.+)/(\w+)/[0-9a-f]{12}")
+
+
+def _new_key(mission: str, address: str, kind: str) -> str:
+    return f"{ROOT}/{mission}/{address}/{kind}/{os.urandom(6).hex()}"
+
+
+def _is_key(name: str, mission: str, kind: str, address: str = "") -> bool:
+    """Return whether a name is that of an inbox in this mission, of any component if no address is given."""
+    found = _OWN.fullmatch(name)
+    if found is None or found[2] != kind or set(name) & set("*$#?"):
+        return False
+    root = f"{ROOT}/{mission}/"
+    return found[1] == root + address if address else found[1].startswith(root)
+
+
+async def query(
+    bus: InboxBus, session: zenoh.Session, key: str, payload: bytes, answered: asyncio.Future[Any], within_s: float
+) -> zenoh.Reply | None:
+    """Send a query, and return its first reply when it settles ``answered``; None: there was none."""
+    arrived, cancel = FirstReply(bus, answered), zenoh.CancellationToken()
+    try:
+        session.get(
+            key,
+            zenoh.handlers.Callback(arrived.reply, arrived.end, indirect=False),
+            payload=payload,
+            timeout=max(0.0, within_s),
+            express=True,
+            cancellation_token=cancel,
+        )
+        return cast("zenoh.Reply | None", await answered)
+    except asyncio.CancelledError:
+        cancel.cancel()  # type: ignore[no-untyped-call]
+        raise

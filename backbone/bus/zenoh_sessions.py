@@ -1,0 +1,90 @@
+"""Sessions of zenoh: their configuration, opening and close."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import zenoh
+
+from backbone.bus.sockets import close_without_waiting
+from backbone.bus.zenoh_settings import client_settings, hub_settings
+from backbone.errors import HubUnreachable
+
+
+def client_config(endpoint: str, secret: str = "") -> zenoh.Config:
+    """Return the configuration of a client; see ``client_settings``."""
+    return _config(client_settings(endpoint, secret))
+
+
+def hub_config(listen: list[str], connect: list[str] | None = None, *, dictionary_file: str = "") -> zenoh.Config:
+    """Return the configuration of a hub; see ``hub_settings``."""
+    return _config(hub_settings(listen, connect or [], dictionary_file))
+
+
+def _config(settings: dict[str, object]) -> zenoh.Config:
+    return zenoh.Config.from_json5(json.dumps(settings))
+
+
+def is_hub(config: zenoh.Config) -> bool:
+    """Return whether it is the configuration of a hub."""
+    return bool(json.loads(config.get_json("mode")) == "router")
+
+
+def _unreachable(config: zenoh.Config, error: zenoh.ZError) -> HubUnreachable:
+    """Return the error of a session that did not open; zenoh's own text names lines of its source."""
+    if is_hub(config):
+        return HubUnreachable(str(error))
+    return HubUnreachable(f"no hub answers at {', '.join(json.loads(config.get_json('connect/endpoints')))}")
+
+
+def open_session(config: zenoh.Config) -> zenoh.Session:
+    """Return a new session.
+
+    Raises:
+        HubUnreachable: No hub listens at the endpoint, or (for a hub) the port is taken.
+    """
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise _unreachable(config, error) from error
+
+
+async def open_when_up(config: zenoh.Config) -> zenoh.Session:
+    """Return a new session as soon as the hub listens, without blocking the event loop.
+
+    Raises:
+        HubUnreachable: The hub did not listen within ``OPEN_TIMEOUT_MS``.
+    """
+    pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="zenoh_open")
+    opening = pool.submit(zenoh.open, config)
+    pool.shutdown(wait=False)
+    try:
+        return await asyncio.shield(asyncio.wrap_future(opening))
+    except asyncio.CancelledError:
+        opening.add_done_callback(_close_unwanted)
+        raise
+    except zenoh.ZError as error:
+        raise _unreachable(config, error) from error
+
+
+def watch_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None]:
+    """Keep the close of this session's TCP links from blocking, while the result is kept."""
+
+    def changed(event: zenoh.LinkEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT and event.link.src.startswith("tcp/"):
+            close_without_waiting()
+
+    return session.info.declare_link_events_listener(zenoh.handlers.Callback(changed, indirect=False), history=True)
+
+
+async def close_session(session: zenoh.Session) -> None:
+    """Close the session; return when its threads have ended."""
+    await asyncio.get_running_loop().run_in_executor(None, session.close)
+
+
+def _close_unwanted(opening: Future[zenoh.Session]) -> None:
+    """Close a session that opened after its opener was cancelled, because an open session keeps the process alive."""
+    if opening.exception() is None:
+        opening.result().close()  # type: ignore[no-untyped-call]

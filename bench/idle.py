@@ -1,0 +1,98 @@
+"""What a mission costs while nobody asks anything of it: wake-ups and processor time, process by process.
+
+Prints one JSON line. A wake-up is a context switch of a thread that had waited (voluntary, from ``/proc``). The floor
+is a hub of zenoh and as many clients that only listen, with the settings of the mission's own processes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+from measuring import BIN, MISSION_XML, report
+
+SETTLE_S = 5.0  # chosen: the behaviors have their ARCs, and the first slices have begun
+
+
+def wake_ups(pid: int) -> int:
+    """Return how often the threads of a process have waited since they began."""
+    found = 0
+    for status in Path(f"/proc/{pid}/task").glob("*/status"):
+        lines = dict(line.split(":", 1) for line in status.read_text().splitlines())
+        found += int(lines["voluntary_ctxt_switches"])
+    return found
+
+
+def processor_s(pid: int) -> float:
+    """Return the processor time of a process, in seconds."""
+    times = psutil.Process(pid).cpu_times()
+    return times.user + times.system
+
+
+@contextmanager
+def mission_up(mission: Path) -> Iterator[psutil.Process]:
+    """Bring a mission up until the block ends; give its launcher."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
+            assert launcher.stderr is not None
+            for line in launcher.stderr:
+                if line.startswith("all ready"):
+                    break
+            else:
+                raise SystemExit("the mission did not come up")
+            try:
+                yield psutil.Process(launcher.pid)
+            finally:
+                launcher.terminate()
+                launcher.stderr.read()
+
+
+def name_of(process: psutil.Process) -> str:
+    """Return what a process is called; the zygote names each for its component."""
+    return Path(f"/proc/{process.pid}/comm").read_text().strip()
+
+
+def measured(pids: Sequence[int], seconds: float) -> dict[int, tuple[float, float]]:
+    """Return wake-ups a second and share of a core of each process over so many seconds."""
+    before = {pid: (wake_ups(pid), processor_s(pid)) for pid in pids}
+    began_s = time.monotonic()
+    time.sleep(seconds)
+    span_s = time.monotonic() - began_s
+    return {
+        pid: ((wake_ups(pid) - waited) / span_s, (processor_s(pid) - busy_s) / span_s)
+        for pid, (waited, busy_s) in before.items()
+    }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("mission", nargs="?", type=Path, default=MISSION_XML)
+    parser.add_argument("--seconds", type=float, default=10.0)
+    given = parser.parse_args()
+    with mission_up(given.mission) as launcher:
+        time.sleep(SETTLE_S)
+        names = {one.pid: name_of(one) for one in [launcher, *launcher.children(recursive=True)]}
+        found = measured(list(names), given.seconds)
+    rows = sorted(((names[pid], *figures) for pid, figures in found.items()), key=lambda row: -row[1])
+    report(
+        "idle",
+        mission=given.mission.name,
+        processes=len(found),
+        wake_ups_per_s=round(sum(wakes for _, wakes, _ in rows)),
+        core_percent=round(100 * sum(share for _, _, share in rows), 1),
+        by_process=[[name, round(wakes), round(100 * share, 2)] for name, wakes, share in rows],
+    )
+
+
+if __name__ == "__main__":
+    main()

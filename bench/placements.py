@@ -1,0 +1,247 @@
+"""Latency of a value over its size, by where its two modules are: in one unit, or in two processes of one host.
+
+``unit``: two modules of one execution unit, which hand over the object itself. ``board``: two processes, by the bus
+with a blackboard. ``network``: two processes, by the bus through the hub, without shared memory. Beside them, in the
+same run: ``socket``, a bare unix socket whose receiver reads the whole value, and ``zenoh``, bare zenoh-python through
+the same hub. Values of all ways alternate. Prints one JSON line: p50 in microseconds by size and way, and the ratio of
+the bus to the floor of its way. A value of more than 8 MiB does not go by the network.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import socket
+import struct
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+
+import uvloop
+import zenoh
+from measuring import helper, percentile, report, wait_for_end_of_input
+
+from backbone.authentication import socket_endpoint
+from backbone.bus.clock import MissionClock
+from backbone.bus.host_boards import boards_for
+from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
+from backbone.ranges import Bulk, MachineTime
+from backbone.wire import MAX_MESSAGE_BYTES, Message
+from mission_control.modules.module import Module
+from mission_control.modules.run import connected
+
+MISSION, CLOCK = "bench", MissionClock(0.0)
+SIZES = (64, 1_000, 16_000, 76_800, 921_600, 10_000_000)
+SENDER, RECEIVER = (address(Subsystem.MISSION_CONTROL, name) for name in ("sender", "receiver"))
+WARM_UP = 10  # values of each way, in which the bus finds its way
+BARE_KEY, OVER_KEY = "bare/values", "bare/over"
+HEAD = struct.Struct("<Qd")
+PAUSE_S, PAUSE_A_BYTE_S = 0.004, 3e-9  # chosen: no value waits for the one before it
+READY_S = 30.0
+
+
+class Large(Message, frozen=True):
+    """A value that says when it was made, on the clock that all processes of a machine share."""
+
+    made_s: MachineTime
+    data: Bulk
+
+
+class Source(Module):
+    """Makes a value in each round."""
+
+    class Outputs(Module.Outputs):
+        """The value."""
+
+        value: Large
+
+    data = memoryview(b"")
+
+    def update(self, _inputs: Module.Inputs) -> Outputs:
+        """Make it."""
+        return self.Outputs(Large(time.monotonic(), self.data))
+
+
+class Sink(Module):
+    """Takes values and notes how old they are."""
+
+    class Inputs(Module.Inputs):
+        """The value."""
+
+        value: Large
+
+    def reset(self) -> None:
+        """Forget."""
+        self.latencies_s: list[float] = []
+
+    def update(self, inputs: Inputs) -> Module.Outputs:
+        """Note one."""
+        self.latencies_s.append(time.monotonic() - inputs.value.made_s)
+        return self.Outputs()
+
+
+def in_one_unit(size: int, values: int) -> list[float]:
+    """Return the latencies between two modules of one unit."""
+    source, sink = Source(), Sink()
+    source.data = memoryview(bytes(size))
+    units = connected(source, sink, frequency_hz=1000.0)
+    for number in range(values):
+        units.tick(number / 1000)
+    return sink.latencies_s
+
+
+def place(way: str, size: int) -> str:
+    """Return the address of the values of a way and size."""
+    return f"{SENDER}/{way}-{size}"
+
+
+Say = Callable[[], None]
+
+
+def ways_to_say(raw: socket.socket, bare: zenoh.Session, near: ZenohBus, far: ZenohBus, size: int) -> list[Say]:
+    """Return what sends a value of this size by each way."""
+    data = bytes(size)
+    publisher = bare.declare_publisher(f"{BARE_KEY}/{size}")
+
+    def on_bus(bus: ZenohBus, way: str) -> Say:
+        at, view = place(way, size), memoryview(data)
+        return lambda: bus.publish(at, Conversation.OUTPUTS, Large(time.monotonic(), view))
+
+    ways: list[Say] = [
+        lambda: raw.sendall(HEAD.pack(size, time.monotonic()) + data),
+        lambda: publisher.put(HEAD.pack(size, time.monotonic()) + data),
+        on_bus(near, "board"),
+    ]
+    return ways if size > MAX_MESSAGE_BYTES else [*ways, on_bus(far, "network")]
+
+
+async def send(folder: str, values: int) -> None:
+    """Be the sending process."""
+    endpoint = socket_endpoint(Path(folder))
+    near = ZenohBus.open(MISSION, SENDER, CLOCK, client_config(endpoint))
+    near.boards = boards_for(folder)
+    far = ZenohBus.open(MISSION, f"{SENDER}-far", CLOCK, client_config(endpoint))
+    ready = asyncio.Event()
+    near.watch_alive(RECEIVER, lambda _address, alive: ready.set() if alive else None)
+    await asyncio.wait_for(ready.wait(), READY_S)
+    with zenoh.open(client_config(endpoint)) as bare, socket.socket(socket.AF_UNIX) as raw:
+        raw.connect(f"{folder}/raw")
+        for size in SIZES:
+            ways = ways_to_say(raw, bare, near, far, size)
+            for _ in range(values + WARM_UP):
+                for say in ways:
+                    say()
+                    await CLOCK.sleep_s(PAUSE_S + size * PAUSE_A_BYTE_S)
+        await CLOCK.sleep_s(0.5)
+        bare.put(OVER_KEY, b"", congestion_control=zenoh.CongestionControl.BLOCK)
+        await asyncio.get_running_loop().run_in_executor(None, wait_for_end_of_input)
+    await near.close()
+    await far.close()
+
+
+def be_hub(folder: str) -> None:
+    """Be the hub process."""
+    with zenoh.open(hub_config([socket_endpoint(Path(folder))])):
+        wait_for_end_of_input()
+
+
+class Latencies:
+    """How old values were when they arrived, by way and size."""
+
+    def __init__(self) -> None:
+        self.by_way: dict[str, dict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
+
+    def note(self, way: str, size: int, made_s: float) -> None:
+        """Take a value that arrives now."""
+        self.by_way[way][size].append(time.monotonic() - made_s)
+
+    def report(self, values: int) -> None:
+        """Print the line."""
+        told = {way: {size: of[WARM_UP:] for size, of in by_size.items()} for way, by_size in self.by_way.items()}
+        p50 = {
+            way: {size: percentile(of, 0.5) * 1e6 for size, of in by_size.items() if of}
+            for way, by_size in told.items()
+        }
+        report(
+            "placements",
+            values=values,
+            p50_us={way: {size: round(each, 1) for size, each in by_size.items()} for way, by_size in p50.items()},
+            arrived={
+                way: {size: round(len(of) / values, 2) for size, of in by_size.items()} for way, by_size in told.items()
+            },
+            ratio={
+                way: {size: round(each / p50[floor][size], 2) for size, each in p50[way].items() if size in p50[floor]}
+                for way, floor in (("board", "socket"), ("network", "zenoh"))
+            },
+        )
+
+
+async def measure(folder: str, values: int) -> None:
+    """Be the receiving process, and report."""
+    latencies, endpoint = Latencies(), socket_endpoint(Path(folder))
+    loop, over = asyncio.get_running_loop(), asyncio.Event()
+
+    async def read(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            while True:
+                size, made_s = HEAD.unpack(await reader.readexactly(HEAD.size))
+                await reader.readexactly(size)
+                latencies.note("socket", size, made_s)
+        except (asyncio.IncompleteReadError, asyncio.CancelledError):
+            writer.close()  # asyncio prints a stream's handler that is cancelled as a bug
+
+    def arrived(sample: zenoh.Sample) -> None:
+        latencies.note("zenoh", *HEAD.unpack_from(sample.payload.to_bytes()))
+
+    def listen(way: str, size: int) -> None:
+        bus.subscribe(
+            place(way, size),
+            Conversation.OUTPUTS,
+            Large,
+            lambda one: latencies.note(way, len(one.body.data), one.body.made_s),
+            latest=True,
+        )
+
+    server = await asyncio.start_unix_server(read, f"{folder}/raw", limit=max(SIZES))
+    bus = ZenohBus.open(MISSION, RECEIVER, CLOCK, client_config(endpoint))
+    bus.boards = boards_for(folder)
+    with zenoh.open(client_config(endpoint)) as bare:
+        for size in SIZES:
+            bare.declare_subscriber(f"{BARE_KEY}/{size}", lambda sample: loop.call_soon_threadsafe(arrived, sample))
+            listen("board", size)
+            listen("network", size)
+        bare.declare_subscriber(OVER_KEY, lambda _sample: loop.call_soon_threadsafe(over.set))
+        bus.declare_alive(RECEIVER)
+        await over.wait()
+    for size in SIZES:
+        latencies.by_way["unit"][size] = in_one_unit(size, values + WARM_UP)
+    latencies.report(values)
+    await bus.close()
+    server.close()
+
+
+def main() -> None:
+    """Run the role named first, or all of them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("role", nargs="?", default="all", choices=["all", "hub", "sender"])
+    parser.add_argument("folder", nargs="?", default="")
+    parser.add_argument("--values", type=int, default=100, help="of each size and way")
+    chosen = parser.parse_args()
+    if chosen.role == "hub":
+        be_hub(chosen.folder)
+    elif chosen.role == "sender":
+        uvloop.run(send(chosen.folder, chosen.values))
+    else:
+        with tempfile.TemporaryDirectory(prefix="s-") as folder, helper(__file__, "hub", folder):
+            while not Path(folder, "hub.sock").exists():
+                time.sleep(0.01)
+            with helper(__file__, "sender", folder, "--values", str(chosen.values)):
+                uvloop.run(measure(folder, chosen.values))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+"""Rates of execution units: what share of its rounds a unit of 1 to 200 Hz has while half of the processors are busy.
+
+``bench/unit_rates.py [--for S] [--idle] [--nice N]``. All units run at once in one process, first in its event loop and
+then each in a thread of its own, beside processes that compute. One JSON line a unit; ``share`` is the number of rounds
+by the number that the frequency asks for.
+
+Exit code 1: a unit had less than 99 % of its rounds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import msgspec
+import uvloop
+from measuring import report
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.local_bus import LocalNetwork
+from backbone.component.launch import Launch
+from backbone.naming import Subsystem
+from backbone.wire import Message
+from mission_control.modules.arrangement import UnitOrder, arranged
+from mission_control.modules.module import Module
+from mission_control.modules.orders import ModuleOrder
+from mission_control.modules.unit_component import UnitComponent
+
+RATES_HZ = (1.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+LEAST_SHARE = 0.99
+STEPS = 300  # chosen: a round of some 20 µs
+COMPUTES = "while True: pass"
+
+
+class Total(Message, frozen=True):
+    """A sum."""
+
+    value: float
+
+
+class Adding(Module):
+    """Computes a little."""
+
+    class Outputs(Module.Outputs):
+        """The sum."""
+
+        total: Total
+
+    def update(self, inputs: Module.Inputs) -> Outputs:  # noqa: ARG002
+        """Return a sum."""
+        return self.Outputs(Total(float(sum(range(STEPS)))))
+
+
+class FreeUnit(UnitComponent):
+    """A unit without a nameserver."""
+
+    registers = False
+
+
+@contextmanager
+def half_busy(processes: int) -> Iterator[None]:
+    """Keep so many processors busy."""
+    busy = [subprocess.Popen([sys.executable, "-c", COMPUTES]) for _ in range(processes)]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+async def rates(for_s: float, own_thread: bool, nice: int) -> dict[float, dict[str, float]]:
+    """Return rate → statistics of the unit that is to have it."""
+    clock, network = MissionClock.started_now(), LocalNetwork()
+    units: dict[float, FreeUnit] = {}
+    for rate_hz in RATES_HZ:
+        name = f"unit{rate_hz:.0f}"
+        module = ModuleOrder("adding", f"{__name__}:Adding", outputs={"total": f"total{rate_hz:.0f}"})
+        order = UnitOrder(name=name, frequency_hz=rate_hz, own_thread=own_thread, nice=nice, modules=[module])
+        given = msgspec.to_builtins(arranged([order], {})[name])
+        launch = Launch("bench", Subsystem.MISSION_CONTROL, name, "unit", "", "here", "", 0.0, 1.0, given)
+        units[rate_hz] = FreeUnit(launch, network.join(launch.address, clock), clock)
+    lives = [asyncio.create_task(unit.run()) for unit in units.values()]
+    await clock.sleep_s(for_s)
+    told = {rate_hz: unit.statistics() for rate_hz, unit in units.items()}
+    for unit in units.values():
+        unit.end("measured")
+    await asyncio.gather(*lives)
+    return told
+
+
+def main() -> int:
+    """Print one line for each unit, without and with a thread."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--for", dest="for_s", type=float, default=20.0, help="seconds of each half")
+    parser.add_argument("--idle", action="store_true", help="leave the processors idle")
+    parser.add_argument("--nice", type=int, default=0, help="added to the niceness of the threads")
+    given = parser.parse_args()
+    busy = 0 if given.idle else max(1, (os.cpu_count() or 1) // 2)
+    is_kept = True
+    with half_busy(busy):
+        for own_thread in (False, True):
+            nice = given.nice if own_thread else 0
+            told = uvloop.run(rates(given.for_s, own_thread, nice))
+            for rate_hz, one in told.items():
+                share = one["rounds"] / (int(given.for_s * rate_hz) or 1)
+                is_kept &= share >= LEAST_SHARE
+                late = {name: round(one[name] * 1000, 3) for name in ("mean_late_s", "most_late_s")}
+                report(
+                    "unit_rates",
+                    frequency_hz=rate_hz,
+                    own_thread=own_thread,
+                    nice=nice,
+                    busy_processes=busy,
+                    share=round(min(1.0, share), 4),
+                    missed=one["missed"],
+                    mean_late_ms=late["mean_late_s"],
+                    most_late_ms=late["most_late_s"],
+                )
+    return 0 if is_kept else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

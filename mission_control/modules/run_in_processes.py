@@ -1,0 +1,216 @@
+"""Run modules without a mission, each in a process of its own: connected by name and type over a hub of their own.
+
+The same modules that ``run`` runs in one process. The processes are forked from the script, so the script's own classes
+are there in each of them; they end with the script, whatever ends it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import multiprocessing
+import signal
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+import msgspec
+
+from backbone.authentication import socket_endpoint
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.component.launch import Launch
+from backbone.component.messages import AskStatistics, Statistics
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from backbone.waiting import settle
+from backbone.wire import Envelope, Message
+from mission_control.modules.arrangement import UnitOrder, arranged
+from mission_control.modules.graph import Graph, Member
+from mission_control.modules.module import Module, default_name
+from mission_control.modules.orders import ModuleOrder, UnitParameters, is_message, output_address
+from mission_control.modules.ports import kinds_of_ports
+from mission_control.modules.unit_component import UnitComponent
+from mission_control.modules.units_together import Listener
+
+MISSION = "modules"
+READY_WITHIN_S = 20.0  # chosen: a busy machine opens a session in a second
+END_WITHIN_S = 2.0  # chosen: a unit ends in milliseconds, unless a module computes
+ANSWERS_WITHIN_S = 2.0  # chosen: a unit answers in a millisecond, unless a module computes
+
+
+class ProcessFell(Refusal):
+    """The process of a module ended, or was not ready in time."""
+
+    code = "module.process"
+    remedy = "See what it printed."
+
+
+class _Unit(UnitComponent):
+    """A unit without a nameserver."""
+
+    registers = False
+
+
+@dataclass
+class _Child:
+    """The process of a module; it begins when it is told the endpoint, and ends when the connection is closed."""
+
+    launch: Launch
+    process: BaseProcess
+    connection: Connection
+
+
+def run_in_processes(
+    *modules: Module,
+    frequency_hz: float = 10.0,
+    for_s: float = math.inf,
+    listen: Mapping[str, Listener] | None = None,
+) -> dict[str, dict[str, float]]:
+    """Run each module in a process of its own; return module → statistics of its unit when the time is over.
+
+    A module that waits for inputs runs when they come, the others at the frequency.
+
+    Args:
+        modules: Each of another class at a module's top. The processes make them anew from class and parameters.
+        frequency_hz: Rounds a second, above 0.
+        for_s: Seconds; left out: until the process is interrupted.
+        listen: Key → function that is called in this process with each of its values.
+
+    Raises:
+        GraphRefused: They cannot be connected, or what they exchange is no message; it says everything at once.
+        ProcessFell: A process ended before the time was over.
+    """
+    units = _units(modules, frequency_hz)
+    clock = MissionClock.started_now()
+    with tempfile.TemporaryDirectory(prefix="scout-") as folder, ExitStack() as stack:
+        children: list[_Child] = []
+        for name, parameters in units.items():
+            children.append(_forked(name, parameters, clock, children))
+            stack.callback(_end, children[-1])
+        return asyncio.run(_accompany(children, socket_endpoint(Path(folder)), clock, for_s, listen or {}))
+
+
+def _units(modules: Sequence[Module], frequency_hz: float) -> dict[str, UnitParameters]:
+    """Return unit → parameters; the units of modules that take from others stand before theirs."""
+    members = [Member(default_name(type(one)), one.ports()) for one in modules]
+    order = Graph({"all": members}).order["all"]
+    apart = Graph({member.name: [member] for member in members})
+    orders = {
+        member.name: UnitOrder(
+            name=member.name,
+            frequency_hz=0.0 if apart.awaited(member.name) else frequency_hz,
+            modules=[_order(member.name, module)],
+        )
+        for member, module in zip(members, modules, strict=True)
+    }
+    return arranged([orders[name] for name in reversed(order)], {})
+
+
+def _order(name: str, module: Module) -> ModuleOrder:
+    kind = type(module)
+    return ModuleOrder(name, f"{kind.__module__}:{kind.__qualname__}", msgspec.to_builtins(module.parameters))
+
+
+# ---------------------------------------------------------------------- in the script
+def _forked(name: str, parameters: UnitParameters, clock: MissionClock, others: Sequence[_Child]) -> _Child:
+    """Fork a process that waits for the endpoint of the hub; it must be forked before the hub's threads exist."""
+    given = msgspec.to_builtins(parameters)
+    origin_s = clock.origin_monotonic_s
+    launch = Launch(MISSION, Subsystem.MISSION_CONTROL, name, "unit", "", "here", "", origin_s, 1.0, given)
+    fork = multiprocessing.get_context("fork")
+    ours, theirs = fork.Pipe()
+    inherited = [ours, *(other.connection for other in others)]
+    process = fork.Process(target=_become, args=(launch, theirs, inherited), name=name, daemon=True)
+    process.start()
+    theirs.close()
+    return _Child(launch, process, ours)
+
+
+def _end(child: _Child) -> None:
+    child.connection.close()
+    child.process.join(END_WITHIN_S)
+    child.process.kill()
+    child.process.join()
+
+
+async def _accompany(
+    children: Sequence[_Child], endpoint: str, clock: MissionClock, for_s: float, listen: Mapping[str, Listener]
+) -> dict[str, dict[str, float]]:
+    """Be the hub, and call the listeners, until the time is over."""
+    loop = asyncio.get_running_loop()
+    fell: asyncio.Future[str] = loop.create_future()
+    for child in children:
+        loop.add_reader(child.process.sentinel, settle, fell, child.process.name)
+    hub = ZenohBus.open(MISSION, "ui_console/script", clock, hub_config([endpoint]))
+    try:
+        for child in children:
+            _subscribe(hub, child.launch, listen)
+            await _begin(hub, child, endpoint, fell)
+        try:
+            async with asyncio.timeout(for_s if for_s < math.inf else None):
+                raise ProcessFell(f"the process of {await fell} ended")
+        except TimeoutError:
+            return {child.launch.name: await _statistics(hub, child.launch) for child in children}
+    finally:
+        for child in children:
+            loop.remove_reader(child.process.sentinel)
+        await hub.close()
+
+
+def _subscribe(hub: ZenohBus, launch: Launch, listen: Mapping[str, Listener]) -> None:
+    """Call the listeners of this unit's outputs."""
+    given = msgspec.convert(launch.parameters, UnitParameters)
+    for order in given.modules:
+        module = order.load()
+        kinds = kinds_of_ports(module.Outputs)
+        for key, port in order.member(module).keyed_outputs:
+            kind = kinds[port.name]
+            if key in listen and is_message(kind):
+                at, listener = output_address(launch.address, key), listen[key]
+                hub.subscribe(at, Conversation.OUTPUTS, kind, partial(_hand_on, listener))
+
+
+def _hand_on(listener: Listener, output: Envelope[Message]) -> None:
+    listener(output.body)
+
+
+async def _begin(hub: ZenohBus, child: _Child, endpoint: str, fell: asyncio.Future[str]) -> None:
+    """Let the process begin; return when it is ready, so that those that produce begin after those that take."""
+    ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+    hub.watch_alive(child.launch.address, lambda _address, alive: settle(ready, "") if alive else None)
+    child.connection.send(endpoint)
+    await asyncio.wait({ready, fell}, timeout=READY_WITHIN_S, return_when=asyncio.FIRST_COMPLETED)
+    if not ready.done():
+        raise ProcessFell(f"the process of {child.launch.name} {'ended' if fell.done() else 'was not ready in time'}")
+
+
+async def _statistics(hub: ZenohBus, launch: Launch) -> dict[str, float]:
+    return (await hub.ask(launch.address, AskStatistics(), Statistics, within_s=ANSWERS_WITHIN_S)).values
+
+
+# ---------------------------------------------------------------------- in the process of a module
+def _become(launch: Launch, connection: Connection, inherited: Sequence[Connection]) -> None:
+    """Become the unit when the endpoint comes."""
+    for one in inherited:  # else the end of the script would not close them
+        one.close()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the script ends its processes
+    try:
+        endpoint = connection.recv()
+    except EOFError:
+        return
+    asyncio.run(_live(msgspec.structs.replace(launch, endpoint=endpoint), connection))
+
+
+async def _live(launch: Launch, connection: Connection) -> None:
+    clock = MissionClock(launch.clock_origin_monotonic_s)
+    bus = await ZenohBus.open_when_up(MISSION, launch.address, clock, client_config(launch.endpoint))
+    unit = _Unit(launch, bus, clock)
+    asyncio.get_running_loop().add_reader(connection.fileno(), unit.end, "its script has ended")
+    await unit.run()

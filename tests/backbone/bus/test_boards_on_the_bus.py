@@ -1,0 +1,479 @@
+"""Large values to listeners of the same host: over a blackboard, and over the network where there is none.
+
+The laws of all publications hold for them as well (``test_bus_publications``); here is what is new.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import os
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+import pytest
+from bus_laws import ASKER, SERVER, THIRD, Heard, fail_on_bug, until_known, within
+from free_ports import free_endpoint
+
+from backbone.blackboard import sealed_memory
+from backbone.blackboard.values import MOST_IN_PACKET
+from backbone.bus import host_boards, zenoh_outlets
+from backbone.bus.clock import MissionClock
+from backbone.bus.host_boards import LARGE_BYTES, boards_for
+from backbone.bus.shared_bus import SharedSession
+from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.zenoh_outlets import MOST_PUBLISHERS
+from backbone.keys import Conversation
+from backbone.ranges import Bulk, Count
+from backbone.wire import (
+    MAX_LARGE_MESSAGE_BYTES,
+    MAX_MESSAGE_BYTES,
+    WIRE_VERSION,
+    Envelope,
+    Message,
+    OversizedMessage,
+)
+
+MISSION, CLOCK = "boards", MissionClock.started_now()
+AT, SAID = SERVER, Conversation.FRAMES
+PICTURE = 76_800
+
+
+class Map(Message, frozen=True):
+    number: Count
+    cells: Bulk
+
+
+class Sketch(Message, frozen=True):
+    number: Count
+    text: Annotated[str, msgspec.Meta(max_length=10**9)] = ""
+
+
+def picture(number: int, size: int = PICTURE) -> Map:
+    return Map(number, memoryview(bytes([number % 256]) * size))
+
+
+class Host:
+    """Buses of one host: a folder for their boards, and a hub; counts what goes by the network."""
+
+    def __init__(self, endpoint: str, directory: Path) -> None:
+        self.endpoint, self.directory = endpoint, directory
+        self.buses: list[ZenohBus] = []
+
+    def join(self, source: str, *, is_near: bool = True) -> ZenohBus:
+        bus = ZenohBus.open(MISSION, source, CLOCK, client_config(self.endpoint))
+        bus.boards = boards_for(str(self.directory)) if is_near else None
+        bus.on_bug = fail_on_bug
+        self.buses.append(bus)
+        return bus
+
+
+@asynccontextmanager
+async def host(directory: Path) -> AsyncIterator[Host]:
+    endpoint = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    made = Host(endpoint, directory)
+    try:
+        yield made
+    finally:
+        for bus in made.buses:
+            await bus.close()
+        await hub.close()
+
+
+@pytest.fixture
+def network(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return the sizes of what large conversations put to the network."""
+    sizes: list[int] = []
+
+    class Counted:
+        def __init__(self, publisher: Any) -> None:
+            self._of = publisher
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._of, name)
+
+        def put(self, raw: bytes) -> None:
+            sizes.append(len(raw))
+            self._of.put(raw)
+
+    class Outlet(zenoh_outlets.Outlet):
+        def __init__(self, key: str, publisher: Any, *others: Any) -> None:
+            super().__init__(key, Counted(publisher), *others)
+
+    monkeypatch.setattr(zenoh_outlets, "Outlet", Outlet)
+    monkeypatch.setattr(zenoh_outlets, "KNOWN_AFTER_S", 0.1)
+    return sizes
+
+
+async def until(holds: Callable[[], bool], what: str, act: Callable[[], None] = lambda: None) -> None:
+    async def wait() -> None:
+        while not holds():
+            act()
+            await asyncio.sleep(0.01)
+
+    await within(wait(), what)
+
+
+def sending(
+    bus: ZenohBus, sent: list[int], size: int = PICTURE, conversation: Conversation = SAID
+) -> Callable[[], None]:
+    """Return what publishes the next picture."""
+
+    def send() -> None:
+        sent.append(len(sent))
+        bus.publish(AT, conversation, picture(len(sent), size))
+
+    return send
+
+
+async def until_near(network: list[int], send: Callable[[], None]) -> None:
+    """Publish until nothing goes by the network any more."""
+
+    def is_near() -> bool:
+        before = len(network)
+        send()
+        return len(network) == before
+
+    await until(is_near, "pictures go by the board alone")
+
+
+async def test_pictures_leave_the_network_and_are_neither_old_nor_doubled(folder: Path, network: list[int]) -> None:
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        send = sending(sender, sent)
+        await until(lambda: len(heard.all) > 0, "the first picture", send)
+        await until_near(network, send)
+        by_network = len(network)
+        for _ in range(50):
+            send()
+            await heard.until(lambda all_: all_[-1].body.number == len(sent), "the newest picture")
+        assert len(network) == by_network
+        assert heard.numbers() == sorted(set(heard.numbers()))
+        assert all(set(np.unique(np.frombuffer(e.body.cells, np.uint8))) == {e.body.number % 256} for e in heard.all)
+        assert heard.all[-1].body.cells.readonly
+
+
+@pytest.mark.parametrize(
+    ("conversation", "size", "is_near"),
+    [
+        (Conversation.FRAMES, LARGE_BYTES, True),
+        (Conversation.VIEWS, LARGE_BYTES, True),
+        (Conversation.OUTPUTS, LARGE_BYTES, True),
+        (Conversation.OUTPUTS, LARGE_BYTES // 2, False),
+        (Conversation.EVENTS, LARGE_BYTES, False),
+    ],
+)
+async def test_only_large_values_of_large_conversations_have_a_board(
+    folder: Path, conversation: Conversation, size: int, is_near: bool
+) -> None:
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard = Heard()
+        listener.subscribe(AT, conversation, Map, heard, latest=True)
+        await until_known(listener, sender)
+        sender.publish(AT, conversation, picture(1, size))
+        await heard.until_count(1)
+        assert (folder / "board").exists() is is_near
+        await sender.close()
+        assert list((folder / "board").glob("*")) == []
+
+
+async def test_small_values_between_large_ones_come_in_order(folder: Path, network: list[int]) -> None:
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, Conversation.OUTPUTS, Map, heard, latest=True)
+        await until_known(listener, sender)
+        await until_near(network, sending(sender, sent, conversation=Conversation.OUTPUTS))
+        for size in (10, PICTURE, 10, 10, 200_000, 0):
+            sending(sender, sent, size, Conversation.OUTPUTS)()
+            await heard.until(lambda all_: all_[-1].body.number == len(sent), "the newest")
+            assert len(heard.all[-1].body.cells) == size
+        assert heard.numbers() == sorted(set(heard.numbers()))
+
+
+async def test_without_a_listener_a_picture_is_not_even_written(
+    folder: Path, network: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with host(folder) as near:
+        sender = near.join(SERVER)
+        sent: list[int] = []
+        await until_near(network, sending(sender, sent))
+        monkeypatch.setattr("backbone.bus.zenoh_bus.write", lambda *_: pytest.fail("written for nobody"))
+        sending(sender, sent)()
+        assert sender.statistics().published == len(sent)
+
+
+@pytest.mark.parametrize("how", ["far", "wildcard", "all", "overhears"])
+async def test_other_listeners_get_every_picture_by_the_network(folder: Path, network: list[int], how: str) -> None:
+    """Of another host (without the folder), by wildcard, those that want all, and those that overhear."""
+    async with host(folder) as near:
+        sender, listener, other = near.join(SERVER), near.join(ASKER), near.join(THIRD, is_near=how != "far")
+        heard, also, sent = Heard(), Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        await until_near(network, send := sending(sender, sent))
+        if how == "overhears":
+            other.overhear(SAID, also, 10**9)
+        else:
+            other.subscribe("*/*" if how == "wildcard" else AT, SAID, Map, also, latest=how != "all")
+        await until(lambda: len(also.all) > 0, "the other listener hears", send)
+        await asyncio.sleep(0.1)  # what is under way comes
+        before = len(also.all)
+        for count in range(1, 21):
+            send()
+            await heard.until(lambda all_: all_[-1].body.number == len(sent), "the newest")
+            await also.until_count(before + count)
+        assert heard.numbers() == sorted(set(heard.numbers()))
+
+
+async def test_a_second_sender_is_heard_while_the_first_goes_on(folder: Path, network: list[int]) -> None:
+    """From another host, from a system without blackboards, and on this host."""
+    async with host(folder) as near:
+        first, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, first)
+        await until_near(network, sending(first, sent))
+        (folder / "elsewhere").mkdir()
+        for source, its_folder in (
+            ("resource_pool/far", folder / "elsewhere"),  # a sender of another host has a board there
+            ("resource_pool/boardless", None),
+            ("resource_pool/near", folder),
+        ):
+            other = near.join(source)
+            other.boards = boards_for(str(its_folder)) if its_folder else None
+
+            def both(other: ZenohBus = other) -> None:
+                sending(first, sent)()
+                sending(other, sent)()
+
+            await until(lambda s=source: any(e.source == s for e in heard.all), f"{source} is heard", both)  # type: ignore[misc]
+            seen = len(heard.all)
+            await until(
+                lambda s=source, n=seen: {s, SERVER} <= {e.source for e in heard.all[n:]},
+                "both are heard",
+                both,  # type: ignore[misc]
+            )
+        for source in {e.source for e in heard.all}:
+            numbers = [e.sequence for e in heard.all if e.source == source]
+            assert numbers == sorted(set(numbers))
+
+
+async def test_a_replay_is_heard_beside_a_board(folder: Path, network: list[int]) -> None:
+    async with host(folder) as near:
+        sender, listener, player = near.join(SERVER), near.join(ASKER), near.join(THIRD)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        await until_near(network, send := sending(sender, sent))
+        recorded = Envelope(WIRE_VERSION, "resource_pool/then", 5, 1.0, "", picture(77))
+
+        def play() -> None:
+            player.pass_on(AT, SAID, recorded)
+            send()
+
+        await until(lambda: any(e.source == recorded.source for e in heard.all), "the replay is heard", play)
+
+
+async def test_a_sender_that_ends_and_begins_anew_is_heard_again(folder: Path, network: list[int]) -> None:
+    async with host(folder) as near:
+        listener = near.join(ASKER)
+        heard = Heard()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        for _life in range(3):
+            sender, sent = near.join(SERVER), list[int]()
+            await until_known(listener, sender)
+            before = len(heard.all)
+            await until(lambda n=before: len(heard.all) > n, "it is heard", sending(sender, sent))  # type: ignore[misc]
+            await until_near(network, sending(sender, sent))
+            lives = [e.sequence for e in heard.all[before:]]
+            assert lives == sorted(set(lives))
+            await sender.close()
+
+
+async def test_a_withdrawn_subscription_leaves_the_board(folder: Path, network: list[int]) -> None:
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        hearing = listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        await until_near(network, send := sending(sender, sent))
+        before = len(os.listdir("/proc/self/fd"))
+        hearing.close()
+        hearing.close()
+        count = len(heard.all)
+        for _ in range(3):
+            send()
+            await asyncio.sleep(0.02)
+        assert len(heard.all) == count
+        assert len(os.listdir("/proc/self/fd")) < before
+
+
+async def test_a_large_output_reaches_this_host_and_a_longer_one_is_refused(folder: Path) -> None:
+    size = 3 * MAX_MESSAGE_BYTES
+    async with host(folder) as near:
+        sender, listener, far = near.join(SERVER), near.join(ASKER), near.join(THIRD, is_near=False)
+        heard = Heard()
+        listener.subscribe(AT, Conversation.OUTPUTS, Map, heard, latest=True)
+        await until_known(listener, sender)
+        sender.publish(AT, Conversation.OUTPUTS, picture(7, size))  # too long for the network, and yet the first
+        await heard.until_count(1)
+        assert bytes(heard.all[0].body.cells) == bytes([7]) * size
+        with pytest.raises(OversizedMessage, match="Sketch"):
+            sender.publish(AT, Conversation.OUTPUTS, Sketch(1, "x" * MAX_LARGE_MESSAGE_BYTES))
+        with pytest.raises(OversizedMessage):
+            far.publish(AT, Conversation.OUTPUTS, picture(8, size))
+        with pytest.raises(OversizedMessage):
+            sender.publish(AT, Conversation.EVENTS, picture(8, size))
+
+
+@pytest.mark.parametrize("at", ["sealed", "mapped"])
+async def test_without_memory_or_descriptors_pictures_go_by_the_network(
+    folder: Path, network: list[int], monkeypatch: pytest.MonkeyPatch, at: str
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        send = sending(sender, sent, 2 * MOST_IN_PACKET)
+        await until_near(network, send)
+        with monkeypatch.context() as patched:
+            patched.setattr(sealed_memory, at, refuse)
+            send()
+            count = len(heard.all)
+            await until(lambda: len(heard.all) > count + 5, "they are heard", send)
+        await asyncio.sleep(host_boards.LOOK_EACH_S)
+        await until_near(network, send)
+        assert heard.numbers() == sorted(set(heard.numbers()))
+
+
+async def test_an_unreadable_value_on_a_board_is_counted_and_skipped(folder: Path, network: list[int]) -> None:
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        await until_near(network, send := sending(sender, sent))
+        sender.publish(AT, SAID, Sketch(1, "x" * PICTURE))
+        await until(lambda: listener.statistics().unreadable == 1, "it is counted")
+        send()
+        await heard.until(lambda all_: all_[-1].body.number == len(sent), "the next picture")
+
+
+async def test_neighbors_get_the_object_and_other_processes_the_board(folder: Path, network: list[int]) -> None:
+    endpoint = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    here, there = (SharedSession(MISSION, endpoint, "", str(folder)) for _ in range(2))
+    sender, neighbor, stranger = here.join(SERVER, CLOCK), here.join(THIRD, CLOCK), there.join(ASKER, CLOCK)
+    close, far, sent = Heard(), Heard(), list[int]()
+    neighbor.subscribe(AT, SAID, Map, close, latest=True)
+    stranger.subscribe(AT, SAID, Map, far, latest=True)
+    await until_known(stranger, sender)
+    await until(lambda: len(far.all) > 0, "the stranger hears", sending(sender, sent))
+    await until_near(network, sending(sender, sent))
+    shown = picture(len(sent) + 1)
+    sender.publish(AT, SAID, shown)
+    await close.until(lambda all_: all_[-1].body.number == shown.number, "the neighbor hears")
+    await far.until(lambda all_: all_[-1].body.number == shown.number, "the stranger hears")
+    assert close.all[-1].body is shown
+    for heard in (close, far):
+        assert heard.numbers() == sorted(set(heard.numbers()))
+    for bus in (sender, neighbor, stranger):
+        await bus.close()
+    for session in (here, there):
+        await session.close()
+    await hub.close()
+    assert list((folder / "board").iterdir()) == []
+
+
+async def test_a_lost_board_sends_the_listener_to_the_network_at_once(folder: Path, network: list[int]) -> None:
+    """The board alone is lost, such as with a folder that somebody removed; its sender goes on."""
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        await until_near(network, send := sending(sender, sent))
+        sender._outlet(AT, SAID).board.close()  # type: ignore[union-attr]  # noqa: SLF001
+        count = len(heard.all)
+        await until(lambda: len(heard.all) > count, "it is heard again", send)
+        await until_near(network, send)
+        assert heard.numbers() == sorted(set(heard.numbers()))
+
+
+async def test_who_publishes_under_ever_new_addresses_does_not_collect_boards(folder: Path) -> None:
+    """As a framegrabber does for each ARC that holds it."""
+    async with host(folder) as near:
+        sender = near.join(SERVER)
+        for number in range(MOST_PUBLISHERS + 20):
+            sender.publish(f"resource_pool/arc-{number}", SAID, picture(number))
+        files = list((folder / "board").iterdir())
+        assert len(files) <= 2 * MOST_PUBLISHERS
+        await sender.close()
+        assert list((folder / "board").iterdir()) == []
+
+
+async def test_a_member_that_moved_to_another_process_is_heard_there(folder: Path, network: list[int]) -> None:
+    endpoint = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    here, there = (SharedSession(MISSION, endpoint, "", str(folder)) for _ in range(2))
+    listener, other = here.join(ASKER, CLOCK), there.join(THIRD, CLOCK)
+    heard, sent = Heard(), list[int]()
+    listener.subscribe(AT, SAID, Map, heard, latest=True)
+    for session in (here, there, here):
+        sender = session.join(SERVER, CLOCK)
+
+        def both(sender: Any = sender) -> None:
+            sending(other, sent)()
+            sending(sender, sent)()
+
+        before = len(heard.all)
+        await until(
+            lambda n=before: {SERVER, THIRD} <= {e.source for e in heard.all[n:]},  # type: ignore[misc]
+            "both are heard",
+            both,
+        )
+        await sender.close()
+    for bus in (listener, other):
+        await bus.close()
+    for session in (here, there):
+        await session.close()
+    await hub.close()
+
+
+async def test_pictures_go_on_while_there_is_no_hub(folder: Path, network: list[int]) -> None:
+    endpoint = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    near = Host(endpoint, folder)
+    sender, listener = near.join(SERVER), near.join(ASKER)
+    heard, sent, links = Heard(), list[int](), Heard()
+    listener.watch_link(links)
+    listener.subscribe(AT, SAID, Map, heard, latest=True)
+    await until_known(listener, sender)
+    await until_near(network, send := sending(sender, sent))
+    await hub.close()
+    await links.until(lambda all_: all_[-1] is False, "the link is lost")
+    for _ in range(20):
+        send()
+        await heard.until(lambda all_: all_[-1].body.number == len(sent), "the newest picture without a hub")
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
+    await links.until(lambda all_: all_[-1] is True, "the link is back")
+    await until_near(network, send)
+    count = len(heard.all)
+    await until(lambda: len(heard.all) > count + 5, "pictures go on", send)
+    assert heard.numbers() == sorted(set(heard.numbers()))
+    for bus in (sender, listener, hub):
+        await bus.close()

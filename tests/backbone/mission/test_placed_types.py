@@ -1,0 +1,27 @@
+"""Which types a mission places, and how often."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import msgspec
+
+from backbone.creator.preload import preloaded_modules
+from backbone.mission.reader import read_mission
+
+
+def test_all_nodes_of_the_tree_are_counted_and_what_stands_twice_is_preloaded() -> None:
+    mission = read_mission(Path(__file__).parents[3] / "mission.xml")
+    counts = Counter(mission.placed_types())
+    assert (counts["surveillance"], counts["watch_for_motion"]) == (1, 2)
+    found = preloaded_modules(mission.types, mission.placed_types())
+    assert "mission_control.behaviors.watch_for_motion" in found
+    assert "mission_control.behaviors.surveillance" not in found
+
+
+def test_code_of_ones_own_is_read_anew_at_each_start() -> None:
+    mission = read_mission(Path(__file__).parents[3] / "mission.xml")
+    [shipped] = [one for one in mission.types if one.name == "watch_for_motion"]
+    own = msgspec.structs.replace(shipped, class_path="lab:Watch")
+    assert preloaded_modules([own], ["watch_for_motion"] * 2) == []

@@ -1,0 +1,186 @@
+"""A unit in a thread of its own, on the machine's time: what it delays, what it hands over, and where it runs."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections.abc import AsyncIterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Any
+
+import msgspec
+import pytest
+from sample_modules import Number
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
+from backbone.component.launch import Launch
+from backbone.component.messages import AskStatistics, Statistics
+from backbone.debug_views import ListViews, Views
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
+from mission_control.modules.module import Module
+from mission_control.modules.orders import ModuleOrder, Source, UnitParameters
+from mission_control.modules.os_threads import ThreadRefused, place_thread
+from mission_control.modules.unit_component import UnitComponent
+
+TESTER = "ui_console/tester"
+WITHIN_S = 20.0
+NUMBERS = {"number": GivenKey("sample_modules:Number", Source(TESTER, Conversation.EVENTS))}
+OPEN, BEGUN = threading.Event(), threading.Event()
+
+
+class Passing(Module):
+    """Hands each number on when the gate is open; a negative one is a bug."""
+
+    class Inputs(Module.Inputs):
+        number: Number
+
+    class Outputs(Module.Outputs):
+        same: Number
+
+    def update(self, inputs: Inputs) -> Outputs:
+        assert threading.current_thread() is not threading.main_thread()
+        BEGUN.set()
+        assert OPEN.wait(WITHIN_S)
+        if inputs.number.value < 0:
+            raise ArithmeticError("negative")
+        self.debug.value("passed", inputs.number.value)
+        return self.Outputs(inputs.number)
+
+
+class Behind(Passing):
+    """A second such module, in another unit."""
+
+    class Inputs(Module.Inputs):
+        same: Number
+
+    class Outputs(Module.Outputs):
+        end: Number
+
+    def update(self, inputs: Inputs) -> Outputs:
+        return self.Outputs(inputs.same)
+
+
+ORDERS = [
+    UnitOrder(name="one", modules=[ModuleOrder("passing", f"{__name__}:Passing")], own_thread=True),
+    UnitOrder(name="two", modules=[ModuleOrder("behind", f"{__name__}:Behind")], own_thread=True, nice=1),
+]
+
+
+@asynccontextmanager
+async def running(local_mission: Any, beside: Any, units: Mapping[str, UnitParameters]) -> AsyncIterator[Bus]:
+    """Give a bus beside these units, all in this process."""
+    clock = MissionClock.started_now()
+    async with AsyncExitStack() as stack:
+        network = await stack.enter_async_context(local_mission(clock=clock))
+        for name, parameters in units.items():
+            given = msgspec.to_builtins(parameters)
+            launch = Launch("local", Subsystem.MISSION_CONTROL, name, "unit", "", "local", "", 0.0, 1.0, given)
+            await stack.enter_async_context(beside(UnitComponent(launch, network.join(launch.address, clock), clock)))
+        bus = network.join(TESTER, clock)
+        stack.push_async_callback(bus.close)
+        yield bus
+
+
+@asynccontextmanager
+async def units(
+    local_mission: Any, beside: Any, orders: Sequence[UnitOrder] = ORDERS
+) -> AsyncIterator[tuple[Bus, asyncio.Queue[Number]]]:
+    """Give a bus and what comes out at the end, beside the units."""
+    OPEN.set()
+    heard: asyncio.Queue[Number] = asyncio.Queue()
+    async with running(local_mission, beside, arranged(orders, NUMBERS)) as bus:
+        bus.subscribe("mission_control/*/end", Conversation.OUTPUTS, Number, lambda one: heard.put_nowait(one.body))
+        yield bus, heard
+
+
+async def test_values_go_from_thread_to_thread_as_the_objects_themselves_and_in_order(
+    local_mission: Any, beside: Any
+) -> None:
+    async with units(local_mission, beside) as (bus, heard), asyncio.timeout(WITHIN_S):
+        for value in range(50):
+            sent = Number(float(value))
+            bus.publish(TESTER, Conversation.EVENTS, sent)
+            assert (await heard.get()) is sent
+        told = (await bus.ask("mission_control/one", AskStatistics(), Statistics, within_s=WITHIN_S)).values
+        assert told["rounds"] == 50
+
+
+async def test_a_long_round_delays_no_answer_and_only_the_newest_value_waits_for_its_end(
+    local_mission: Any, beside: Any
+) -> None:
+    async with units(local_mission, beside) as (bus, heard), asyncio.timeout(WITHIN_S):
+        OPEN.clear()
+        BEGUN.clear()
+        bus.publish(TESTER, Conversation.EVENTS, Number(1.0))
+        await asyncio.to_thread(BEGUN.wait, WITHIN_S)
+        for value in (2.0, 3.0, 4.0):  # the first round still runs, and the unit answers in between
+            bus.publish(TESTER, Conversation.EVENTS, Number(value))
+            assert (await _statistics(bus))["passing_runs"] == 0
+        OPEN.set()
+        assert [(await heard.get()).value, (await heard.get()).value] == [1.0, 4.0]
+        assert (await _statistics(bus))["overwritten_number"] == 2
+        listed = await bus.ask("mission_control/one", ListViews(), Views, within_s=WITHIN_S)
+        assert [(one.view, one.value) for one in listed.views] == [("passing-passed", 4.0)]
+
+
+async def _statistics(bus: Bus) -> dict[str, float]:
+    return (await bus.ask("mission_control/one", AskStatistics(), Statistics, within_s=WITHIN_S)).values
+
+
+async def test_a_bug_in_the_thread_ends_the_unit(local_mission: Any, beside: Any) -> None:
+    gone = asyncio.Event()
+
+    async def until_it_ends() -> None:
+        async with units(local_mission, beside) as (bus, _heard), asyncio.timeout(WITHIN_S):
+            bus.watch_alive("mission_control/one", lambda _address, alive: None if alive else gone.set())
+            bus.publish(TESTER, Conversation.EVENTS, Number(-1.0))
+            await gone.wait()
+
+    with pytest.raises(ArithmeticError):
+        await until_it_ends()
+
+
+async def test_a_unit_runs_where_and_as_urgently_as_it_was_told(local_mission: Any, beside: Any) -> None:
+    there = min(os.sched_getaffinity(0))
+    [order, _] = ORDERS
+    placed = msgspec.structs.replace(order, name="one", nice=2, cpus=[there])
+    async with units(local_mission, beside, [placed]) as (bus, _heard):
+        told = await _statistics(bus)
+    assert told["thread_nice"] == min(19, os.getpriority(os.PRIO_PROCESS, 0) + 2)
+    assert told["thread_processors"] == 1
+    assert os.sched_getaffinity(0) >= {there}
+
+
+async def test_a_unit_that_cannot_have_its_processor_says_so_at_its_start(local_mission: Any, beside: Any) -> None:
+    [order, _] = ORDERS
+    with pytest.raises(ThreadRefused, match="processor 4095"):
+        async with units(local_mission, beside, [msgspec.structs.replace(order, cpus=[4095])]):
+            pass
+
+
+def test_only_its_thread_is_placed_and_a_priority_that_the_user_may_not_have_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def forbidden(_which: int, _who: int, _nice: int) -> None:
+        raise PermissionError
+
+    before = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+    with ThreadPoolExecutor(1) as pool:
+        placed = pool.submit(place_thread, 1, ()).result()
+        assert placed.id != threading.get_native_id()
+        assert placed.nice == min(19, before + 1)
+        monkeypatch.setattr(os, "setpriority", forbidden)
+        with pytest.raises(ThreadRefused, match="niceness") as refused:
+            pool.submit(place_thread, -5, ()).result()
+    assert "CAP_SYS_NICE" in refused.value.remedy
+    assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) == before
+
+
+def test_niceness_needs_a_thread() -> None:
+    with pytest.raises(msgspec.ValidationError, match="a thread of its own"):
+        msgspec.convert({"name": "one", "nice": 1, "modules": []}, UnitOrder)

@@ -1,0 +1,97 @@
+"""Modules in processes of their own, without a mission: a script of thirty lines, what falls, and how it ends."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+from mission_control.modules.graph import GraphRefused
+from mission_control.modules.run_in_processes import run_in_processes
+
+pytestmark = pytest.mark.processes
+
+TOP = Path(__file__).parents[2]
+EXAMPLES = TOP / "docs/examples"
+WITHIN_S = 60.0
+SCRIPT = """
+import os, sys
+from pair import Height, Smoothing, Wave
+from mission_control.modules.module import Module
+from mission_control.modules.run_in_processes import run_in_processes
+
+class Falling(Module):
+    class Inputs(Module.Inputs):
+        smooth: Height
+    class Outputs(Module.Outputs):
+        pid: Height
+    def update(self, inputs):
+        if {falls}:
+            os._exit(7)
+        return self.Outputs(Height(float(os.getpid())))
+
+pids = []
+heard = {{"pid": lambda one: pids.append(one.height_m), "wave": lambda one: print("wave", flush=True)}}
+modules = Falling(), Wave(), Smoothing(Smoothing.Parameters(weight=0.5))
+told = run_in_processes(*modules, frequency_hz=50, for_s={for_s}, listen=heard)
+print(len({{os.getpid(), *pids}}), sorted(told), told["smoothing"]["smoothing_runs"] > 3)
+"""
+
+
+def script(*, falls: bool = False, for_s: str = "0.5") -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", SCRIPT.format(falls=falls, for_s=for_s)],
+        cwd=TOP,
+        env={"PYTHONPATH": str(EXAMPLES)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_the_pair_in_two_processes_says_what_it_says_in_one() -> None:
+    text = (EXAMPLES / "pair_in_processes.py").read_text().replace("for_s=2", "for_s=0.5")
+    done = subprocess.run(
+        [sys.executable, "-c", text],
+        env={"PYTHONPATH": str(EXAMPLES)},
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=TOP,
+    )
+    assert done.stdout.splitlines()[:2] == ["Height(height_m=0.25)", "Height(height_m=0.6875)"]
+    assert not done.stderr
+
+
+def test_modules_of_the_script_itself_run_elsewhere_and_its_statistics_come_back() -> None:
+    said, complaint = script().communicate(timeout=WITHIN_S)
+    assert said.splitlines()[-1:] == ["2 ['falling', 'smoothing', 'wave'] True"], complaint
+
+
+def test_a_process_that_falls_ends_the_run_with_its_name() -> None:
+    with script(falls=True, for_s="60") as running:
+        _said, complaint = running.communicate(timeout=WITHIN_S)
+    assert running.returncode == 1
+    assert "ProcessFell: the process of falling ended" in complaint
+
+
+def test_the_processes_end_with_a_script_that_is_killed() -> None:
+    with script(for_s="60") as running:
+        assert running.stdout is not None
+        assert running.stdout.readline() == "wave\n"
+        children = psutil.Process(running.pid).children(recursive=True)
+        assert len(children) == 3
+        running.kill()
+        _gone, left = psutil.wait_procs(children, timeout=WITHIN_S)
+        assert not left
+
+
+def test_what_cannot_be_connected_starts_no_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(EXAMPLES)
+    import pair
+
+    with pytest.raises(GraphRefused, match="smoothing needs wave"):
+        run_in_processes(pair.Smoothing())
