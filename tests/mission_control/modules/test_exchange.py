@@ -299,3 +299,12 @@ def test_a_reset_ends_an_exchange() -> None:
     assert exchange.cause == "its unit began anew"
     unit.put("number", Number(1.0))
     assert [value for _key, value in unit.run(0.0)] == [("old", 1, 1.0)]
+
+
+def test_the_new_one_does_not_get_what_the_old_one_has_had() -> None:
+    unit, new, exchange = unit_of(Tally()), Tally(), begun()
+    unit.put("number", Number(1.0))
+    unit.run(0.0)
+    unit.exchange(WantedExchange(GRAPH, "tally", new, exchange, lambda _outputs: None))
+    assert unit.run(0.1) == []
+    assert (new.runs, new.state.got) == (0, [1.0]), "the state was handed over, and no input"
