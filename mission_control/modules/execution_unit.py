@@ -248,6 +248,7 @@ class ExecutionUnit:
             for key, value in (self._turned(seat, now_s) or {}).items():
                 self._slots[key].put(value)
                 produced.append(Produced(key, value))
+        self._settle(now_s)
         return produced
 
     def _turned(self, seat: _Seat, now_s: float) -> Mapping[str, object] | None:

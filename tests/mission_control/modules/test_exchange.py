@@ -308,3 +308,13 @@ def test_the_new_one_does_not_get_what_the_old_one_has_had() -> None:
     unit.exchange(WantedExchange(GRAPH, "tally", new, exchange, lambda _outputs: None))
     assert unit.run(0.1) == []
     assert (new.runs, new.state.got) == (0, [1.0]), "the state was handed over, and no input"
+
+
+def test_an_exchange_overwrites_no_value() -> None:
+    unit, new, exchange = unit_of(Tally()), Tally(), begun(prove_s=0.2)
+    unit.exchange(WantedExchange(GRAPH, "tally", new, exchange, lambda _outputs: None))
+    for number in range(10):
+        unit.put("number", Number(float(number)))
+        unit.run(number * ROUND_S)
+    assert exchange.phase is Phase.PROVED
+    assert unit.statistics().overwritten == {}
