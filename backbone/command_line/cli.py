@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
+from backbone.command_line.module_commands import swap
 from backbone.command_line.options import (
     AsJson,
     CommandTable,
@@ -365,6 +366,7 @@ def set_(
     run(lambda: print_attributes(where, name, parameter, as_json=as_json))
 
 
+app.command()(swap)
 app.add_typer(tree, name="tree")
 app.add_typer(record, name="record")
 app.add_typer(recording, name="recording")

@@ -42,6 +42,7 @@ class OperatorAction(StrEnum):
     STOP_COMPONENT = "stop_component"
     CHANGE_TREE = "change_tree"
     INJECT = "inject"  # said something on the bus in a component's place
+    SWAP = "swap"  # asked for another class in a module's place
 
 
 _SENTENCES = {
@@ -71,6 +72,7 @@ _SENTENCES = {
     OperatorAction.STOP_COMPONENT: "{user} stopped it",
     OperatorAction.CHANGE_TREE: "{user} changes the behavior tree",
     OperatorAction.INJECT: "{user} injects a message",
+    OperatorAction.SWAP: "{user} exchanges it",
 }
 
 

@@ -30,14 +30,15 @@ class Smoothing(Module):
     class Parameters(Module.Parameters, frozen=True):
         weight: float = 0.25
 
-    parameters: Parameters
+    class State(Module.State):
+        height_m: float = 0.0
 
-    def reset(self) -> None:
-        self.height_m = 0.0
+    parameters: Parameters
+    state: State
 
     def update(self, inputs: Inputs) -> Outputs:
-        self.height_m += self.parameters.weight * (inputs.wave.height_m - self.height_m)
-        return self.Outputs(Height(self.height_m))
+        self.state.height_m += self.parameters.weight * (inputs.wave.height_m - self.state.height_m)
+        return self.Outputs(Height(self.state.height_m))
 
 
 if __name__ == "__main__":

@@ -11,13 +11,15 @@ order, if its inputs are there:
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import msgspec
 
 from backbone.errors import Refusal
+from mission_control.modules.exchange import Exchange, Phase, handed_over
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module
 from mission_control.modules.ports import Port
@@ -106,8 +108,9 @@ class _Seat:
     name: str
     module: Module
     inputs: list[_Input]
-    outputs: list[tuple[str, str, _Slot]]
+    outputs: list[tuple[str, str]]
     times: ModuleTimes = field(default_factory=ModuleTimes)
+    judge: Callable[[object], None] | None = None
 
     def taken(self) -> dict[str, object] | None:
         """Return the inputs that are there, which are seen from now on; None: the module does not run."""
@@ -121,13 +124,40 @@ class _Seat:
             one.seen = one.slot.number
         return given
 
-    def produced(self, outputs: object) -> Iterator[Produced]:
-        """Put the outputs where the others of the unit find them, and yield them."""
-        for name, key, slot in self.outputs:
-            value = getattr(outputs, name)
-            if value is not None:
-                slot.put(value)
-                yield Produced(key, value)
+    def values(self, outputs: object) -> dict[str, object]:
+        """Return key → value of what is in the outputs."""
+        if self.judge is not None:
+            self.judge(outputs)
+        return {key: value for name, key in self.outputs if (value := getattr(outputs, name)) is not None}
+
+
+@dataclass(frozen=True, slots=True)
+class WantedExchange:
+    """A module that is to take the place of another one.
+
+    Attributes:
+        graph: The unit's with the new module in place of the old one; its connections from outside are the same.
+        name: Of both modules.
+        module: The new one.
+        judge: Raises if what its ``update`` returned are no outputs.
+    """
+
+    graph: Graph
+    name: str
+    module: Module
+    exchange: Exchange
+    judge: Callable[[object], None]
+
+
+@dataclass(slots=True)
+class _Exchanging:
+    """Two seats of one name, of which the exchange says which one produces."""
+
+    exchange: Exchange
+    old: _Seat
+    new: _Seat
+    seats: list[_Seat]
+    """All seats of the unit as they were before."""
 
 
 class ExecutionUnit:
@@ -161,12 +191,15 @@ class ExecutionUnit:
         self._into, self._awaited = frozenset(graph.into(name)), graph.awaited(name)
         if not (trigger.frequency_hz or self._awaited):
             raise NeverRuns(f"unit {name} has no frequency, and no fresh input from outside begins a round")
-        self._fresh: dict[str, list[_Input]] = {key: [] for key in self._into}
-        for seat, member in ((seat, members[seat.name]) for seat in self._seats):
-            for (key, port), one in zip(member.keyed_inputs, seat.inputs, strict=True):
-                if key in self._into and not port.is_latest:
-                    self._fresh[key].append(one)
+        self._fresh = self._fresh_inputs()
+        self._exchanging: _Exchanging | None = None
+        self._wanted: WantedExchange | None = None
         self._begin(start_s)
+
+    def _fresh_inputs(self) -> dict[str, list[_Input]]:
+        """Return key from outside → the fresh inputs that take its values."""
+        every = [one for seat in self._seats for one in seat.inputs if not one.port.is_latest]
+        return {key: [one for one in every if one.slot is self._slots[key]] for key in self._into}
 
     def _begin(self, start_s: float) -> None:
         self._schedule = UnitSchedule(self._trigger, self._awaited, start_s)
@@ -174,7 +207,9 @@ class ExecutionUnit:
 
     def _seat(self, member: Member, module: Module) -> _Seat:
         inputs = [_Input(port, self._slot(key)) for key, port in member.keyed_inputs]
-        outputs = [(port.name, key, self._slot(key)) for key, port in member.keyed_outputs]
+        outputs = [(port.name, key) for key, port in member.keyed_outputs]
+        for _name, key in outputs:
+            self._slot(key)
         return _Seat(member.name, module, inputs, outputs)
 
     def _slot(self, key: str) -> _Slot:
@@ -208,17 +243,68 @@ class ExecutionUnit:
         """Have a round; return what its modules produced, in the order in which they did."""
         self._schedule.began(now_s)
         produced: list[Produced] = []
+        self._settle(now_s)
         for seat in self._seats:
-            given = seat.taken()
-            if given is not None:
-                began_s = self._stopwatch()
-                outputs = seat.module.update(seat.module.Inputs(**given))
-                seat.times = seat.times.with_run(self._stopwatch() - began_s)
-                produced += seat.produced(outputs)
+            for key, value in (self._turned(seat, now_s) or {}).items():
+                self._slots[key].put(value)
+                produced.append(Produced(key, value))
+        self._settle(now_s)
         return produced
 
+    def _turned(self, seat: _Seat, now_s: float) -> Mapping[str, object] | None:
+        """Return what comes from this place in this round; None: its inputs are not there."""
+        pair = self._exchanging
+        if pair is None or pair.old is not seat:
+            return self._turn(seat)
+        return pair.exchange.round(now_s, partial(self._turn, seat), partial(self._turn, pair.new))
+
+    def _turn(self, seat: _Seat) -> Mapping[str, object] | None:
+        given = seat.taken()
+        if given is None:
+            return None
+        began_s = self._stopwatch()
+        outputs = seat.module.update(seat.module.Inputs(**given))
+        seat.times = seat.times.with_run(self._stopwatch() - began_s)
+        return seat.values(outputs)
+
+    def exchange(self, wanted: WantedExchange) -> None:
+        """Begin the exchange with the next round; it decides which module produces until it is over."""
+        self._wanted = wanted
+
+    def _settle(self, now_s: float) -> None:
+        """End an exchange that is over, and begin one that is wanted."""
+        if self._exchanging is not None and self._exchanging.exchange.is_over:
+            self._end_exchange(self._exchanging)
+        if self._wanted is not None and self._exchanging is None:
+            wanted, self._wanted = self._wanted, None
+            self._begin_exchange(wanted, now_s)
+
+    def _begin_exchange(self, wanted: WantedExchange, now_s: float) -> None:
+        [member] = [one for one in wanted.graph.units[self.name] if one.name == wanted.name]
+        [old] = [seat for seat in self._seats if seat.name == wanted.name]
+        new, seen = self._seat(member, wanted.module), {id(one.slot): one.seen for one in old.inputs}
+        new.judge = wanted.judge
+        for one in new.inputs:
+            one.seen = seen.get(id(one.slot), one.seen)
+        self._exchanging = _Exchanging(wanted.exchange, old, new, self._seats)
+        order = wanted.graph.order[self.name]  # legal for the old one, too: the new one has its inputs, and others
+        self._seats = sorted(self._seats, key=lambda seat: order.index(seat.name))
+        wanted.exchange.begin(now_s, lambda: handed_over(old.module, new.module))
+
+    def _end_exchange(self, pair: _Exchanging) -> None:
+        self._exchanging = None
+        if pair.exchange.phase is Phase.RETURNED:
+            self._seats = pair.seats
+            return
+        pair.new.judge, pair.new.times = None, pair.old.times
+        self._seats = [pair.new if seat is pair.old else seat for seat in self._seats]
+        self._fresh = self._fresh_inputs()
+
     def reset(self, start_s: float) -> None:
-        """Begin anew: modules, inputs and statistics are as they were at first."""
+        """Begin anew: modules, inputs and statistics are as they were at first, and no exchange goes on."""
+        if self._exchanging is not None:
+            self._exchanging.exchange.fail(start_s, "its unit began anew")
+            self._end_exchange(self._exchanging)
         for slot in self._slots.values():
             slot.value, slot.number = None, 0
         for seat in self._seats:

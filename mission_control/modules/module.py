@@ -1,7 +1,7 @@
 """Module: an algorithm with declared inputs and outputs, which knows neither bus nor clock.
 
 Derive, declare ``Inputs`` and ``Outputs``, override ``update``. What a module keeps between two updates it sets in
-``reset``. A module is tried in three lines::
+``reset``, or declares as ``State``. A module is tried in three lines::
 
     averaging = Averaging(Averaging.Parameters(count=2))
     averaging.update(Averaging.Inputs(Number(1.0)))
@@ -66,6 +66,11 @@ class Module:
     class Parameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Values that a mission file can set; with defaults, or else the file must give them."""
 
+    class State(msgspec.Struct):
+        """What it keeps between two updates and hands over when it is exchanged; each field has a default."""
+
+    state: Any
+    """Derived classes with a state repeat this as ``state: State``."""
     parameters: Any
     """Derived classes with parameters repeat this as ``parameters: Parameters``."""
 
@@ -79,8 +84,17 @@ class Module:
         """Forget everything: afterwards the module is as it was when it was made.
 
         When: at the begin of its life, and before its unit begins anew. What: set every attribute that ``update``
-        changes.
+        changes. A class that declares ``State`` and keeps nothing else needs no ``reset`` of its own.
         """
+        self.state = self.State()
+
+    def is_ready(self) -> bool:
+        """Return whether its outputs are good enough to use.
+
+        When: after each update while it runs beside the module that it is to replace. Override it if the first outputs
+        after ``reset`` are poor, such as those of a running average.
+        """
+        return True
 
     def update(self, inputs: Any) -> Any:
         """Return the ``Outputs`` for these ``Inputs``.

@@ -1,6 +1,7 @@
 """The component that runs one execution unit on the bus: a thin loop around ``ExecutionUnit``; see ``unit_thread``.
 
 * another unit, or any component → it: the values of its inputs, published under the addresses that its parameters name.
+* an operator → it: the exchange of a module (``exchange``).
 * it → everybody: the outputs that its parameters name, published under ``output_address`` (conversation ``outputs``).
 
 Only the newest value of a key waits for delivery, so a slow unit never works on old ones; the values that it did not
@@ -19,6 +20,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, WrongParameter
 from backbone.component.launch import Launch
 from backbone.debug_views import ListViews, LookAt
+from backbone.exchange import SwapModule
 from backbone.keys import Conversation
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
@@ -27,9 +29,10 @@ from mission_control.modules.arrangement import judged
 from mission_control.modules.choice import Choice
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.graph import Graph
-from mission_control.modules.orders import UnitParameters, WrongModule, is_message, output_address
+from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, is_message, output_address
 from mission_control.modules.os_threads import ThreadPlace
 from mission_control.modules.ports import kinds_of_ports, type_name
+from mission_control.modules.unit_exchanges import UnitExchanges
 from mission_control.modules.unit_schedule import Trigger
 from mission_control.modules.unit_thread import LoopPublisher, UnitThread
 
@@ -47,7 +50,7 @@ class UnitComponent(Component[UnitParameters]):
     parameters_type = UnitParameters
     shares_process = False
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(UnitParameters.__struct_fields__)
-    accepts: ClassVar[Accepts | None] = ListViews | LookAt
+    accepts: ClassVar[Accepts | None] = ListViews | LookAt | SwapModule
 
     @classmethod
     def arrange(cls, question: UnitsQuestion) -> Arranged:
@@ -76,6 +79,7 @@ class UnitComponent(Component[UnitParameters]):
         self._choose()
         self._thread: UnitThread | None = None
         self._place: ThreadPlace | None = None
+        self._exchanges = UnitExchanges(self, self._modules, self._graph, lambda: self._unit, self._exchanged)
         self._missed, self._report_again_s = 0, -math.inf
 
     def _new_unit(self) -> ExecutionUnit:
@@ -104,8 +108,10 @@ class UnitComponent(Component[UnitParameters]):
                 self._run(now_s)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer who looks at debug views."""
+        """Answer who looks at debug views, and exchange a module."""
         match asked.body:
+            case SwapModule() as swap:
+                return await self._exchanges.swap(swap)
             case ListViews():
                 return self._views.listed()
             case LookAt() as look:
@@ -125,6 +131,10 @@ class UnitComponent(Component[UnitParameters]):
                 remedy="Change the mission file and start it again.",
             )
         self._choose()
+
+    def _exchanged(self, modules: list[ModuleOrder]) -> None:
+        self.parameters = msgspec.structs.replace(self.parameters, modules=modules)
+        self._as_started = msgspec.structs.replace(self._as_started, modules=modules)
 
     def _choose(self) -> None:
         choices = {one.parameters.key: one for one in self._modules.values() if isinstance(one, Choice)}

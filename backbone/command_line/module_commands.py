@@ -1,0 +1,70 @@
+"""``scout-backbone swap``: exchange a module of a mission that is up.
+
+Rules of this file: as those of ``cli``.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from backbone.command_line.options import (
+    Endpoint,
+    MissionName,
+    SecretFile,
+    chosen,
+    finite,
+    named_value,
+    run,
+)
+
+LONGEST_S = 3_600.0  # chosen: an hour; who proves longer leaves it to the next fault
+PROVE_S = 5.0  # as in exchange
+READY_WITHIN_S = 10.0  # as in exchange
+SILENT_S = 1.0  # as in exchange
+
+
+def swap(
+    module: Annotated[str, typer.Argument(metavar="MODULE", help="A module that runs.")],
+    class_path: Annotated[
+        str, typer.Argument(metavar="PACKAGE.MODULE:CLASS", help="Its new class; the file is read anew.")
+    ],
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="NAME=VALUE, value as JSON or text; repeatable. Others stay as they are."),
+    ] = None,
+    prove_s: Annotated[
+        float,
+        typer.Option(
+            "--prove", min=0.0, max=LONGEST_S, callback=finite, help="Mission seconds for which the old one is kept."
+        ),
+    ] = PROVE_S,
+    ready_within_s: Annotated[
+        float,
+        typer.Option(
+            "--ready-within", min=0.1, max=LONGEST_S, callback=finite, help="Mission seconds to become ready."
+        ),
+    ] = READY_WITHIN_S,
+    silent_s: Annotated[
+        float,
+        typer.Option(
+            "--silent",
+            min=0.0,
+            max=LONGEST_S,
+            callback=finite,
+            help="Mission seconds without an output that the old one has.",
+        ),
+    ] = SILENT_S,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Exchange a module while it runs: the old one comes back if the new one fails; 5 if it did."""
+    from backbone.command_line.swapping import swap_module
+    from backbone.exchange import SwapModule
+    from backbone.mission_log.operators import login_name
+
+    where, values = chosen(mission, connect, secret_file), dict(map(named_value, parameter or []))
+    asked = SwapModule(module, class_path, values, prove_s, ready_within_s, silent_s, login_name())
+    run(lambda: swap_module(where, asked))

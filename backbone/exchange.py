@@ -1,0 +1,72 @@
+"""Exchange of a part of a running component: the question, and its answer when the exchange is over.
+
+An operator asks the component that runs the part. It answers when the new part has proved itself, or when the old one
+has come back; a refusal has changed nothing.
+"""
+
+from __future__ import annotations
+
+from backbone.errors import Refusal
+from backbone.ranges import Count, Duration, Line, Mention, Text, Values
+from backbone.wire import Message
+
+PROVE_S = 5.0  # chosen: a person sees the outputs of some hundred rounds
+READY_WITHIN_S = 10.0  # chosen: a running average of 30 pictures at 5 pictures a second, and half of that again
+SILENT_S = 1.0  # chosen: many rounds of what robots live by, and short enough for one that is blind
+
+
+class UnknownModule(Refusal):
+    """No module has this name."""
+
+    code = "exchange.unknown"
+    remedy = "Name a module of the mission file."
+
+
+class ExchangeRunning(Refusal):
+    """An exchange in this unit is not over yet."""
+
+    code = "exchange.running"
+    remedy = "Wait until it is over; 'scout-backbone status' shows it in the line of the unit."
+
+
+class SwapModule(Message, frozen=True):
+    """Exchange a module of this unit while it runs; the answer comes when the exchange is over.
+
+    Attributes:
+        class_path: ``package.module:Class`` of the new module; its file is read anew.
+        parameters: For the new module; what is left out is as in the old one, if both have it.
+        prove_s: Mission time for which the old one is kept after the switch; 0: it is not kept.
+        ready_within_s: Mission time after which a new one that is not ready is dropped.
+        silent_s: Mission time without an output that the old one has, after which the old one comes back.
+        user: The person who asks.
+    """
+
+    module: Mention
+    class_path: Line
+    parameters: Values = {}
+    prove_s: Duration = PROVE_S
+    ready_within_s: Duration = READY_WITHIN_S
+    silent_s: Duration = SILENT_S
+    user: Mention = ""
+
+
+class Swapped(Message, frozen=True):
+    """Answer to ``SwapModule``.
+
+    Attributes:
+        is_proved: True: the new one produces. False: the old one does.
+        cause: Why the old one came back, or could not be kept; empty: the new one has proved itself.
+        keeps_state: True if the new one went on with the state of the old one.
+        warming_s: Mission time from its begin to the switch; without a switch, to the end.
+        proving_s: Mission time from the switch to the end.
+        rounds: Rounds in which the new one produced during the exchange.
+        remark: What the operator should know besides; empty: nothing.
+    """
+
+    is_proved: bool
+    cause: Text
+    keeps_state: bool
+    warming_s: Duration
+    proving_s: Duration
+    rounds: Count
+    remark: Text = ""

@@ -1,0 +1,128 @@
+"""Reading the file of a module anew, so that the code of an exchange is what stands in the file now.
+
+Rules of this file:
+
+* The file becomes another module object, so the code that runs keeps all that it refers to. ``importlib.reload`` would
+  put the new functions under the feet of the old class.
+* Python's cache of compiled files is not asked: it knows an edited file by its time in seconds and its length.
+* Classes of values (structs and enumerations at the top of the file) stay those that run, because other modules have
+  them. So they must be declared as before.
+* Only the named file is read anew, not what it imports.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.machinery
+import importlib.util
+import sys
+from enum import Enum
+from types import ModuleType
+
+import msgspec
+
+from backbone.errors import Refusal
+from mission_control.modules.exchange import UNPROVED, complaint
+from mission_control.modules.module import Module
+from mission_control.modules.orders import WrongModule, load_module_class
+from mission_control.modules.ports import type_name
+
+
+class ValuesChanged(Refusal):
+    """A file declares a class of values otherwise than the running mission."""
+
+    code = "exchange.values"
+    remedy = "Give the changed class another name, or bring the mission down and up."
+
+
+class ReadAnew:
+    """A module class whose file was read just now.
+
+    Args:
+        class_path: ``package.module:Class``.
+
+    Attributes:
+        kind: The class.
+
+    Raises:
+        WrongModule: The file cannot be read, or has no such module class.
+        ValuesChanged: It declares classes of values otherwise.
+    """
+
+    def __init__(self, class_path: str) -> None:
+        self._file = class_path.partition(":")[0]
+        self._before = sys.modules.get(self._file)
+        try:
+            if self._before is not None:
+                _read(self._file, self._before)
+            self.kind: type[Module] = load_module_class(class_path)
+        except UNPROVED as error:
+            self.undo()
+            if isinstance(error, Refusal):
+                raise
+            raise WrongModule(f"{class_path}: {complaint(error)}", class_path=class_path) from error
+
+    def undo(self) -> None:
+        """Let imports find again what they found before."""
+        if self._before is not None:
+            _place(self._file, self._before)
+        else:
+            sys.modules.pop(self._file, None)
+
+
+def _read(file: str, before: ModuleType) -> None:
+    """Put the file as it is now in the place of what was imported before."""
+    parent = sys.modules.get(file.rpartition(".")[0])
+    importlib.invalidate_caches()
+    spec = importlib.machinery.PathFinder.find_spec(file, getattr(parent, "__path__", None))
+    if spec is None or not isinstance(loader := spec.loader, importlib.machinery.SourceFileLoader):
+        raise WrongModule(f"{file} has no file that can be read anew", remedy="Name a class in a Python file.")
+    fresh = importlib.util.module_from_spec(spec)
+    code = loader.source_to_code(loader.get_data(loader.path), loader.path)
+    _place(file, fresh)
+    exec(code, fresh.__dict__)  # noqa: S102  as an import does
+    _keep_values(before, fresh)
+
+
+def _place(file: str, module: ModuleType) -> None:
+    sys.modules[file] = module
+    package, _, name = file.rpartition(".")
+    if package in sys.modules:
+        setattr(sys.modules[package], name, module)
+
+
+def _keep_values(before: ModuleType, fresh: ModuleType) -> None:
+    """Let the fresh code use the classes of values that run.
+
+    Raises:
+        ValuesChanged: They are declared otherwise.
+    """
+    changed = []
+    for name, new in vars(fresh).copy().items():
+        old = getattr(before, name, None)
+        if not (_is_of_values(new, fresh) and _is_of_values(old, before)) or old is new:
+            continue
+        if _declared(old) != _declared(new):
+            changed.append(name)
+        setattr(fresh, name, old)
+    if changed:
+        raise ValuesChanged(
+            f"{fresh.__name__} declares {', '.join(changed)} otherwise than the running mission, where others have it"
+        )
+
+
+def _is_of_values(kind: object, module: ModuleType) -> bool:
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct | Enum) and kind.__module__ == module.__name__
+
+
+def _declared(kind: object) -> object:
+    """Return what two declarations must have in common."""
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        config = kind.__struct_config__
+        fields = [
+            (one.name, one.encode_name, type_name(one.type), repr(one.default), repr(one.default_factory))
+            for one in msgspec.structs.fields(kind)
+        ]
+        return fields, config.tag, config.tag_field, config.array_like, config.frozen, config.forbid_unknown_fields
+    assert isinstance(kind, type) and issubclass(kind, Enum)  # noqa: S101, PT018  see _is_of_values
+    return [(name, repr(one.value)) for name, one in kind.__members__.items()]

@@ -1,0 +1,225 @@
+"""The exchanges of modules in one unit that runs: reads the new class, lets the unit exchange, tells how it goes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import msgspec
+
+from backbone.addresses import PLACER
+from backbone.component.component import Component
+from backbone.component.log_level import LogLevel
+from backbone.errors import LinkError, Refusal
+from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
+from backbone.naming import did_you_mean
+from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from mission_control.modules.choice import Choice
+from mission_control.modules.exchange import UNPROVED, Exchange, ExchangeRules, Phase, complaint
+from mission_control.modules.exchangeable import graph_with, judge_of, kinds_made
+from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
+from mission_control.modules.graph import Graph
+from mission_control.modules.module import UNSEEN, Module
+from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule
+from mission_control.modules.reading_anew import ReadAnew
+
+REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
+LEAST_WAIT_S = 0.01  # chosen: a round that runs in a thread when its exchange's time is over ends soon
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A module that is to take a place, and the one that has it."""
+
+    asked: SwapModule
+    before: ModuleOrder
+    old: Module
+    order: ModuleOrder
+    new: Module
+
+
+class UnitExchanges:
+    """Exchanges modules of one unit, one at a time.
+
+    Args:
+        component: That runs the unit; its parameters name the modules that run.
+        modules: Name → module; kept up to date.
+        graph: The unit's at its start.
+        unit: Returns the unit.
+        exchanged: Called with the orders of all modules that run after an exchange; they become its parameters.
+    """
+
+    def __init__(
+        self,
+        component: Component[UnitParameters],
+        modules: dict[str, Module],
+        graph: Graph,
+        unit: Callable[[], ExecutionUnit],
+        exchanged: Callable[[list[ModuleOrder]], None],
+    ) -> None:
+        self._component, self._modules, self._graph, self._unit = component, modules, graph, unit
+        self._exchanged = exchanged
+        self._kinds: dict[str, object] = {}
+        """Key → class of the values; of the start, because a file that is read anew declares the classes again."""
+        for one in component.parameters.modules:
+            self._kinds |= kinds_made(modules[one.name], one.member(modules[one.name]))
+        self._running = ""
+
+    async def swap(self, asked: SwapModule) -> Swapped:
+        """Exchange the module; return when the new one has proved itself, or the old one has come back.
+
+        Raises:
+            UnknownModule: The unit has no such module, or it is a choice.
+            ExchangeRunning: Another exchange of this unit is not over.
+            WrongModule: The class cannot be read or made.
+            ValuesChanged: Its file declares values otherwise.
+            GraphRefused: It has other ports; everything at once.
+        """
+        if asked.module not in self._modules:
+            meant = did_you_mean(asked.module, self._modules)
+            raise UnknownModule(f"{self._component.name} has no module {asked.module!r}{meant}")
+        if isinstance(self._modules[asked.module], Choice):
+            remedy = f"Choose another source: 'scout-backbone set {self._component.name} chosen …'."
+            raise UnknownModule(f"{asked.module} chooses between sources and cannot be exchanged", remedy=remedy)
+        if self._running:
+            raise ExchangeRunning(f"{self._component.name} is exchanging {self._running}")
+        self._running = asked.module
+        try:
+            return await self._swap(asked)
+        except Refusal as refusal:
+            self._tell(asked, f"is not exchanged: {refusal.detail}", LogLevel.WARNING)
+            raise
+        finally:
+            self._running = ""
+
+    async def _swap(self, asked: SwapModule) -> Swapped:
+        anew = await asyncio.to_thread(ReadAnew, asked.class_path)  # rounds go on while it imports
+        try:
+            candidate = await self._candidate(asked, anew.kind)
+            wanted, changed = self._wanted(candidate)
+        except Refusal:
+            anew.undo()
+            raise
+        by = f" for {asked.user}" if asked.user else ""
+        self._tell(asked, f"{asked.class_path} warms beside {candidate.before.class_path}{by}", LogLevel.NOTICE)
+        self._unit().exchange(wanted)
+        await self._until_over(candidate, wanted.exchange, changed)
+        if wanted.exchange.phase is Phase.RETURNED:
+            anew.undo()
+            return self._returned(candidate, wanted.exchange)
+        return await self._proved(candidate, wanted)
+
+    async def _candidate(self, asked: SwapModule, kind: type[Module]) -> _Candidate:
+        [before] = [one for one in self._component.parameters.modules if one.name == asked.module]
+        has = {one.encode_name for one in msgspec.structs.fields(kind.Parameters)}
+        kept = {name: value for name, value in before.parameters.items() if name in has}
+        ports = kind.ports()
+        order = ModuleOrder(
+            asked.module,
+            asked.class_path,
+            {**kept, **asked.parameters},
+            {name: key for name, key in before.inputs.items() if name in {one.name for one in ports.inputs}},
+            {name: key for name, key in before.outputs.items() if name in {one.name for one in ports.outputs}},
+        )
+        return _Candidate(asked, before, self._modules[asked.module], order, await asyncio.to_thread(_made, order))
+
+    def _wanted(self, candidate: _Candidate) -> tuple[WantedExchange, asyncio.Event]:
+        """Return the exchange, and an event that each change of its phase sets."""
+        asked, new = candidate.asked, candidate.new
+        member = candidate.order.member(new)
+        graph = graph_with(self._graph, self._component.name, member)
+        changed, loop = asyncio.Event(), asyncio.get_running_loop()
+        exchange = Exchange(
+            ExchangeRules(asked.prove_s, asked.ready_within_s, asked.silent_s),
+            new.is_ready,
+            lambda: _unless_closed(loop, changed),
+            self._component.clock.now_s(),
+        )
+        judge = judge_of(self._kinds, type(new), member)
+        return WantedExchange(graph, asked.module, new, exchange, judge), changed
+
+    async def _until_over(self, candidate: _Candidate, exchange: Exchange, changed: asyncio.Event) -> None:
+        clock, views = self._component.clock, candidate.old.debug
+        while not exchange.is_over:
+            left_s = max(LEAST_WAIT_S, (exchange.due_s - clock.now_s()) / clock.rate)
+            try:
+                async with asyncio.timeout(left_s):
+                    await changed.wait()
+            except TimeoutError:
+                exchange.pass_time(clock.now_s())
+            changed.clear()
+            if exchange.phase is Phase.PROVING:
+                candidate.new.debug, candidate.old.debug = views, UNSEEN
+                self._tell(candidate.asked, f"{candidate.order.class_path} produces, and has to prove itself")
+        is_new = exchange.phase is Phase.PROVED
+        candidate.new.debug, candidate.old.debug = (views, UNSEEN) if is_new else (UNSEEN, views)
+
+    def _returned(self, candidate: _Candidate, exchange: Exchange) -> Swapped:
+        old, new = candidate.before.class_path, candidate.order.class_path
+        stays = "goes on" if exchange.switched_s is None else "is back"
+        self._tell(candidate.asked, f"{old} {stays}, {new} failed: {exchange.cause}", LogLevel.WARNING)
+        is_same = old.partition(":")[0] == new.partition(":")[0]
+        remark = f"a new start of {self._component.name} reads the file as it is now" if is_same else ""
+        return _answer(exchange, self._component.clock.now_s(), remark)
+
+    async def _proved(self, candidate: _Candidate, wanted: WantedExchange) -> Swapped:
+        name, component, exchange = candidate.asked.module, self._component, wanted.exchange
+        self._modules[name], self._graph = candidate.new, wanted.graph
+        modules = [candidate.order if one.name == name else one for one in component.parameters.modules]
+        self._exchanged(modules)
+        after = f": {exchange.cause}" if exchange.cause else ""
+        state = "with the state of" if exchange.keeps_state else "from a fresh state instead of"
+        told = f"{candidate.order.class_path} goes on {state} {candidate.before.class_path}{after}"
+        self._tell(candidate.asked, told, LogLevel.NOTICE)
+        return _answer(exchange, component.clock.now_s(), await self._revised())
+
+    async def _revised(self) -> str:
+        """Have the next life of the component begin with the new class; return what an operator should know."""
+        component = self._component
+        order = ReviseStart(component.name, msgspec.to_builtins(component.parameters))
+        try:
+            await component.bus.ask(PLACER, order, StartRevised, within_s=REVISED_WITHIN_S)
+        except NotPlaced:  # started by hand
+            return ""
+        except (LinkError, Refusal) as error:
+            return f"a new start of {component.name} has the old class again: {error}"
+        return ""
+
+    def _tell(self, asked: SwapModule, what: str, level: LogLevel = LogLevel.INFO) -> None:
+        self._component.publish_event(asked.module, what, level)
+        self._component.report(f"{asked.module}: {what}")
+
+
+def _made(order: ModuleOrder) -> Module:
+    """Return the module.
+
+    Raises:
+        WrongModule: It refuses its parameters, or cannot be made.
+    """
+    try:
+        return order.load()
+    except Refusal:
+        raise
+    except UNPROVED as error:
+        raise WrongModule(f"{order.class_path} cannot be made: {complaint(error)}") from error
+
+
+def _answer(exchange: Exchange, now_s: float, remark: str) -> Swapped:
+    ended_s = now_s if exchange.ended_s is None else exchange.ended_s
+    switched_s = ended_s if exchange.switched_s is None else exchange.switched_s
+    return Swapped(
+        exchange.phase is Phase.PROVED,
+        exchange.cause,
+        exchange.keeps_state,
+        switched_s - exchange.began_s,
+        ended_s - switched_s,
+        exchange.rounds,
+        remark,
+    )
+
+
+def _unless_closed(loop: asyncio.AbstractEventLoop, changed: asyncio.Event) -> None:
+    """Set the event in its loop; a round may end after the loop."""
+    if not loop.is_closed():
+        loop.call_soon_threadsafe(changed.set)

@@ -1,0 +1,95 @@
+"""A file that is read anew: what imports find afterwards, and after an undo."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from mission_control.modules.orders import WrongModule
+from mission_control.modules.reading_anew import ReadAnew, ValuesChanged
+
+PATH = "read_anew_package.inside:One"
+SOURCE = """
+from __future__ import annotations
+from enum import Enum
+import msgspec
+from mission_control.modules.module import Module
+
+
+class Color(Enum):
+    RED = "red"
+
+
+class Spot(msgspec.Struct):
+    color: Color = Color.RED
+    sizes: list[int] = []
+
+
+class One(Module):
+    class Outputs(Module.Outputs):
+        spot: Spot
+
+    def update(self, inputs):
+        return self.Outputs(Spot(Color.RED, [EDITION]))
+
+
+EDITION = 1
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    folder = tmp_path / "read_anew_package"
+    folder.mkdir()
+    (folder / "__init__.py").write_text("")
+    (folder / "inside.py").write_text(SOURCE)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield folder / "inside.py"
+    for name in [name for name in sys.modules if name.startswith("read_anew_package")]:
+        del sys.modules[name]
+
+
+def test_what_was_never_imported_is_imported_and_after_an_undo_it_is_not(file: Path) -> None:
+    read = ReadAnew(PATH)
+    assert read.kind.__name__ == "One"
+    read.undo()
+    assert "read_anew_package.inside" not in sys.modules
+
+
+def test_an_old_class_keeps_its_code_and_the_new_one_has_its_own(file: Path) -> None:
+    old = ReadAnew(PATH).kind
+    file.write_text(SOURCE.replace("EDITION = 1", "EDITION = 2"))
+    read = ReadAnew(PATH)
+    spots = [kind().update(kind.Inputs()).spot for kind in (old, read.kind)]
+    assert [one.sizes for one in spots] == [[1], [2]]
+    assert type(spots[0]) is type(spots[1]), "classes of values stay those that run"
+    assert spots[0].color is spots[1].color
+    assert sys.modules["read_anew_package"].inside.One is read.kind
+    read.undo()
+    assert sys.modules["read_anew_package"].inside.One is old
+    assert sys.modules["read_anew_package.inside"].One is old
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "name"),
+    [
+        ('RED = "red"', 'RED = "rot"', "Color, Spot"),
+        ("sizes: list[int] = []", "sizes: list[float] = []", "Spot"),
+        ("class Spot(msgspec.Struct)", "class Spot(msgspec.Struct, frozen=True)", "Spot"),
+        ("    sizes: list[int] = []\n", "", "Spot"),
+    ],
+)
+def test_a_class_of_values_that_is_declared_otherwise_is_refused(file: Path, old: str, new: str, name: str) -> None:
+    before = ReadAnew(PATH).kind
+    file.write_text(SOURCE.replace(old, new).replace("[EDITION]", ""))
+    with pytest.raises(ValuesChanged, match=f"declares {name} otherwise"):
+        ReadAnew(PATH)
+    assert sys.modules["read_anew_package.inside"].One is before
+
+
+def test_what_has_no_file_is_refused() -> None:
+    with pytest.raises(WrongModule, match="no file that can be read anew"):
+        ReadAnew("sys:One")
