@@ -76,7 +76,7 @@ class Compatibility:
         return self._roomy[rc]
 
     def demand_changed(self, rcs: Iterable[str]) -> None:
-        """Drop the answers of ``has_room_for_all`` about these sharable RCs: other ARCs ask for them now."""
+        """Drop the answers of ``has_room_for_all`` about these RCs: other ARCs ask for them now, to share or alone."""
         for rc in rcs:
             self._roomy.pop(rc, None)
             if len(self._admitted.get(rc, ())) > SETS_REMEMBERED:

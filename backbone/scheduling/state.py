@@ -234,8 +234,8 @@ class ScheduleState:
             self.groups.add(arc, arc.uses)
         elif was_active and not arc.active:
             self.groups.remove(arc)
-        if arc.shares and arc.active is not was_active:
-            self.compatibility.demand_changed(arc.shares)
+        if arc.active is not was_active:
+            self.compatibility.demand_changed(arc.uses)
         if arc.active and not was_active:
             self.fairness.joined(arc, now_s)
 

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 import pytest
 from examples import share
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from random_missions import END_S, play, random_mission
 from simulated_switches import Bench, ask, manager, unit
@@ -59,6 +59,8 @@ class Doubled:
 
 @settings(max_examples=150, deadline=None)
 @given(seed=st.integers(0, 2**32), rules=st.sampled_from(RULES), at=st.integers(0, 120))
+@example(seed=713, rules={"exact_up_to": 2, "discipline": "time"}, at=11)  # one ARC came to want a shared RC alone
+@example(seed=10, rules={"exact_up_to": 2}, at=20)
 def test_a_copy_decides_as_the_original_does(seed: int, rules: dict[str, Any], at: int):
     bench, happens = random_mission(Random(seed), **rules)
     bench.manager = Doubled(bench.manager, at)
