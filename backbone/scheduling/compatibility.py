@@ -1,7 +1,7 @@
 """Compatibility: which ARCs can hold their RCs together (rule 1).
 
 An exclusive RC has one holder; on a sharable one every stream of every holder meets its deadline. Answers are cached;
-``demand_changed`` and ``service_changed`` drop the answers that may have changed.
+``service_changed`` drops the answers that may have changed.
 """
 
 from __future__ import annotations
@@ -23,20 +23,25 @@ class Compatibility:
     """
 
     def __init__(
-        self, rcs: Mapping[str, RcEntry], users: Mapping[str, Collection[ArcEntry]], admission: Analysis
+        self,
+        rcs: Mapping[str, RcEntry],
+        users: Mapping[str, Collection[ArcEntry]],
+        admission: Analysis,
+        roomy: dict[str, bool],
     ) -> None:
         """Begin with no answers.
 
         Args:
             users: RC → the active ARCs that use it.
             admission: Test of the demand that a sharable RC can serve.
+            roomy: RC → known answer of ``has_room_for_all``; whoever changes ``users`` drops it.
         """
         self._rcs = rcs
         self._users = users
         self.admission: Analysis = admission
         self._usable: dict[ArcEntry, bool] = {}
         self._admitted: dict[str, dict[frozenset[ArcEntry], bool]] = {}
-        self._roomy: dict[str, bool] = {}
+        self._roomy = roomy
 
     def fits(self, arc: ArcEntry, others: Iterable[ArcEntry]) -> bool:
         """Return whether the ARC can hold all its RCs together with these others."""
@@ -75,13 +80,6 @@ class Compatibility:
             self._roomy[rc] = all(rc in user.shares for user in users) and self._admissible(rc, users)
         return self._roomy[rc]
 
-    def demand_changed(self, rcs: Iterable[str]) -> None:
-        """Drop the answers of ``has_room_for_all`` about these RCs: other ARCs ask for them now, to share or alone."""
-        for rc in rcs:
-            self._roomy.pop(rc, None)
-            if len(self._admitted.get(rc, ())) > SETS_REMEMBERED:
-                del self._admitted[rc]
-
     def service_changed(self, rcs: Iterable[str]) -> None:
         """Drop all answers about these RCs: their states, capacities or their users' priorities have changed."""
         for rc in rcs:
@@ -97,6 +95,8 @@ class Compatibility:
         known = self._admitted.setdefault(rc, {})
         key = frozenset(users)
         if key not in known:
+            if len(known) >= SETS_REMEMBERED:
+                known.clear()
             known[key] = self._serves(rc, users, [user.streams[rc] for user in users])
         return known[key]
 

@@ -61,7 +61,7 @@ _VALUES: dict[str, type[Any]] = {
 _ENUMS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (requests.RequestState, Afterwards)}
 _CACHES = {
     "WholeGroupPlanner": {"_plans"},
-    "Compatibility": {"_usable", "_admitted", "_roomy"},
+    "Compatibility": {"_usable", "_admitted"},
     "TraceWriter": {"_story"},
     "Decision": {"instructions", "ended"},
 }

@@ -47,7 +47,9 @@ class ScheduleState:
         self.arcs: dict[str, ArcEntry] = {}
         self.groups: Groups[ArcEntry] = Groups(exact_up_to)
         self.users = self.groups.users
-        self.compatibility = Compatibility(self.rcs, self.users, admission)
+        self.roomy: dict[str, bool] = {}
+        """Sharable RC → whether its whole active demand fits, where this is known; see ``Compatibility``."""
+        self.compatibility = Compatibility(self.rcs, self.users, admission, self.roomy)
         self.fairness: Fairness = Turns() if discipline == "turns" else EqualTime(self.rivals, tolerance_s)
         self.now_s = 0.0
         self.version = 0
@@ -235,7 +237,8 @@ class ScheduleState:
         elif was_active and not arc.active:
             self.groups.remove(arc)
         if arc.active is not was_active:
-            self.compatibility.demand_changed(arc.uses)
+            for rc in arc.uses:
+                self.roomy.pop(rc, None)  # another ARC wants it, to share or alone, or one less
         if arc.active and not was_active:
             self.fairness.joined(arc, now_s)
 

@@ -178,9 +178,9 @@ FAULTS = [
     Planted("a successor is forgotten", "arc_events.py", "            self.requested(successor)", "            pass"),
     Planted(
         "new demand is not looked at",
-        "compatibility.py",
-        "            self._roomy.pop(rc, None)\n            if len",
-        "            if len",
+        "state.py",
+        "                self.roomy.pop(rc, None)  #",
+        "                pass  #",
     ),
     Planted(
         "blocking is not counted",
