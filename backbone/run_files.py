@@ -12,18 +12,17 @@ import tempfile
 from pathlib import Path
 
 import msgspec
-import psutil
 
 from backbone.atomic_file import replace_file
 from backbone.authentication import secret_of
 from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
+from backbone.operating_system.process_starts import started_s
 
 FILE_NAME = "run.json"
 KEPT = ".kept"  # no legal name of a mission
 ENDED = ".ended-"  # the folder of an ending mission is renamed to .<mission>.ended-<pid of the zygote that removes it>
 TRIAL_BYTES = 1 << 16  # chosen: what a mission writes until all is ready, logs included
-START_TIME_TOLERANCE_S = 2.0  # chosen: the system reports starts in hundredths and shifts them with the clock
 
 
 class RunFile(msgspec.Struct, frozen=True):
@@ -35,7 +34,7 @@ class RunFile(msgspec.Struct, frozen=True):
         clock_rate: Mission seconds per second of the machine.
         host: Name of this machine in the mission.
         source: Path of the mission file.
-        launcher_started_s: Start of the launcher's process, seconds since 1970; set by ``write``.
+        launcher_started_s: Start of the launcher's process, seconds since the machine's start; set by ``write``.
     """
 
     mission: str
@@ -157,8 +156,8 @@ def write(run_file: RunFile) -> Path:
         RunFolderUnusable: The system refused.
     """
     directory = run_directory(run_file.mission)
-    started_s = psutil.Process(run_file.launcher_pid).create_time()
-    content = msgspec.json.encode(msgspec.structs.replace(run_file, launcher_started_s=started_s))
+    began_s = started_s(run_file.launcher_pid) or 0.0
+    content = msgspec.json.encode(msgspec.structs.replace(run_file, launcher_started_s=began_s))
     path = directory / FILE_NAME
     try:
         directory.mkdir(mode=0o700, exist_ok=True)
@@ -213,7 +212,7 @@ def _remove_what_dead_zygotes_left(directory: Path) -> None:
     """Remove folders of earlier runs whose zygote was killed between hiding its folder and removing it."""
     for hidden in directory.parent.glob(f".{directory.name}{ENDED}*"):
         pid = hidden.name.rpartition(ENDED)[2]
-        if pid.isdecimal() and not psutil.pid_exists(int(pid)):
+        if pid.isdecimal() and started_s(int(pid)) is None:
             shutil.rmtree(hidden, ignore_errors=True)
 
 
@@ -253,10 +252,4 @@ def _read(path: Path) -> RunFile | None:
 
 
 def _is_fresh(run_file: RunFile) -> bool:
-    try:
-        launcher = psutil.Process(run_file.launcher_pid)
-        if launcher.status() == psutil.STATUS_ZOMBIE:
-            return False
-        return abs(launcher.create_time() - run_file.launcher_started_s) < START_TIME_TOLERANCE_S
-    except psutil.NoSuchProcess:
-        return False
+    return started_s(run_file.launcher_pid) == run_file.launcher_started_s
