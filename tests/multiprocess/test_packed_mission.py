@@ -16,7 +16,7 @@ def test_a_mission_without_a_process_in_its_file_runs_in_two_packs(tmp_path: Pat
     file = tmp_path / "mission.xml"
     file.write_text(re.sub(r' process="[a-z]+"', "", MISSION_XML.read_text()))
     with mission_up("--pack", "2", mission_xml=file) as mission:
-        mission.wait_for_watchers()
+        mission.wait_for_components("watch-scout1", "watch-scout2")
         there = [
             one for one in mission.status()["components"] if one["subsystem"] in ("resource_pool", "mission_control")
         ]
