@@ -28,7 +28,7 @@ from backbone.blackboard.values import (
 
 
 @dataclass(slots=True)
-class _Sent:
+class _Outgoing:
     """A value as it is sent; the descriptor of its memory file is -1 if it travels in the packet."""
 
     head: bytes
@@ -36,7 +36,7 @@ class _Sent:
     descriptor: int = -1
 
     @classmethod
-    def of(cls, number: int, value: bytes | memoryview) -> _Sent:
+    def of(cls, number: int, value: bytes | memoryview) -> _Outgoing:
         length = memoryview(value).nbytes
         head = HEADER.pack(number, length)
         return cls(head, bytes(value)) if length <= MOST_IN_PACKET else cls(head, b"", sealed_memory.sealed(value))
@@ -51,14 +51,14 @@ class _Sent:
 
 
 @dataclass(slots=True)
-class _Reader:
+class _ConnectedReader:
     """A connected reader; before its first packet it has no sockets yet."""
 
     connection: socket.socket
     way: socket.socket | None = None
     undelivered: socket.socket | None = None
 
-    def send(self, newest: _Sent) -> None:
+    def send(self, newest: _Outgoing) -> None:
         """Leave the value as the only undelivered one; until it is sent, the one before it can be taken.
 
         Raises:
@@ -120,8 +120,8 @@ class BlackboardWriter:
         self._events = sealed_memory.Waits()
         self._events.add(self._listening)
         self._guard = threading.RLock()
-        self._readers: dict[int, _Reader] = {}
-        self._newest: _Sent | None = None
+        self._readers: dict[int, _ConnectedReader] = {}
+        self._newest: _Outgoing | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._is_open, self._is_served = True, False
         self.number = 0
@@ -149,7 +149,7 @@ class BlackboardWriter:
             self.number += 1
             if not (self.keeps or self._readers):
                 return self.number
-            sent = _Sent.of(self.number, value)
+            sent = _Outgoing.of(self.number, value)
             self._forget()
             self._newest = sent
             for descriptor in tuple(self._readers):
@@ -210,7 +210,7 @@ class BlackboardWriter:
                 if not sealed_memory.is_own(connection):
                     connection.close()
                     continue
-                self._readers[connection.fileno()] = _Reader(connection)
+                self._readers[connection.fileno()] = _ConnectedReader(connection)
                 self._events.add(connection)
                 self._hear(connection.fileno())
 
@@ -235,7 +235,7 @@ class BlackboardWriter:
         if self._newest is not None:
             self._send_to(descriptor, self._newest)
 
-    def _send_to(self, descriptor: int, sent: _Sent) -> None:
+    def _send_to(self, descriptor: int, sent: _Outgoing) -> None:
         try:
             self._readers[descriptor].send(sent)
         except BlockingIOError:

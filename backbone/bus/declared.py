@@ -9,10 +9,10 @@ from backbone.bus.inbox import InboxBus
 from backbone.waiting import settle
 
 
-class Declared:
+class Declaration:
     """A zenoh entity that can be withdrawn once; None if no entity was needed."""
 
-    def __init__(self, entity: Any, register: set[Declared]) -> None:
+    def __init__(self, entity: Any, register: set[Declaration]) -> None:
         self._entity, self._register = entity, register
 
     @property

@@ -18,7 +18,7 @@ import zenoh
 
 from backbone.bus.answers import Came, TooLate, read_answer
 from backbone.bus.bus_base import quoted
-from backbone.bus.declared import Both, Declared, FirstReply
+from backbone.bus.declared import Both, Declaration, FirstReply
 from backbone.bus.host_boards import HostBoards, SentBoard
 from backbone.bus.host_copies import HostCopies
 from backbone.bus.inbox import (
@@ -104,7 +104,7 @@ class ZenohBus(InboxBus):
         """For large values to and from this host; settable before they are used."""
         self._session, self._is_hub, self._shared = session, is_hub, shared
         self._links = None if shared else watch_links(session)
-        self._declared: set[Declared] = set()
+        self._declared: set[Declaration] = set()
         self._outlets = Outlets(session, mission, source, only_elsewhere=shared)
         self.ways = Ways(self, session, mission, source, only_elsewhere=shared)
         """To whom it asks again and again."""
@@ -349,7 +349,7 @@ class ZenohBus(InboxBus):
         at_once = zenoh.handlers.Callback(heard, indirect=False)
         return self._declare(self._session.liveliness().declare_subscriber(pattern, at_once, history=True))
 
-    def watch_link(self, listener: LinkListener) -> Declared:
+    def watch_link(self, listener: LinkListener) -> Declaration:
         """Report the loss and return of this session's link; see ``Bus.watch_link``.
 
         The link of a hub is always up.
@@ -390,7 +390,7 @@ class ZenohBus(InboxBus):
             return
         self._outlets.close()
 
-    def _declare(self, entity: Any) -> Declared:
-        declared = Declared(entity, self._declared)
+    def _declare(self, entity: Any) -> Declaration:
+        declared = Declaration(entity, self._declared)
         self._declared.add(declared)
         return declared

@@ -45,14 +45,16 @@ _EXPRESS: dict[str, Any] = {  # as queries and their replies
 log = logging.getLogger(__name__)
 
 
-class Way:
+class DirectWay:
     """The way to the inbox of one life of a component.
 
     Args:
         lost: Called when the inbox has lost its owner.
     """
 
-    def __init__(self, bus: InboxBus, publisher: zenoh.Publisher, inbox: str, lost: Callable[[Way], None]) -> None:
+    def __init__(
+        self, bus: InboxBus, publisher: zenoh.Publisher, inbox: str, lost: Callable[[DirectWay], None]
+    ) -> None:
         self.inbox, self.publisher, self._lost = inbox, publisher, lost
         self.waiting: dict[int, asyncio.Future[Came]] = {}
         """Number → open question."""
@@ -93,10 +95,10 @@ class Ways:
         self._number = 0
         self._querying = Counter[str]()
         self._answered_by: OrderedDict[str, str] = OrderedDict()  # address → inbox of who answered the last query
-        self._ways: OrderedDict[str, Way] = OrderedDict()
-        self._open: dict[int, Way] = {}
+        self._ways: OrderedDict[str, DirectWay] = OrderedDict()
+        self._open: dict[int, DirectWay] = {}
 
-    def way_to(self, address: str) -> Way | None:
+    def way_to(self, address: str) -> DirectWay | None:
         """Return the way to this component, if there is one now."""
         way = self._ways.get(address)
         if way is None or not way.is_open or self._querying[address]:
@@ -104,7 +106,7 @@ class Ways:
         self._ways.move_to_end(address)
         return way
 
-    async def ask(self, way: Way, payload: bytes, answered: asyncio.Future[Came], within_s: float) -> Came:
+    async def ask(self, way: DirectWay, payload: bytes, answered: asyncio.Future[Came], within_s: float) -> Came:
         """Return what came of the question; None, too, if the bus is closed meanwhile."""
         self._number += 1
         number = self._number
@@ -160,16 +162,16 @@ class Ways:
         if (former := self._ways.pop(address, None)) is not None:
             self._leave(former)
         publisher = self._session.declare_publisher(inbox, allowed_destination=self._destination, **_EXPRESS)
-        self._ways[address] = Way(self._bus, publisher, inbox, lambda way: self._lost(address, way))
+        self._ways[address] = DirectWay(self._bus, publisher, inbox, lambda way: self._lost(address, way))
         while len(self._ways) > MOST_WAYS:
             self._ways.popitem(last=False)[1].close()  # its questions are answered all the same
 
-    def _lost(self, address: str, way: Way) -> None:
+    def _lost(self, address: str, way: DirectWay) -> None:
         if self._ways.get(address) is way:
             del self._ways[address]
             self._leave(way)
 
-    def _leave(self, way: Way) -> None:
+    def _leave(self, way: DirectWay) -> None:
         """Close a way whose inbox has no owner; its questions end when their answers can have arrived."""
         way.close()
         for answered in way.waiting.values():

@@ -16,7 +16,7 @@ from backbone.component.messages import AskStatistics, Statistics
 from backbone.errors import LinkError, Refusal
 from backbone.launcher.endings import ExitCode, say
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.picture.load import Loads, Reading, loads
+from backbone.picture.load import LoadReading, Loads, loads
 from backbone.picture.screen import table
 from backbone.printable import printable_all
 from backbone.rc_manager.messages import AskSchedule
@@ -57,7 +57,7 @@ async def _schedule(bus: Bus) -> Schedule | None:
         return None
 
 
-async def _reading(bus: Bus, listed: Components) -> Reading:
+async def _reading(bus: Bus, listed: Components) -> LoadReading:
     async def of(address: str) -> dict[str, float]:
         try:
             return printable_all(await bus.ask(address, AskStatistics(), Statistics, within_s=REPLY_TIME_S)).values
@@ -65,7 +65,7 @@ async def _reading(bus: Bus, listed: Components) -> Reading:
             return {}
 
     at_s, addresses = time.monotonic(), [one.address for one in listed.components]
-    return Reading(at_s, dict(zip(addresses, await asyncio.gather(*map(of, addresses)), strict=True)))
+    return LoadReading(at_s, dict(zip(addresses, await asyncio.gather(*map(of, addresses)), strict=True)))
 
 
 def _draw(found: Loads, width: int | None) -> None:

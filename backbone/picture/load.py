@@ -25,7 +25,7 @@ Numbers = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class LoadReading:
     """What all components said of themselves at about the same time.
 
     Attributes:
@@ -102,7 +102,9 @@ class Loads:
     silent: list[str]
 
 
-def loads(components: Iterable[ComponentState], schedule: Schedule | None, first: Reading, then: Reading) -> Loads:
+def loads(
+    components: Iterable[ComponentState], schedule: Schedule | None, first: LoadReading, then: LoadReading
+) -> Loads:
     """Return the loads between two readings; a component that began meanwhile counts from its begin."""
     present = list(components)
     processes = sorted(_processes(present, first, then), key=lambda one: (-one.cores, one.host, one.pid))
@@ -112,7 +114,7 @@ def loads(components: Iterable[ComponentState], schedule: Schedule | None, first
     return Loads(_robots(schedule, processes), list(_modules(first, then)), processes, silent)
 
 
-def _processes(components: Iterable[ComponentState], first: Reading, then: Reading) -> Iterable[ProcessLoad]:
+def _processes(components: Iterable[ComponentState], first: LoadReading, then: LoadReading) -> Iterable[ProcessLoad]:
     members: dict[tuple[str, int], list[str]] = defaultdict(list)
     for one in components:
         if PROCESSOR_S in then.numbers.get(one.address, {}):
@@ -148,7 +150,7 @@ def _robot(robot: str, parts: Mapping[str, float], process_of: Mapping[str, Proc
     return RobotLoad(robot, tuple(there), processor_s, cores)
 
 
-def _modules(first: Reading, then: Reading) -> Iterable[ModuleLoad]:
+def _modules(first: LoadReading, then: LoadReading) -> Iterable[ModuleLoad]:
     took_s = then.at_s - first.at_s
     for address, numbers in sorted(then.numbers.items()):
         before = first.numbers.get(address, {})

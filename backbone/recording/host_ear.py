@@ -31,7 +31,7 @@ class HostEar:
 
     def __init__(self, directory: Path, *, pictures_only: bool) -> None:
         self._path = directory / (PICTURES_SOCKET if pictures_only else ALL_SOCKET)
-        self._senders: list[_Sender] = []
+        self._senders: list[_CopySender] = []
         self._gone = 0
         self._server: socket.socket | None = None
         self._next: asyncio.TimerHandle | None = None
@@ -82,17 +82,17 @@ class HostEar:
             while True:
                 connection, _address = server.accept()
                 connection.setblocking(False)
-                self._senders.append(_Sender(connection))
+                self._senders.append(_CopySender(connection))
         except OSError:  # nobody more, or no more files can be opened: then they wait
             return
 
-    def _leave(self, sender: _Sender) -> None:
+    def _leave(self, sender: _CopySender) -> None:
         self._senders.remove(sender)
         self._gone += sender.dropped
         sender.connection.close()
 
 
-class _Sender:
+class _CopySender:
     """The copies of one process."""
 
     def __init__(self, connection: socket.socket) -> None:

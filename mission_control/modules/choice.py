@@ -1,6 +1,6 @@
 """Choice: algorithms for one task run side by side, and one of them is the source of a key.
 
-A ``Choice`` is a module like others, so the graph checks its classes, finds its place in the order, and connects it to
+A ``SourceChoice`` is a module like others, so the graph checks its classes, finds its place, and connects it to
 other units. Its ports follow from its parameters.
 """
 
@@ -17,7 +17,7 @@ from mission_control.modules.module import Module
 from mission_control.modules.orders import ModuleOrder, load_at
 from mission_control.modules.ports import Key, type_name
 
-CLASS_PATH = "mission_control.modules.choice:Choice"
+CLASS_PATH = "mission_control.modules.choice:SourceChoice"
 
 
 class ChoiceOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -48,11 +48,11 @@ class ChoiceOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return ModuleOrder(self.name, CLASS_PATH, {"of": type_name(kind), "key": self.key, "sources": self.sources})
 
 
-class Choice(Module):
+class SourceChoice(Module):
     """Hands on the values of the chosen source, as they come."""
 
     class Parameters(Module.Parameters, frozen=True):
-        """Parameters of ``Choice``.
+        """Parameters of ``SourceChoice``.
 
         Attributes:
             of: Class of the values, ``package.module:Class``.
@@ -66,7 +66,7 @@ class Choice(Module):
 
     parameters: Parameters
 
-    def __new__(cls, parameters: Parameters) -> Choice:
+    def __new__(cls, parameters: Parameters) -> SourceChoice:
         """Return a module of a class with these ports.
 
         Raises:

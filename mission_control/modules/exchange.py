@@ -35,7 +35,7 @@ UNPROVED = (Exception, SystemExit)
 """What code that has not proved itself may raise without an end of the component."""
 
 
-class Phase(StrEnum):
+class ExchangePhase(StrEnum):
     """How far an exchange is."""
 
     WARMING = "warming"  # the old one produces, the new one runs beside it
@@ -72,7 +72,7 @@ class Exchange:
         self, rules: ExchangeRules, is_ready: Callable[[], bool], changed: Callable[[], None], now_s: float
     ) -> None:
         self._rules, self._is_ready, self._changed = rules, is_ready, changed
-        self.phase, self.cause, self.keeps_state, self.rounds = Phase.WARMING, "", False, 0
+        self.phase, self.cause, self.keeps_state, self.rounds = ExchangePhase.WARMING, "", False, 0
         self.began_s = now_s
         self.switched_s: float | None = None
         self.ended_s: float | None = None
@@ -83,7 +83,7 @@ class Exchange:
     @property
     def is_over(self) -> bool:
         """True: only one of the two is there."""
-        return self.phase in (Phase.PROVED, Phase.RETURNED)
+        return self.phase in (ExchangePhase.PROVED, ExchangePhase.RETURNED)
 
     @property
     def due_s(self) -> float:
@@ -101,13 +101,13 @@ class Exchange:
         with self._busy:
             self._let_pass(now_s)
             match self.phase:
-                case Phase.WARMING:
+                case ExchangePhase.WARMING:
                     return self._warm(now_s, old, new)
-                case Phase.PROVING:
+                case ExchangePhase.PROVING:
                     return self._prove(now_s, old, new)
-                case Phase.PROVED:
+                case ExchangePhase.PROVED:
                     return new()
-                case Phase.RETURNED:
+                case ExchangePhase.RETURNED:
                     return old()
 
     def pass_time(self, now_s: float) -> None:
@@ -120,7 +120,7 @@ class Exchange:
 
     def fail(self, now_s: float, cause: str) -> None:
         """End: the old one produces. For failures of the new one before its first round."""
-        self._end(Phase.RETURNED, now_s, cause)
+        self._end(ExchangePhase.RETURNED, now_s, cause)
 
     # ------------------------------------------------------------------ rounds
     def _warm(self, now_s: float, old: Turn, new: Turn) -> Turned:
@@ -130,24 +130,24 @@ class Exchange:
             return kept
         self._has_run = True
         if not set(kept or ()) - set(turned) and self._tried(now_s, self._is_ready):
-            self.phase, self.switched_s = Phase.PROVING, now_s
+            self.phase, self.switched_s = ExchangePhase.PROVING, now_s
             self._changed()
             self._let_pass(now_s)
         return kept
 
     def _prove(self, now_s: float, old: Turn, new: Turn) -> Turned:
         turned = self._tried(now_s, new)
-        if self.phase is Phase.RETURNED:
+        if self.phase is ExchangePhase.RETURNED:
             return old()
         try:
             kept = old()
         except Exception as error:
-            self._end(Phase.PROVED, now_s, f"the old one failed beside it and is gone: {complaint(error)}")
+            self._end(ExchangePhase.PROVED, now_s, f"the old one failed beside it and is gone: {complaint(error)}")
             return turned
         if silent := self._silent(now_s, kept or {}, turned or {}):
             missing = ", ".join(silent)
             cause = f"no {missing} for {self._rules.silent_s:g} s, and the old one had it"
-            self._end(Phase.RETURNED, now_s, cause)
+            self._end(ExchangePhase.RETURNED, now_s, cause)
             return kept
         self.rounds += turned is not None
         return turned
@@ -165,20 +165,20 @@ class Exchange:
         try:
             return act()
         except UNPROVED as error:
-            self._end(Phase.RETURNED, now_s, complaint(error))
+            self._end(ExchangePhase.RETURNED, now_s, complaint(error))
             return None
 
     # ------------------------------------------------------------------ times
     def _let_pass(self, now_s: float) -> None:
         if self.is_over or now_s < self.due_s:
             return
-        if self.phase is Phase.PROVING:
-            self._end(Phase.PROVED, now_s)
+        if self.phase is ExchangePhase.PROVING:
+            self._end(ExchangePhase.PROVED, now_s)
             return
         why = "" if self._has_run else ": its inputs did not come together"
-        self._end(Phase.RETURNED, now_s, f"not ready within {self._rules.ready_within_s:g} s{why}")
+        self._end(ExchangePhase.RETURNED, now_s, f"not ready within {self._rules.ready_within_s:g} s{why}")
 
-    def _end(self, phase: Phase, now_s: float, cause: str = "") -> None:
+    def _end(self, phase: ExchangePhase, now_s: float, cause: str = "") -> None:
         if not self.is_over:
             self.phase, self.cause, self.ended_s = phase, cause, now_s
             self._changed()

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import msgspec
 
 from backbone.errors import Refusal
-from mission_control.modules.exchange import Exchange, Phase, handed_over
+from mission_control.modules.exchange import Exchange, ExchangePhase, handed_over
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module
 from mission_control.modules.ports import Port
@@ -293,7 +293,7 @@ class ExecutionUnit:
 
     def _end_exchange(self, pair: _Exchanging) -> None:
         self._exchanging = None
-        if pair.exchange.phase is Phase.RETURNED:
+        if pair.exchange.phase is ExchangePhase.RETURNED:
             self._seats = pair.seats
             return
         pair.new.judge, pair.new.times = None, pair.old.times

@@ -99,7 +99,7 @@ class UnitParameters(Running, frozen=True, forbid_unknown_fields=True, kw_only=T
         modules: What it runs.
         sources: Key → where its values come from, for what the unit does not produce itself.
         published: Keys of the outputs that others get.
-        chosen: Key → chosen source, where it is another than the first one of a ``Choice``; settable.
+        chosen: Key → chosen source, where it is another than the first one of a ``SourceChoice``; settable.
     """
 
     modules: list[ModuleOrder]

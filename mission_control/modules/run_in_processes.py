@@ -45,7 +45,7 @@ END_WITHIN_S = 2.0  # chosen: a unit ends in milliseconds, unless a module compu
 ANSWERS_WITHIN_S = 2.0  # chosen: a unit answers in a millisecond, unless a module computes
 
 
-class ProcessFell(Refusal):
+class ModuleProcessFell(Refusal):
     """The process of a module ended, or was not ready in time."""
 
     code = "module.process"
@@ -85,7 +85,7 @@ def run_in_processes(
 
     Raises:
         GraphRefused: They cannot be connected, or what they exchange is no message; it says everything at once.
-        ProcessFell: A process ended before the time was over.
+        ModuleProcessFell: A process ended before the time was over.
     """
     units = _units(modules, frequency_hz)
     clock = MissionClock.started_now()
@@ -155,7 +155,7 @@ async def _accompany(
             await _begin(hub, child, endpoint, fell)
         try:
             async with asyncio.timeout(for_s if for_s < math.inf else None):
-                raise ProcessFell(f"the process of {await fell} ended")
+                raise ModuleProcessFell(f"the process of {await fell} ended")
         except TimeoutError:
             return {child.launch.name: await _statistics(hub, child.launch) for child in children}
     finally:
@@ -188,7 +188,9 @@ async def _begin(hub: ZenohBus, child: _Child, endpoint: str, fell: asyncio.Futu
     child.connection.send(endpoint)
     await asyncio.wait({ready, fell}, timeout=READY_WITHIN_S, return_when=asyncio.FIRST_COMPLETED)
     if not ready.done():
-        raise ProcessFell(f"the process of {child.launch.name} {'ended' if fell.done() else 'was not ready in time'}")
+        raise ModuleProcessFell(
+            f"the process of {child.launch.name} {'ended' if fell.done() else 'was not ready in time'}"
+        )
 
 
 async def _statistics(hub: ZenohBus, launch: Launch) -> dict[str, float]:

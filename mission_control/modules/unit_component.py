@@ -26,7 +26,7 @@ from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.debug_views import DebugViews
 from mission_control.modules.arrangement import judged
-from mission_control.modules.choice import Choice
+from mission_control.modules.choice import SourceChoice
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.graph import Graph
 from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, is_message, output_address
@@ -137,7 +137,7 @@ class UnitComponent(Component[UnitParameters]):
         self._as_started = msgspec.structs.replace(self._as_started, modules=modules)
 
     def _choose(self) -> None:
-        choices = {one.parameters.key: one for one in self._modules.values() if isinstance(one, Choice)}
+        choices = {one.parameters.key: one for one in self._modules.values() if isinstance(one, SourceChoice)}
         for key, source in self.parameters.chosen.items():
             known = choices[key].parameters.sources if key in choices else []
             if source not in known:

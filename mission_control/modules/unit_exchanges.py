@@ -15,8 +15,8 @@ from backbone.errors import LinkError, Refusal
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
 from backbone.naming import did_you_mean
 from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
-from mission_control.modules.choice import Choice
-from mission_control.modules.exchange import UNPROVED, Exchange, ExchangeRules, Phase, complaint
+from mission_control.modules.choice import SourceChoice
+from mission_control.modules.exchange import UNPROVED, Exchange, ExchangePhase, ExchangeRules, complaint
 from mission_control.modules.exchangeable import graph_with, judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
 from mission_control.modules.graph import Graph
@@ -79,7 +79,7 @@ class UnitExchanges:
         if asked.module not in self._modules:
             meant = did_you_mean(asked.module, self._modules)
             raise UnknownModule(f"{self._component.name} has no module {asked.module!r}{meant}")
-        if isinstance(self._modules[asked.module], Choice):
+        if isinstance(self._modules[asked.module], SourceChoice):
             remedy = f"Choose another source: 'scout-backbone set {self._component.name} chosen …'."
             raise UnknownModule(f"{asked.module} chooses between sources and cannot be exchanged", remedy=remedy)
         if self._running:
@@ -105,7 +105,7 @@ class UnitExchanges:
         self._tell(asked, f"{asked.class_path} warms beside {candidate.before.class_path}{by}", LogLevel.NOTICE)
         self._unit().exchange(wanted)
         await self._until_over(candidate, wanted.exchange, changed)
-        if wanted.exchange.phase is Phase.RETURNED:
+        if wanted.exchange.phase is ExchangePhase.RETURNED:
             anew.undo()
             return self._returned(candidate, wanted.exchange)
         return await self._proved(candidate, wanted)
@@ -149,10 +149,10 @@ class UnitExchanges:
             except TimeoutError:
                 exchange.pass_time(clock.now_s())
             changed.clear()
-            if exchange.phase is Phase.PROVING:
+            if exchange.phase is ExchangePhase.PROVING:
                 candidate.new.debug, candidate.old.debug = views, UNSEEN
                 self._tell(candidate.asked, f"{candidate.order.class_path} produces, and has to prove itself")
-        is_new = exchange.phase is Phase.PROVED
+        is_new = exchange.phase is ExchangePhase.PROVED
         candidate.new.debug, candidate.old.debug = (views, UNSEEN) if is_new else (UNSEEN, views)
 
     def _returned(self, candidate: _Candidate, exchange: Exchange) -> Swapped:
@@ -209,7 +209,7 @@ def _answer(exchange: Exchange, now_s: float, remark: str) -> Swapped:
     ended_s = now_s if exchange.ended_s is None else exchange.ended_s
     switched_s = ended_s if exchange.switched_s is None else exchange.switched_s
     return Swapped(
-        exchange.phase is Phase.PROVED,
+        exchange.phase is ExchangePhase.PROVED,
         exchange.cause,
         exchange.keeps_state,
         switched_s - exchange.began_s,

@@ -75,7 +75,7 @@ def test_a_process_that_falls_ends_the_run_with_its_name() -> None:
     with script(falls=True, for_s="60") as running:
         _said, complaint = running.communicate(timeout=WITHIN_S)
     assert running.returncode == 1
-    assert "ProcessFell: the process of falling ended" in complaint
+    assert "ModuleProcessFell: the process of falling ended" in complaint
 
 
 def test_the_processes_end_with_a_script_that_is_killed() -> None:

@@ -48,7 +48,7 @@ class ModuleUnderTest:
 
     def __init__(self, module: Module) -> None:
         self.module, self.shown = watched(module), dict[str, object]()
-        module.debug = Shown(self.shown)
+        module.debug = ShownViews(self.shown)
         self._history: list[tuple[dict[str, object], Pickles]] = []
 
     def update(self, **inputs: object) -> Any:
@@ -81,7 +81,7 @@ class ModuleUnderTest:
 MakeModule = Callable[[Module], ModuleUnderTest]
 
 
-class Shown:
+class ShownViews:
     """The debug views of a module at which somebody always looks; see ``mission_control.modules.module.Debug``."""
 
     def __init__(self, into: dict[str, object]) -> None:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.component.messages import PROCESSOR_S, ComponentState, LifeState
-from backbone.picture.load import ModuleLoad, Reading, loads
+from backbone.picture.load import LoadReading, ModuleLoad, loads
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 
@@ -24,8 +24,8 @@ def request(arc: str, *rcs: str) -> RequestView:
     return RequestView(arc, "owner", RequestState.RUNNING, list(rcs), 0.0, 0.0, 0.0, "", [], 1.0, "", 0)
 
 
-def reading(at_s: float, **processor_s: float) -> Reading:
-    return Reading(at_s, {f"resource_pool/{name}": {PROCESSOR_S: value} for name, value in processor_s.items()})
+def reading(at_s: float, **processor_s: float) -> LoadReading:
+    return LoadReading(at_s, {f"resource_pool/{name}": {PROCESSOR_S: value} for name, value in processor_s.items()})
 
 
 PLACES = st.lists(st.tuples(st.integers(1, 4), st.floats(0, 100), st.floats(0, 100)), min_size=1, max_size=8)
@@ -70,7 +70,7 @@ def test_a_module_has_the_time_of_its_updates() -> None:
     at = "mission_control/vision"
     before = {"ball_runs": 10.0, "ball_busy_s": 1.0, "ball_longest_s": 0.2, "other_busy_s": 5.0}
     after = {"ball_runs": 30.0, "ball_busy_s": 2.0, "ball_longest_s": 0.3, "other_busy_s": 6.0}
-    [module] = loads([], None, Reading(0.0, {at: before}), Reading(2.0, {at: after})).modules
+    [module] = loads([], None, LoadReading(0.0, {at: before}), LoadReading(2.0, {at: after})).modules
     assert module == ModuleLoad("vision", "ball", 2.0, 0.5, 10.0, 0.3)
-    [anew] = loads([], None, Reading(0.0, {at: after}), Reading(2.0, {at: before})).modules
+    [anew] = loads([], None, LoadReading(0.0, {at: after}), LoadReading(2.0, {at: before})).modules
     assert (anew.cores, anew.rate_hz) == (0.5, 5.0)

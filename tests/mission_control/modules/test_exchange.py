@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_modules import Number
 
-from mission_control.modules.exchange import Exchange, ExchangeRules, Phase, Turned, complaint, handed_over
+from mission_control.modules.exchange import Exchange, ExchangePhase, ExchangeRules, Turned, complaint, handed_over
 from mission_control.modules.exchangeable import judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
 from mission_control.modules.graph import Graph, Member
@@ -129,7 +129,7 @@ def played(numbers: Sequence[float], wanted: Sequence[Swap]) -> tuple[list[list[
         try:
             said.append([value for _key, value in unit.run(now_s)])
         except ValueError:  # a module that has proved itself fails: as without an exchange, the unit ends
-            assert any(one.phase is Phase.PROVED for one in began)
+            assert any(one.phase is ExchangePhase.PROVED for one in began)
             break
     return said, began
 
@@ -153,7 +153,7 @@ def test_each_round_has_the_outputs_of_one_module_and_only_a_silent_new_one_leav
         assert updates == list(range(1, len(said) + 1)), "none lost, none doubled, whoever produced"
         assert sums == [sum(numbers[: n + 1]) for n in range(len(numbers))]
     for exchange in began:
-        assert not (exchange.phase is Phase.RETURNED and not exchange.cause)
+        assert not (exchange.phase is ExchangePhase.RETURNED and not exchange.cause)
 
 
 @given(NUMBERS, swaps(EQUAL))
@@ -169,7 +169,7 @@ def test_exchanges_between_equal_classes_change_no_output(numbers: list[float], 
 def test_after_a_failure_all_is_as_if_there_had_been_no_exchange(numbers: list[float], at: int, new: Tally) -> None:
     said, began = played(numbers, [Swap(at, new, ExchangeRules(1e9, 1e9, 1e9))])
     plain, _none = played(numbers, [])
-    if began and began[0].phase is Phase.RETURNED:
+    if began and began[0].phase is ExchangePhase.RETURNED:
         assert "ValueError: planted" in began[0].cause
         assert began[0].ended_s is not None
         ended = round(began[0].ended_s / ROUND_S)
@@ -187,29 +187,29 @@ def begun(prove_s: float = 1.0, ready_within_s: float = 1.0, silent_s: float = 0
 def test_a_new_one_that_says_nothing_is_not_ready_while_the_old_one_speaks() -> None:
     exchange = begun()
     assert rounds_of(exchange, old={"a": 1}, new={}, count=11) == [{"a": 1}] * 11
-    assert (exchange.phase, exchange.switched_s) == (Phase.RETURNED, None)
+    assert (exchange.phase, exchange.switched_s) == (ExchangePhase.RETURNED, None)
     assert exchange.cause == "not ready within 1 s"
 
 
 def test_a_new_one_that_falls_silent_gives_its_place_back_in_that_very_round() -> None:
     exchange = begun()
     rounds_of(exchange, old={"a": 1}, new={"a": 2}, count=2)
-    assert exchange.phase is Phase.PROVING
+    assert exchange.phase is ExchangePhase.PROVING
     assert rounds_of(exchange, old={"a": 1}, new={}, count=4, first_s=0.2) == [{}, {}, {}, {"a": 1}]
-    assert exchange.phase is Phase.RETURNED
+    assert exchange.phase is ExchangePhase.RETURNED
     assert exchange.cause == "no a for 0.25 s, and the old one had it"
 
 
 def test_without_a_time_to_prove_itself_the_new_one_is_alone_after_the_switch() -> None:
     exchange = begun(prove_s=0.0)
     assert rounds_of(exchange, old={"a": 1}, new={"a": 2}, count=2) == [{"a": 1}, {"a": 2}]
-    assert (exchange.phase, exchange.switched_s, exchange.ended_s) == (Phase.PROVED, 0.0, 0.0)
+    assert (exchange.phase, exchange.switched_s, exchange.ended_s) == (ExchangePhase.PROVED, 0.0, 0.0)
 
 
 def test_time_passes_without_rounds() -> None:
     exchange = begun()
     exchange.pass_time(0.5)
-    assert exchange.phase is Phase.WARMING
+    assert exchange.phase is ExchangePhase.WARMING
     exchange.pass_time(1.0)
     assert exchange.cause == "not ready within 1 s: its inputs did not come together"
 
@@ -221,7 +221,7 @@ def test_an_old_one_that_fails_beside_the_new_one_is_gone_and_the_unit_goes_on()
     exchange = begun()
     rounds_of(exchange, old={"a": 1}, new={"a": 2}, count=1)
     assert exchange.round(0.1, broken, lambda: {"a": 2}) == {"a": 2}
-    assert exchange.phase is Phase.PROVED
+    assert exchange.phase is ExchangePhase.PROVED
     assert "the old one failed beside it and is gone: RuntimeError: old age" in exchange.cause
     with pytest.raises(RuntimeError, match="old age"):
         begun().round(0.0, broken, lambda: {"a": 2})
@@ -316,5 +316,5 @@ def test_an_exchange_overwrites_no_value() -> None:
     for number in range(10):
         unit.put("number", Number(float(number)))
         unit.run(number * ROUND_S)
-    assert exchange.phase is Phase.PROVED
+    assert exchange.phase is ExchangePhase.PROVED
     assert unit.statistics().overwritten == {}
