@@ -19,7 +19,7 @@ import re
 import struct
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, cast
 
 import zenoh
@@ -30,7 +30,7 @@ from backbone.bus.inbox import InboxBus
 from backbone.keys import ROOT
 from backbone.waiting import settle
 
-MOST_WAYS = 64  # chosen: a component asks few others again and again; each way is a declaration at the hub
+MOST_WAYS = 64  # chosen: each way is a declaration at the hub; whoever is asked beyond them is asked by queries
 STILL_COME_S = (
     0.1  # measured: one in a hundred reports of an owner's end overtakes the owner's last answer, by milliseconds
 )
@@ -95,7 +95,7 @@ class Ways:
         self._number = 0
         self._querying = Counter[str]()
         self._answered_by: OrderedDict[str, str] = OrderedDict()  # address → inbox of who answered the last query
-        self._ways: OrderedDict[str, DirectWay] = OrderedDict()
+        self._ways: dict[str, DirectWay] = {}
         self._open: dict[int, DirectWay] = {}
 
     def way_to(self, address: str) -> DirectWay | None:
@@ -103,7 +103,6 @@ class Ways:
         way = self._ways.get(address)
         if way is None or not way.is_open or self._querying[address]:
             return None
-        self._ways.move_to_end(address)
         return way
 
     async def ask(self, way: DirectWay, payload: bytes, answered: asyncio.Future[Came], within_s: float) -> Came:
@@ -161,10 +160,10 @@ class Ways:
             )
         if (former := self._ways.pop(address, None)) is not None:
             self._leave(former)
+        if len(self._ways) >= MOST_WAYS:
+            return
         publisher = self._session.declare_publisher(inbox, allowed_destination=self._destination, **_EXPRESS)
         self._ways[address] = DirectWay(self._bus, publisher, inbox, lambda way: self._lost(address, way))
-        while len(self._ways) > MOST_WAYS:
-            self._ways.popitem(last=False)[1].close()  # its questions are answered all the same
 
     def _lost(self, address: str, way: DirectWay) -> None:
         if self._ways.get(address) is way:
@@ -217,7 +216,8 @@ class DirectQuestion:
     def drop(self) -> None:
         """Say that there is no answer, unless there was one."""
         if not self._is_answered:
-            self._session.put(self._answers, b"", attachment=self._number + _UNANSWERED, **_EXPRESS)
+            with suppress(zenoh.ZError):  # the session is closed: the asker learns from the hub that the inbox is gone
+                self._session.put(self._answers, b"", attachment=self._number + _UNANSWERED, **_EXPRESS)
 
 
 class Query:

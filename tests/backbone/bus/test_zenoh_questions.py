@@ -14,6 +14,7 @@ import zenoh
 from bus_laws import Echo, Echoed, TooLoud
 from free_ports import free_endpoint
 
+from backbone.bus import zenoh_questions
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Answer
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
@@ -99,6 +100,20 @@ async def test_after_two_answers_there_is_a_way_and_all_answers_are_as_by_querie
         with pytest.raises(NoResponder):
             await ask(asker, "bug")
         assert asker.ways.way_to(SERVER) is not None
+
+
+async def test_whoever_is_asked_beyond_the_most_ways_makes_none_change(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(zenoh_questions, "MOST_WAYS", 1)
+    async with serving(endpoint), joined(endpoint, "backbone/other") as other, joined(endpoint, ASKER) as asker:
+        other.serve("backbone/other", Echo, echo)
+        await on_the_way(asker)
+        kept = asker.ways.way_to(SERVER)
+        for _ in range(10):
+            assert (await asker.ask("backbone/other", Echo("b"), Echoed, within_s=DEADLINE_S)).text == "b"
+            assert await ask(asker, "a") == "a"
+        assert asker.ways.way_to(SERVER) is kept
 
 
 async def test_one_who_is_asked_once_has_no_way(endpoint: str) -> None:
