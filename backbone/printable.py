@@ -16,6 +16,8 @@ from backbone.printable_text import printable
 
 Value = TypeVar("Value")
 
+WITHOUT_TEXT = (type(None), bool, int, float, bytes, memoryview)  # most values are: they are known before all others
+
 
 def printable_all(value: Value) -> Value:
     """Return the message, dataclass, list or dictionary with every text in it one printable line; itself if all are."""
@@ -28,6 +30,8 @@ def with_texts(value: Value, change: Callable[[str], str]) -> Value:
 
 
 def _with_texts(value: object, change: Callable[[str], str]) -> Any:
+    if type(value) in WITHOUT_TEXT:
+        return value
     match value:
         case str():
             return change(value) if type(value) is str else value  # texts of an enumeration come from this project

@@ -27,7 +27,7 @@ from backbone.naming import Subsystem
 
 # Few examples for a person who waits, all of them in CI; both the same in every run, so that two runs of one commit say
 # the same. "search" looks for new ones. No deadline: how long an example takes is the machine's affair.
-settings.register_profile("quick", max_examples=25, derandomize=True, deadline=None)
+settings.register_profile("quick", max_examples=10, derandomize=True, deadline=None)
 settings.register_profile("full", max_examples=100, derandomize=True, deadline=None)
 settings.register_profile("search", max_examples=100, derandomize=False, deadline=None)
 settings.load_profile(os.environ.get("SCOUT_EXAMPLES", "quick"))
