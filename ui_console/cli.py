@@ -18,6 +18,7 @@ from backbone.command_line.options import (
     hub_endpoint,
     names_for,
     run,
+    run_table,
 )
 from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode, say
@@ -297,10 +298,7 @@ def design(ctx: typer.Context) -> None:
 
 def main() -> None:
     """Run the command line."""
-    try:
-        app()
-    except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
+    run_table(app)
 
 
 def _watch(where: Where, user: str, *, as_json: bool) -> None:

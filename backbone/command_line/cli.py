@@ -36,6 +36,7 @@ from backbone.command_line.options import (
     json_or_text,
     named_value,
     run,
+    run_table,
 )
 from backbone.command_line.recording_commands import compare, inject, record, recording, replay, top, watch
 from backbone.command_line.tool_commands import bridge, metrics
@@ -67,10 +68,7 @@ PIPE_WIDTH = 180  # chosen: no table is wider, so files and pipes get whole tabl
 
 def main() -> None:
     """Run the command line."""
-    try:
-        app()
-    except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
+    run_table(app)
 
 
 def read_or_exit(mission_file: Path) -> tuple[Any, bytes]:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
+import sys
 from collections.abc import Awaitable, Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -15,10 +17,13 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
+from typer.main import get_command_name
+from typer.models import CommandInfo, TyperInfo
 
 from backbone import __version__
 from backbone.command_line.where import Where
 from backbone.errors import BackboneError
+from backbone.launcher.endings import ExitCode
 
 DISTRIBUTION = "scout-backbone"
 
@@ -46,6 +51,36 @@ class CommandTable(TyperGroup):
         if command is not None:
             _convert_only_what_needs_it(command.get_params(ctx))
         return name, command, rest
+
+
+def run_table(table: typer.Typer) -> None:
+    """Run the command line of this process.
+
+    It builds the command that the words name, for a version none, and else all: that takes a third of a short command's
+    time.
+    """
+    tables: tuple[list[Any], ...] = (table.registered_commands, table.registered_groups)
+    named = _words_before_the_cursor()[:1]
+    if named in [["--version"], *([_name_of(each)] for commands in tables for each in commands)]:
+        for commands in tables:
+            commands[:] = [each for each in commands if [_name_of(each)] == named]
+    try:
+        table()
+    except KeyboardInterrupt:
+        sys.exit(ExitCode.INTERRUPTED)
+
+
+def _words_before_the_cursor() -> list[str]:
+    """Return the words of the command line; while a shell completes one, those before it."""
+    if len(sys.argv) > 1 or not (typed := os.environ.get("_TYPER_COMPLETE_ARGS", os.environ.get("COMP_WORDS", ""))):
+        return sys.argv[1:]
+    words = typed.split() if typed[-1].isspace() else typed.split()[:-1]
+    return words[1 : int(os.environ.get("COMP_CWORD", len(words)))]
+
+
+def _name_of(command: CommandInfo | TyperInfo) -> str:
+    """Return the name under which Typer lists a command or a group."""
+    return command.name or get_command_name(getattr(command.callback, "__name__", ""))
 
 
 def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
