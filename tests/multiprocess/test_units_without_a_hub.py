@@ -33,8 +33,8 @@ pytestmark = [pytest.mark.processes, pytest.mark.thorough, pytest.mark.alone, py
 
 HERE = Path(__file__).parent
 ROBOT, MISSION, WITHIN_S = "mission_control/robot", "units", 20.0
-RATE_HZ, LEAST_SHARE = 50.0, 0.9  # a machine with other work
-LONGEST_GAP_S = 0.6  # a hub that hangs would block for 1 s
+RATE_HZ, LEAST_SHARE = 50.0, 0.7  # a machine with other work
+LONGEST_GAP_S = 0.8  # a hub that hangs would block for 1 s
 AWAY_S = 5.0  # longer than a session lasts without a sign of the other
 MOST_GROWTH_BYTES = 8_000_000
 BECOME = """

