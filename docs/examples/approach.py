@@ -150,7 +150,7 @@ class GrowthEstimator(Module):
         growing: Growing
 
     class Parameters(Module.Parameters, frozen=True):
-        over: Annotated[int, msgspec.Meta(ge=2, le=256)] = 15
+        over: Annotated[int, msgspec.Meta(ge=2, le=256)] = 30
 
     parameters: Parameters
 
