@@ -4,7 +4,7 @@ The bus gives them to its listeners by a blackboard. Beside it, in the same run 
 zenoh-python with shared memory, through the same hub, with as many bytes and the same bridge into asyncio; both drop
 what finds a queue full. Prints one JSON line for each number of listeners: latency of all listeners' pictures, and the
 processor time of sender, hub and listeners together for one picture, without what they use when nothing is sent.
-``ratio`` is bus p50 over bare p50.
+``ratio`` is bus p50 over bare p50, ``processor_ratio`` the same of processor times; ``ros1`` has both of ROS 1.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -44,6 +44,13 @@ WIDTH_PX, HEIGHT_PX, RATE_HZ = 320, 240, 30.0
 TURN_S, REST_S = 1.0, 0.1  # chosen: a turn of each way, and a rest that no picture of the other way reaches over
 WARM_UP = 10_000_000  # number of the first of those pictures that count for nothing
 READY_S = 30.0
+ROS1_US = {1: (562, 660), 4: (828, 777), 16: (1882, 1606)}
+"""Listeners → p50 of ROS 1, and of bare zenoh with shared memory beside it, for the same pictures.
+
+Source: measured for issue 16 in one run, before this program was; on another machine, so only the ratio says something.
+"""
+ROS1_PROCESSOR_MS = {1: (0.89, 1.56), 4: (2.24, 2.51), 16: (6.79, 6.43)}
+"""The same of processor time for a picture; same source."""
 
 
 def with_shared_memory(settings: dict[str, Any]) -> zenoh.Config:
@@ -137,6 +144,17 @@ async def listen(folder: str, name: str) -> None:
     bare.close()
 
 
+def ratios(listeners: int, p50_s: Mapping[str, float], processor_us: Mapping[str, float]) -> dict[str, object]:
+    """Return the bus to bare zenoh, and beside it what ROS 1 was to bare zenoh, if that was measured."""
+    ratio, processor_ratio = p50_s["bus"] / p50_s["bare"], processor_us["bus"] / max(1.0, processor_us["bare"])
+    told: dict[str, object] = {"ratio": round(ratio, 3), "processor_ratio": round(processor_ratio, 3)}
+    if listeners in ROS1_US:
+        (ros1, bare), (ros1_ms, bare_ms) = ROS1_US[listeners], ROS1_PROCESSOR_MS[listeners]
+        told["ros1"] = {"ratio": round(ros1 / bare, 2), "processor_ratio": round(ros1_ms / bare_ms, 2)}
+        told["below_ros1"] = {"ratio": ratio < ros1 / bare, "processor_ratio": processor_ratio < ros1_ms / bare_ms}
+    return told
+
+
 def measure(listeners: int, frames: int) -> None:
     """Run a hub, so many listeners and a publisher, and report."""
     with tempfile.TemporaryDirectory(prefix="s-") as folder, ExitStack() as running:
@@ -166,8 +184,8 @@ def measure(listeners: int, frames: int) -> None:
         **{
             way: {**summary(all_s), "arrived": round(len(all_s) / listeners / frames, 3)} for way, all_s in both.items()
         },
-        ratio=round(percentile(both["bus"], 0.5) / percentile(both["bare"], 0.5), 3),
         processor_us=processor_us,
+        **ratios(listeners, {way: percentile(all_s, 0.5) for way, all_s in both.items()}, processor_us),
     )
 
 

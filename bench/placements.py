@@ -1,24 +1,31 @@
-"""Latency of a value over its size, by where its two modules are: in one unit, or in two processes of one host.
+"""Latency of a value over its size, by where its two modules are: unit, thread, or process of one host.
 
-``unit``: two modules of one execution unit, which hand over the object itself. ``board``: two processes, by the bus
-with a blackboard. ``network``: two processes, by the bus through the hub, without shared memory. Beside them, in the
-same run: ``socket``, a bare unix socket whose receiver reads the whole value, and ``zenoh``, bare zenoh-python through
-the same hub. Values of all ways alternate. Prints one JSON line: p50 in microseconds by size and way, and the ratio of
-the bus to the floor of its way. A value of more than 8 MiB does not go by the network.
+``unit``: two modules of one execution unit, which hand over the object itself. ``thread``: two units of one process,
+each in a thread of its own. ``board``: two processes, by the bus with a blackboard. ``network``: two processes, by the
+bus through the hub, without shared memory. Beside them, in the same run, the floors: ``queue``, two bare threads and a
+queue; ``socket``, a bare unix socket whose receiver reads the whole value; and ``zenoh``, bare zenoh-python through the
+same hub. Values between processes alternate by all ways. Prints one JSON line: p50 in microseconds by size and way, and
+the ratio of each way to its floor. A value of more than 8 MiB does not go by the network.
+
+``--plot FILE``, PNG or SVG, draws the line, as Figure 5 of RoboFrame 2006 does: floors are dashed.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import queue
 import socket
 import struct
 import tempfile
+import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
+import msgspec
 import uvloop
 import zenoh
 from measuring import helper, percentile, report, wait_for_end_of_input
@@ -26,13 +33,18 @@ from measuring import helper, percentile, report, wait_for_end_of_input
 from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
 from backbone.bus.host_boards import boards_for
+from backbone.bus.local_bus import LocalNetwork
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.ranges import Bulk, MachineTime
 from backbone.wire import MAX_MESSAGE_BYTES, Message
+from mission_control.modules.arrangement import UnitOrder, arranged
 from mission_control.modules.module import Module
+from mission_control.modules.orders import ModuleOrder
 from mission_control.modules.run import connected
+from mission_control.modules.unit_component import UnitComponent
 
 MISSION, CLOCK = "bench", MissionClock(0.0)
 SIZES = (64, 1_000, 16_000, 76_800, 921_600, 10_000_000)
@@ -42,6 +54,10 @@ BARE_KEY, OVER_KEY = "bare/values", "bare/over"
 HEAD = struct.Struct("<Qd")
 PAUSE_S, PAUSE_A_BYTE_S = 0.004, 3e-9  # chosen: no value waits for the one before it
 READY_S = 30.0
+THREADS_HZ = 200.0  # chosen: no value waits for the one before it
+FLOORS = {"thread": "queue", "board": "socket", "network": "zenoh"}
+LATENCIES_S: list[float] = []
+"""What the sink of this process noted."""
 
 
 class Large(Message, frozen=True):
@@ -59,7 +75,16 @@ class Source(Module):
 
         value: Large
 
-    data = memoryview(b"")
+    class Parameters(Module.Parameters, frozen=True):
+        """How large it is, in bytes."""
+
+        size: int
+
+    parameters: Parameters
+
+    def reset(self) -> None:
+        """Make the data anew."""
+        self.data = memoryview(bytes(self.parameters.size))
 
     def update(self, _inputs: Module.Inputs) -> Outputs:
         """Make it."""
@@ -76,22 +101,71 @@ class Sink(Module):
 
     def reset(self) -> None:
         """Forget."""
-        self.latencies_s: list[float] = []
+        LATENCIES_S.clear()
 
     def update(self, inputs: Inputs) -> Module.Outputs:
         """Note one."""
-        self.latencies_s.append(time.monotonic() - inputs.value.made_s)
+        LATENCIES_S.append(time.monotonic() - inputs.value.made_s)
         return self.Outputs()
+
+
+class FreeUnit(UnitComponent):
+    """A unit without a nameserver."""
+
+    registers = False
 
 
 def in_one_unit(size: int, values: int) -> list[float]:
     """Return the latencies between two modules of one unit."""
-    source, sink = Source(), Sink()
-    source.data = memoryview(bytes(size))
-    units = connected(source, sink, frequency_hz=1000.0)
+    units = connected(Source(Source.Parameters(size)), Sink(), frequency_hz=1000.0)
     for number in range(values):
         units.tick(number / 1000)
-    return sink.latencies_s
+    return list(LATENCIES_S)
+
+
+async def between_threads(size: int, values: int) -> list[float]:
+    """Return the latencies between two units of this process, each in a thread of its own."""
+    clock, network = MissionClock.started_now(), LocalNetwork()
+    modules = {
+        "sink": ModuleOrder("sink", f"{__name__}:Sink"),
+        "source": ModuleOrder("source", f"{__name__}:Source", {"size": size}),
+    }
+    orders = [
+        UnitOrder(name=name, own_thread=True, frequency_hz=THREADS_HZ if name == "source" else 0.0, modules=[one])
+        for name, one in modules.items()
+    ]
+    units: list[FreeUnit] = []
+    for name, parameters in arranged(orders, {}).items():
+        given = msgspec.to_builtins(parameters)
+        launch = Launch(MISSION, Subsystem.MISSION_CONTROL, name, "unit", "", "here", "", 0.0, 1.0, given)
+        units.append(FreeUnit(launch, network.join(launch.address, clock), clock))
+    lives = [asyncio.create_task(unit.run()) for unit in units]
+    ends_s = clock.now_s() + READY_S + values / THREADS_HZ
+    while len(LATENCIES_S) < values and clock.now_s() < ends_s:
+        await clock.sleep_s(0.05)
+    for unit in units:
+        unit.end("measured")
+    await asyncio.gather(*lives)
+    return LATENCIES_S[:values]
+
+
+def between_bare_threads(size: int, values: int) -> list[float]:
+    """Return the latencies of an object that goes from one thread to another by a queue."""
+    handed: queue.SimpleQueue[tuple[float, bytes] | None] = queue.SimpleQueue()
+    found: list[float] = []
+
+    def take() -> None:
+        while (came := handed.get()) is not None:
+            found.append(time.monotonic() - came[0])
+
+    taker, data = threading.Thread(target=take), bytes(size)
+    taker.start()
+    for _ in range(values):
+        handed.put((time.monotonic(), data))
+        time.sleep(1 / THREADS_HZ)
+    handed.put(None)
+    taker.join()
+    return found
 
 
 def place(way: str, size: int) -> str:
@@ -159,29 +233,30 @@ class Latencies:
         """Take a value that arrives now."""
         self.by_way[way][size].append(time.monotonic() - made_s)
 
-    def report(self, values: int) -> None:
-        """Print the line."""
+    def report(self, values: int) -> dict[str, dict[int, float]]:
+        """Print the line; return way → size → p50 in microseconds."""
         told = {way: {size: of[WARM_UP:] for size, of in by_size.items()} for way, by_size in self.by_way.items()}
         p50 = {
-            way: {size: percentile(of, 0.5) * 1e6 for size, of in by_size.items() if of}
+            way: {size: round(percentile(of, 0.5) * 1e6, 1) for size, of in by_size.items() if of}
             for way, by_size in told.items()
         }
         report(
             "placements",
             values=values,
-            p50_us={way: {size: round(each, 1) for size, each in by_size.items()} for way, by_size in p50.items()},
+            p50_us=p50,
             arrived={
                 way: {size: round(len(of) / values, 2) for size, of in by_size.items()} for way, by_size in told.items()
             },
             ratio={
                 way: {size: round(each / p50[floor][size], 2) for size, each in p50[way].items() if size in p50[floor]}
-                for way, floor in (("board", "socket"), ("network", "zenoh"))
+                for way, floor in FLOORS.items()
             },
         )
+        return p50
 
 
-async def measure(folder: str, values: int) -> None:
-    """Be the receiving process, and report."""
+async def measure(folder: str, values: int) -> dict[str, dict[int, float]]:
+    """Be the receiving process, and report; return way → size → p50 in microseconds."""
     latencies, endpoint = Latencies(), socket_endpoint(Path(folder))
     loop, over = asyncio.get_running_loop(), asyncio.Event()
 
@@ -217,11 +292,13 @@ async def measure(folder: str, values: int) -> None:
         bare.declare_subscriber(OVER_KEY, lambda _sample: loop.call_soon_threadsafe(over.set))
         bus.declare_alive(RECEIVER)
         await over.wait()
-    for size in SIZES:
-        latencies.by_way["unit"][size] = in_one_unit(size, values + WARM_UP)
-    latencies.report(values)
     await bus.close()
     server.close()
+    for size in SIZES:
+        latencies.by_way["unit"][size] = in_one_unit(size, values + WARM_UP)
+        latencies.by_way["thread"][size] = await between_threads(size, values + WARM_UP)
+        latencies.by_way["queue"][size] = between_bare_threads(size, values + WARM_UP)
+    return latencies.report(values)
 
 
 def main() -> None:
@@ -230,17 +307,25 @@ def main() -> None:
     parser.add_argument("role", nargs="?", default="all", choices=["all", "hub", "sender"])
     parser.add_argument("folder", nargs="?", default="")
     parser.add_argument("--values", type=int, default=100, help="of each size and way")
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help="also draw the line, PNG or SVG; needs the extra 'plot'"
+    )
     chosen = parser.parse_args()
+    if chosen.plot is not None and chosen.plot.suffix not in (".png", ".svg"):
+        parser.error(f"{chosen.plot} ends neither with .png nor with .svg")
     if chosen.role == "hub":
         be_hub(chosen.folder)
     elif chosen.role == "sender":
         uvloop.run(send(chosen.folder, chosen.values))
     else:
+        plot = import_module("placements_plot") if chosen.plot is not None else None  # before it measures for minutes
         with tempfile.TemporaryDirectory(prefix="s-") as folder, helper(__file__, "hub", folder):
             while not Path(folder, "hub.sock").exists():
                 time.sleep(0.01)
             with helper(__file__, "sender", folder, "--values", str(chosen.values)):
-                uvloop.run(measure(folder, chosen.values))
+                p50 = uvloop.run(measure(folder, chosen.values))
+        if plot is not None:
+            plot.draw(p50, FLOORS, chosen.plot)
 
 
 if __name__ == "__main__":

@@ -159,11 +159,17 @@ class UnitComponent(Component[UnitParameters]):
             for module, one in told.modules.items()
             for name in one.__struct_fields__
         }
-        place = self._place
-        thread = (
-            {} if place is None else {"thread_nice": float(place.nice), "thread_processors": float(len(place.cpus))}
-        )
-        return {**own, **missed, **times, **thread}
+        return {**own, **missed, **times, **self._thread_statistics()}
+
+    def _thread_statistics(self) -> dict[str, float]:
+        place, thread = self._place, self._thread
+        if place is None or thread is None:
+            return {}
+        return {
+            "thread_nice": float(place.nice),
+            "thread_processors": float(len(place.cpus)),
+            "thread_lost": float(thread.lost),
+        }
 
     def _listener(self, key: str) -> Callable[[Envelope[Message]], None]:
         def heard(envelope: Envelope[Message]) -> None:

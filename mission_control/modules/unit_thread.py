@@ -1,8 +1,10 @@
 """A thread of its own for the rounds of one execution unit, beside the event loop of its component.
 
-Between two rounds the unit belongs to the event loop, which takes values and decides when the next round begins, as it
-does without a thread. During a round the unit belongs to the thread, and what arrives waits: of each key only the
-newest value. So nothing is locked, and a module needs no care. On a ``VirtualLoop`` a round takes no time.
+The thread decides when the next round begins, so the unit keeps its rate while its component's event loop is blocked,
+by another component of the process or by a hub that hangs. The event loop puts values in and hands outputs on. A value
+that finds the unit waiting gets a round; of what arrives until that is over only the newest value of each key waits.
+The outputs of up to ``MOST_WAITING`` rounds wait for the event loop. On a ``VirtualLoop`` there is no thread, and a
+round takes no time.
 """
 
 from __future__ import annotations
@@ -11,41 +13,64 @@ import asyncio
 import contextlib
 import math
 import threading
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TypeVar
 
+from backbone.bus.clock import VirtualLoop
 from backbone.bus.interface import Bus, Clock, current_cause
 from backbone.keys import Conversation
 from backbone.wire import Message
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.os_threads import ThreadPlace, place_thread
 
-T = TypeVar("T")
+MOST_WAITING = 256  # chosen: a hub that hangs blocks a sender for a second, in which few units have as many rounds
+LONGEST_WAIT_S = 3600.0  # chosen: far below what a lock can wait for
 
 
 @dataclass(frozen=True, slots=True)
 class _Arrival:
     """The newest value of a key that waits for the end of a round, and how many it overwrote."""
 
+    key: str
     value: object
     cause: str
     overwritten: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class _Round:
+    """A round whose outputs wait for the event loop."""
+
+    now_s: float
+    cause: str
+    produced: list[Produced]
+
+
 class UnitThread:
-    """The rounds of one unit in a thread.
+    """The rounds of one unit in a thread. Make it inside the event loop of its component.
 
     Args:
         produced: Called in the event loop with the time of each round and what its modules produced.
+
+    Attributes:
+        lost: Rounds whose outputs nobody got, because too many waited for the event loop.
     """
 
     def __init__(self, unit: ExecutionUnit, clock: Clock, produced: Callable[[float, list[Produced]], None]) -> None:
         self._unit, self._clock, self._produced = unit, clock, produced
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix=unit.name)
+        self._loop = asyncio.get_running_loop()
+        self._pool: ThreadPoolExecutor | None = None
+        if not isinstance(self._loop, VirtualLoop):
+            self._pool = ThreadPoolExecutor(1, thread_name_prefix=unit.name)
+        self._news, self._virtual_news = threading.Condition(), asyncio.Event()
         self._arrived: dict[str, _Arrival] = {}
-        self._news = asyncio.Event()
+        self._next: _Arrival | None = None
+        self._is_idle = False
+        self._waiting: deque[_Round] = deque()
+        self._is_over = False
+        self.lost = 0
 
     async def place(self, nice: int, cpus: list[int]) -> ThreadPlace | None:
         """Place the thread; return None on a ``VirtualLoop``, which has none.
@@ -53,49 +78,100 @@ class UnitThread:
         Raises:
             ThreadRefused: It cannot run there.
         """
-        return await self._in_thread(
-            lambda: None if threading.current_thread() is threading.main_thread() else place_thread(nice, cpus)
-        )
+        if self._pool is None:
+            return None
+        return await self._loop.run_in_executor(self._pool, place_thread, nice, cpus)
 
     def put(self, key: str, value: object) -> None:
-        """Take a value from outside the unit, at once or after the round that runs."""
-        older = self._arrived.get(key)
-        self._arrived[key] = _Arrival(value, current_cause.get(), 0 if older is None else older.overwritten + 1)
-        self._news.set()
+        """Take a value from outside the unit, at once or after the round that runs; called in the event loop."""
+        cause = current_cause.get()
+        with self._news:
+            if self._is_idle and self._next is None:
+                self._next = _Arrival(key, value, cause)
+            else:
+                older = self._arrived.get(key)
+                self._arrived[key] = _Arrival(key, value, cause, 0 if older is None else older.overwritten + 1)
+            self._news.notify()
+        self._virtual_news.set()
 
     async def keep(self) -> None:
         """Have all rounds, until cancelled; the round that then runs ends by itself, and nobody gets its outputs."""
         try:
-            while True:
-                await self._wait()
-                if self._unit.tick(self._clock.now_s()):
-                    current_cause.set("")
-                    await self._round()
-                if self._arrived:
-                    key, arrival = next(iter(self._arrived.items()))
-                    del self._arrived[key]
-                    if self._unit.put(key, arrival.value, arrival.overwritten):
-                        current_cause.set(arrival.cause)
-                        await self._round()
+            if self._pool is None:
+                await self._live_virtually()
+            else:
+                await self._loop.run_in_executor(self._pool, self._live)
         finally:
-            self._pool.shutdown(wait=False, cancel_futures=True)
+            with self._news:
+                self._is_over = True
+                self._news.notify()
+            if self._pool is not None:
+                self._pool.shutdown(wait=False, cancel_futures=True)
 
-    async def _wait(self) -> None:
-        """Return when a round is due because of the time, or a value waits."""
-        self._news.clear()
-        if self._arrived:
-            return
-        left_s = (self._unit.due_s - self._clock.now_s()) / self._clock.rate
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(None if left_s == math.inf else left_s):
-                await self._news.wait()
+    # ------------------------------------------------------------------ in the thread
+    def _live(self) -> None:
+        while not self._is_over:
+            with self._news:
+                self._is_idle = not (self._arrived or self._is_over)
+                if self._is_idle:
+                    self._news.wait(max(0.0, min(self._left_s, LONGEST_WAIT_S)))
+                self._is_idle = False
+            self._turn()
 
-    async def _round(self) -> None:
+    async def _live_virtually(self) -> None:
+        while True:
+            self._virtual_news.clear()
+            if not self._arrived:
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(None if self._left_s == math.inf else self._left_s):
+                        await self._virtual_news.wait()
+            self._turn()
+
+    @property
+    def _left_s(self) -> float:
+        """Seconds of the machine until the next round of the frequency."""
+        return (self._unit.due_s - self._clock.now_s()) / self._clock.rate
+
+    def _turn(self) -> None:
+        """Have the round that is due because of the time, and the one because of a value that waits."""
+        if self._unit.tick(self._clock.now_s()):
+            self._round("")
+        with self._news:
+            arrival, self._next = self._next, None
+            if arrival is None and self._arrived:
+                arrival = self._arrived.pop(next(iter(self._arrived)))
+        if arrival is not None and self._unit.put(arrival.key, arrival.value, arrival.overwritten):
+            self._round(arrival.cause)
+
+    def _round(self, cause: str) -> None:
         now_s = self._clock.now_s()
-        self._produced(now_s, await self._in_thread(lambda: self._unit.run(now_s)))
+        done = _Round(now_s, cause, self._unit.run(now_s))
+        if self._pool is None:
+            self._hand_on(done)
+            return
+        with self._news:
+            is_first = not self._waiting
+            self._waiting.append(done)
+            if len(self._waiting) > MOST_WAITING:
+                self._waiting.popleft()
+                self.lost += 1
+        if is_first:
+            with contextlib.suppress(RuntimeError):  # the component and its loop have ended
+                self._loop.call_soon_threadsafe(self._hand_next_on)
 
-    async def _in_thread(self, act: Callable[[], T]) -> T:
-        return await asyncio.get_running_loop().run_in_executor(self._pool, act)
+    # ------------------------------------------------------------------ in the event loop
+    def _hand_next_on(self) -> None:
+        """Hand on the outputs of one round; those of the next in a step of its own, so that listeners get both."""
+        with self._news:
+            done, has_more = self._waiting.popleft(), len(self._waiting) > 0
+        self._hand_on(done)
+        if has_more:
+            self._loop.call_soon(self._hand_next_on)
+
+    def _hand_on(self, done: _Round) -> None:
+        if not self._is_over:
+            current_cause.set(done.cause)
+            self._produced(done.now_s, done.produced)
 
 
 class LoopPublisher:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import signal
+import time
 from pathlib import Path
 
 import msgspec
@@ -17,6 +20,7 @@ from backbone.keys import Conversation
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
 WITHIN_S = 20.0
+REPLACED_WITHIN_S = 8.0  # a hub that hangs is replaced after 3 s
 TESTER = "ui_console/tester"
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 FIRST = '<module name="first" class="pair:Smoothing"/>'
@@ -87,6 +91,25 @@ async def test_the_example_goes_into_a_mission_unchanged() -> None:
         assert "waves" in done.stdout
         tree = mission.command("scout-backbone", "tree", "--json", "--mission", mission.name)
         assert json.loads(tree.stdout)["tree"] == []
+
+
+@pytest.mark.thorough
+@pytest.mark.alone
+@pytest.mark.parametrize("how", [signal.SIGSTOP, signal.SIGKILL])
+async def test_a_unit_goes_on_in_its_process_while_the_hub_of_its_mission_is_replaced(how: signal.Signals) -> None:
+    async def statistics() -> dict[str, float]:
+        async with mission.bus(TESTER) as bus:
+            return (await bus.ask("mission_control/waves", AskStatistics(), Statistics, within_s=WITHIN_S)).values
+
+    with mission_up(mission_xml=EXAMPLES / "pair.xml") as mission:
+        hub, unit = mission.component("nameserver")["pid"], mission.component("waves")["pid"]
+        began_s, before = time.monotonic(), (await statistics())["rounds"]
+        os.kill(hub, how)
+        await asyncio.sleep(REPLACED_WITHIN_S)
+        rounds, passed_s = (await statistics())["rounds"] - before, time.monotonic() - began_s
+        assert mission.component("nameserver")["pid"] != hub
+        assert mission.component("waves")["pid"] == unit
+        assert rounds > 0.8 * 20 * passed_s, (rounds, passed_s)
 
 
 def test_load_shows_the_processor_time_of_modules_and_processes() -> None:

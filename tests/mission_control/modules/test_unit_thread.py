@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import threading
+import time
 from collections.abc import AsyncIterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -21,6 +22,7 @@ from backbone.component.messages import AskStatistics, Statistics
 from backbone.debug_views import ListViews, Views
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
+from mission_control.modules import unit_thread
 from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
 from mission_control.modules.module import Module
 from mission_control.modules.orders import ModuleOrder, Source, UnitParameters
@@ -31,6 +33,7 @@ TESTER = "ui_console/tester"
 WITHIN_S = 20.0
 NUMBERS = {"number": GivenKey("sample_modules:Number", Source(TESTER, Conversation.EVENTS))}
 OPEN, BEGUN = threading.Event(), threading.Event()
+TICKS_S: list[float] = []
 
 
 class Passing(Module):
@@ -50,6 +53,20 @@ class Passing(Module):
             raise ArithmeticError("negative")
         self.debug.value("passed", inputs.number.value)
         return self.Outputs(inputs.number)
+
+
+class Ticking(Module):
+    """Notes when each of its rounds is."""
+
+    class Outputs(Module.Outputs):
+        end: Number
+
+    def reset(self) -> None:
+        TICKS_S.clear()
+
+    def update(self, inputs: Module.Inputs) -> Outputs:
+        TICKS_S.append(time.monotonic())
+        return self.Outputs(Number(float(len(TICKS_S))))
 
 
 class Behind(Passing):
@@ -130,6 +147,41 @@ async def test_a_long_round_delays_no_answer_and_only_the_newest_value_waits_for
 
 async def _statistics(bus: Bus) -> dict[str, float]:
     return (await bus.ask("mission_control/one", AskStatistics(), Statistics, within_s=WITHIN_S)).values
+
+
+TICKING = UnitOrder(
+    name="one", modules=[ModuleOrder("ticking", f"{__name__}:Ticking")], frequency_hz=100.0, own_thread=True
+)
+BLOCKED_S = 1.0  # as long as a hub that hangs blocks who sends
+
+
+async def test_a_unit_keeps_its_rate_while_the_loop_is_blocked_and_its_outputs_come_afterwards_in_order(
+    local_mission: Any, beside: Any
+) -> None:
+    async with units(local_mission, beside, [TICKING]) as (_bus, heard), asyncio.timeout(WITHIN_S):
+        assert (await heard.get()).value >= 1
+        before = len(TICKS_S)
+        time.sleep(BLOCKED_S)  # noqa: ASYNC251  that is what is tried
+        during = len(TICKS_S) - before
+        assert during > 0.1 * BLOCKED_S * 100.0  # a machine with much other work
+        values = [(await heard.get()).value for _ in range(during)]
+    assert values == [values[0] + number for number in range(during)]
+
+
+async def test_what_waits_for_a_blocked_loop_is_bounded_and_what_is_lost_is_counted(
+    local_mission: Any, beside: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unit_thread, "MOST_WAITING", 5)
+    async with units(local_mission, beside, [TICKING]) as (bus, heard), asyncio.timeout(WITHIN_S):
+        first = (await heard.get()).value
+        time.sleep(BLOCKED_S)  # noqa: ASYNC251  that is what is tried
+        last = float(len(TICKS_S))
+        values = [first]
+        while values[-1] < last:
+            values.append((await heard.get()).value)
+        told = await _statistics(bus)
+    assert values == sorted(set(values))
+    assert told["thread_lost"] >= last - first + 1 - len(values) > 0
 
 
 async def test_a_bug_in_the_thread_ends_the_unit(local_mission: Any, beside: Any) -> None:
