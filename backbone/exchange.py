@@ -63,14 +63,12 @@ class SwapClass(Message, frozen=True):
     Attributes:
         class_path: As in ``SwapModule``, as are all others. A driver may also have the name of one that is built in.
         parameters: Of the behavior; for a driver, its options.
-        silent_s: Longest time of a driver's call; a behavior may be silent.
     """
 
     class_path: Line
     parameters: Values = {}
     prove_s: Duration = PROVE_S
     ready_within_s: Duration = READY_WITHIN_S
-    silent_s: Duration = SILENT_S
     user: Mention = ""
 
 

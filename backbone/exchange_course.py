@@ -39,7 +39,7 @@ class ExchangeRules(msgspec.Struct, frozen=True):
 
     prove_s: float
     ready_within_s: float
-    silent_s: float
+    silent_s: float = 0.0
 
 
 class ExchangeCourse:

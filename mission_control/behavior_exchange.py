@@ -256,7 +256,7 @@ class BehaviorExchanges:
             raise
         by = f" for {asked.user}" if asked.user else ""
         self._tell(f"{asked.class_path} warms beside {class_path_of(old)}{by}")
-        rules = ExchangeRules(asked.prove_s, asked.ready_within_s, asked.silent_s)
+        rules = ExchangeRules(asked.prove_s, asked.ready_within_s)
         course = ExchangeCourse(rules, self._changed, old.clock.now_s())
         going = self._exchange = _Exchange(asked, old, new, course)
         self._begin(new, _survived(new.run()))
