@@ -16,10 +16,17 @@ SILENT_S = 1.0  # chosen: many rounds of what robots live by, and short enough f
 
 
 class UnknownModule(Refusal):
-    """No module has this name."""
+    """Nothing that can be exchanged has this name."""
 
     code = "exchange.unknown"
-    remedy = "Name a module of the mission file."
+    remedy = "Name a module, behavior or resource of the mission file."
+
+
+class Silent(Refusal):
+    """What is to be exchanged does not answer; nothing was changed."""
+
+    code = "exchange.silent"
+    remedy = "See 'scout-backbone status'. Its creator replaces a process that hangs; swap again then."
 
 
 class ExchangeRunning(Refusal):

@@ -272,22 +272,33 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 task.cancel()
         self._keeping = self._acting = None
 
-    async def _hear_of_grant(self, arc: ArcClient, need: ArcNeed) -> None:
-        """Know the grant of the class in charge.
+    def _compare_needs(self, need: ArcNeed | None) -> None:
+        """Note how its ARC is to change when it is in charge.
 
         Raises:
-            WrongClass: It needs another ARC than that class.
+            WrongClass: It needs another ARC than the class in charge.
         """
-        other = self.exchanges.present
-        assert isinstance(other, Behavior)  # noqa: S101  its exchanges are those of a behavior
-        had: ArcNeed | None = other.claimed
-        times = need.minimum_runtime_s, need.maximum_runtime_s
-        if had is None or need != msgspec.structs.replace(had, minimum_runtime_s=times[0], maximum_runtime_s=times[1]):
+        other = self._in_charge
+        had, same = other.claimed, need
+        if had is not None and need is not None:
+            times = need.minimum_runtime_s, need.maximum_runtime_s
+            same = msgspec.structs.replace(had, minimum_runtime_s=times[0], maximum_runtime_s=times[1])
+        if (had is None) != (need is None) or need != same:
             raise WrongClass(f"{self.name} would need another ARC than now", remedy="Ask for the ARC of the tree.")
         self.claimed, self._has_other_times = need, need != had
         self._suspended_because = other.suspended_because
-        if other.arc is not None and other.arc.granted is not None:
-            await arc.handle(other.arc.granted)
+
+    async def _hear_of_grant(self, arc: ArcClient) -> None:
+        """Know the grant of the class in charge."""
+        held = self._in_charge.arc
+        if held is not None and held.granted is not None:
+            await arc.handle(held.granted)
+
+    @property
+    def _in_charge(self) -> Behavior[Any]:
+        present = self.exchanges.present
+        assert isinstance(present, Behavior)  # noqa: S101  its exchanges are those of a behavior
+        return present
 
     # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
@@ -305,14 +316,16 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             await self._parent.wait_noted()
         await self.start()
         need = self.need()
+        if not self.gate.is_open:
+            self._compare_needs(need)
         if need is not None and not self.status.is_final:
             self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self, self.not_now)
             self.arc.frames(self._saw)
-            self._suspended_because = NO_GRANT_YET
             if self.gate.is_open:
+                self._suspended_because = NO_GRANT_YET
                 self._keeping = self.begin_task(self._keep(self.arc, need), "arc")
             else:
-                await self._hear_of_grant(self.arc, need)
+                await self._hear_of_grant(self.arc)
         self.has_begun = True
         self._reported_because = self.suspended_because
         self._send_report()  # it takes the place of an earlier life's
