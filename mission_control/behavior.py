@@ -251,7 +251,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Go on where another implementation is: its story, progress, grants and place in the tree."""
         self.story, self.payload, self.claimed = other.story, other.payload, self.claimed or other.claimed
         self.times_resumed, self.times_suspended = other.times_resumed, other.times_suspended
-        self.frames_seen, self.tree_version = other.frames_seen, other.tree_version
+        self.frames_seen, self.tree_version, self.pid = other.frames_seen, other.tree_version, other.pid
 
     def take_charge(self) -> None:
         """Command from now on, and keep the ARC."""

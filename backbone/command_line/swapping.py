@@ -44,17 +44,18 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
             raise NotExchanged(
                 f"{asked.module} is no module, behavior or resource", remedy="See 'scout-backbone status' for these."
             ) from None
-    show([_told(asked, swapped)])
+    counts = "round" if question is asked else "command" if at.startswith(f"{Subsystem.MISSION_CONTROL}/") else "call"
+    show([_told(asked, swapped, counts)])
     if swapped.remark:
         say(swapped.remark)
     return ExitCode.DONE if swapped.is_proved else ExitCode.REFUSED
 
 
-def _told(asked: SwapModule, swapped: Swapped) -> str:
+def _told(asked: SwapModule, swapped: Swapped, counts: str) -> str:
     state = "with the state of the old one" if swapped.keeps_state else "from a fresh state"
     times = f"{swapped.warming_s:.2f} s beside the old one"
     if swapped.proving_s or swapped.is_proved:
-        times += f", {swapped.proving_s:.2f} s and {counted(swapped.rounds, 'round')} to prove itself"
+        times += f", {swapped.proving_s:.2f} s and {counted(swapped.rounds, counts)} to prove itself"
     if swapped.is_proved:
         after = f"; {swapped.cause}" if swapped.cause else ""
         return f"{asked.module}: proved, {asked.class_path} goes on {state} ({times}){after}"

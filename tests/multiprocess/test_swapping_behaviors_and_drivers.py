@@ -6,7 +6,7 @@ import asyncio
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -87,7 +87,7 @@ def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def mission(source: Path, tmp_path: Path) -> Iterator[RunningMission]:
     file = tmp_path / "m.xml"
     file.write_text(MISSION)
-    with mission_up(mission_xml=file) as up:
+    with mission_up("--trace", str(tmp_path / "trace"), mission_xml=file) as up:
         yield up
 
 
@@ -131,7 +131,7 @@ def edit(source: Path, text: str) -> None:
 
 @pytest.mark.thorough
 async def test_a_patrol_is_exchanged_a_hundred_times_and_twenty_broken_ones_leave_it(
-    mission: RunningMission, source: Path
+    mission: RunningMission, source: Path, judged: Callable[[Path], None]
 ) -> None:
     async with mission.bus(TESTER) as bus:
         visits = Visits(bus)
@@ -157,6 +157,7 @@ async def test_a_patrol_is_exchanged_a_hundred_times_and_twenty_broken_ones_leav
         assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), "no way point is lost or doubled"
         robot = await statistics(bus, "resource_pool/scout1")
         assert (robot["refused_stale"], robot["connects"]) == (0, 1)
+    judged(source.parent / "trace")
 
 
 async def test_a_person_exchanges_a_behavior_and_a_driver_and_new_starts_have_them(
