@@ -15,6 +15,7 @@ import inspect
 from collections.abc import Callable, Mapping
 
 from backbone.errors import Refusal
+from backbone.exchange_course import UNPROVED
 from resource_pool.drivers.interface import HardwareFault
 
 HANGS_S = 0.2  # chosen: the old driver still has as long until the RC itself gives a call up; machine seconds
@@ -67,7 +68,7 @@ class DriverSlot:
         driver = self.works
         try:
             done: object = getattr(driver, name)(*(self._while_works(driver, one) for one in arguments), **named)
-        except Exception as error:
+        except UNPROVED as error:
             back = None if _is_no_fault(error) else self.on_trial(error)
             if back is None:
                 raise
@@ -89,7 +90,7 @@ class DriverSlot:
                 done: object = await getattr(driver, name)(*given, **named)
             self.calls += 1
             return done
-        except Exception as error:
+        except UNPROVED as error:
             fault = HardwareFault(f"{name} took longer than {HANGS_S} s") if isinstance(error, TimeoutError) else error
             if not _is_no_fault(error) and self.works is driver:
                 back = self.on_trial(fault)

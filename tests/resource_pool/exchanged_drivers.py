@@ -7,6 +7,7 @@ import asyncio
 from driver_bench import Bench
 
 from resource_pool.drivers.interface import DriverSite, HardwareFault
+from resource_pool.drivers.simulated import SimulatedScoutProtocol
 
 
 class First:
@@ -69,3 +70,10 @@ class SecondBeside(Second):
 class NoLamp:
     def __init__(self, site: DriverSite) -> None:
         pass
+
+
+class LoudProtocol(SimulatedScoutProtocol):
+    def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
+        if Bench.fault == "call":
+            raise ValueError("too loud")
+        return super().drive(left_rad_s, right_rad_s)

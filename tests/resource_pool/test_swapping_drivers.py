@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -19,12 +20,13 @@ from backbone.component.component import WrongParameter
 from backbone.component.messages import AskParameters, Parameters
 from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
+from backbone.keys import Conversation
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected
 from backbone.reading_anew import WrongClass
 from backbone.scheduling.requests import RcUse
-from resource_pool.commands import Drive
+from resource_pool.commands import Drive, Tune
 from resource_pool.drivers.interface import HardwareFault, UnknownDriver
-from resource_pool.messages import Applied
+from resource_pool.messages import Applied, Frame
 from resource_pool.rcs.skeleton import Lamp, Shine
 
 DRIVERS = "exchanged_drivers"
@@ -138,6 +140,16 @@ def test_refusals_change_nothing(local_mission: Any) -> None:
     bench(local_mission, "First", scene)
 
 
+@contextmanager
+def the_pool_is_read_anew() -> Iterator[None]:
+    """Let the module of the pool be the old one again afterwards."""
+    mine = sys.modules["pool_on_local_network"]
+    try:
+        yield
+    finally:
+        sys.modules["pool_on_local_network"] = mine
+
+
 EVENTS = st.lists(
     st.tuples(st.sampled_from(["shine", "connect", "disconnect", "swap"]), st.sampled_from(["", *FAULTS])), max_size=10
 )
@@ -192,8 +204,49 @@ def test_a_radio_goes_on_under_the_same_grant(local_mission: Any) -> None:
             after.breaks = True
             assert isinstance(await pool.outcome("radio"), HardwareFault), "a proved driver that breaks ends its RC"
 
-    mine = sys.modules["pool_on_local_network"]
-    try:
+    with the_pool_is_read_anew():
         run_virtual(main())
-    finally:
-        sys.modules["pool_on_local_network"] = mine
+
+
+def test_a_grabber_delivers_on_and_only_once(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["video", "grabber"], manager=False) as pool:
+            frames: list[Frame] = []
+            ear = pool.voice("ear")
+            ear.subscribe("resource_pool/one", Conversation.FRAMES, Frame, lambda heard: frames.append(heard.body))
+            grabber = "resource_pool/grabber"
+            await pool.manager_voice.ask(grabber, Connect("one", 7, 30.0, RcUse(), {}), Connected, within_s=1)
+            await pool.voice("one").ask(grabber, Tune("video", "scout1").under("one", 7), Applied, within_s=1)
+            old = pool.grabber_driver
+            swapping = asyncio.create_task(swap(pool, "pool_on_local_network:HandOperatedGrabber", at=grabber))
+            await pool.clock.sleep_s(0.5)
+            new = sys.modules["pool_on_local_network"].HandOperatedGrabber.built[-1]
+            for driver in (old, new):
+                driver.deliver(driver.picture())
+            await pool.clock.sleep_s(0.1)
+            assert (new.frequency, [(one.number, one.epoch) for one in frames]) == ("video", [(1, 7)])
+            await pool.manager_voice.ask(grabber, Disconnect("one", 7), Disconnected, within_s=1)
+            assert new.frequency == ""
+            assert (await swapping).is_proved
+
+    with the_pool_is_read_anew():
+        run_virtual(main())
+
+
+def test_a_protocol_is_exchanged_under_the_robot_s_name(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            at = "resource_pool/scout1"
+            Bench.fault = "call"
+            swapping = asyncio.create_task(swap(pool, "exchanged_drivers:LoudProtocol", at=at))
+            await pool.clock.sleep_s(0.2)
+            await command(pool, "one", 1, Drive(2.0, 2.0))
+            assert "too loud" in (await swapping).cause
+            Bench.fault = ""
+            assert (await swap(pool, "exchanged_drivers:LoudProtocol", at=at)).is_proved
+            told = await pool.voice("one").ask(at, AskParameters(), Parameters, within_s=1)
+            assert told.values["protocol"] == "exchanged_drivers:LoudProtocol"
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+
+    run_virtual(main())
