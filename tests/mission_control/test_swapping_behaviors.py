@@ -289,6 +289,32 @@ def test_its_end_during_an_exchange_is_its_end(stage: Stage, play: Play) -> None
     play(scene)
 
 
+@pytest.mark.parametrize("fails", [False, True])
+def test_an_arc_that_dies_meanwhile_is_claimed_again_by_the_one_in_charge(
+    stage: Stage, play: Play, fails: bool
+) -> None:
+    async def scene() -> None:
+        await stage.arc.grant()
+        if fails:
+            stage.edit(
+                "self.turns += 1", "self.turns += 1\n            if self.turns > 20: raise ValueError('planted')"
+            )
+        swapping = asyncio.create_task(stage.swap(prove_s=6.0, speed_rad_s=2.0))
+        await stage.sleep(0.5)
+        await stage.placer.kill("turner-capture")
+        await stage.placer.wait(lambda: "turner-capture" in stage.placer.arcs)
+        stage.arc = stage.placer.arcs["turner-capture"]
+        await stage.arc.grant()
+        assert (await swapping).is_proved is not fails
+        await stage.sleep(0.5)
+        assert stage.speeds() == ([2.0, 1.0] if fails else [2.0])
+        await stage.sleep(5.0)
+        assert stage.placer.arcs["turner-capture"] is stage.arc
+        assert stage.placer.started.count("turner-capture") == 2
+
+    play(scene)
+
+
 def swaps_going(swaps: Sequence[asyncio.Task[Any]]) -> bool:
     return any(not swap.done() for swap in swaps)
 
