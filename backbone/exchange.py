@@ -16,17 +16,31 @@ SILENT_S = 1.0  # chosen: many rounds of what robots live by, and short enough f
 
 
 class UnknownModule(Refusal):
-    """No module has this name."""
+    """Nothing that can be exchanged has this name."""
 
     code = "exchange.unknown"
-    remedy = "Name a module of the mission file."
+    remedy = "Name a module, behavior or resource of the mission file."
+
+
+class Silent(Refusal):
+    """What is to be exchanged does not answer; nothing was changed."""
+
+    code = "exchange.silent"
+    remedy = "See 'scout-backbone status'. Its creator replaces a process that hangs; swap again then."
 
 
 class ExchangeRunning(Refusal):
-    """An exchange in this unit is not over yet."""
+    """An exchange in this component is not over yet."""
 
     code = "exchange.running"
-    remedy = "Wait until it is over; 'scout-backbone status' shows it in the line of the unit."
+    remedy = "Wait until it is over; 'scout-backbone status' shows it in the line of the component."
+
+
+class NotExchanged(Refusal):
+    """A part cannot be exchanged as it is now."""
+
+    code = "exchange.not_now"
+    remedy = "Change the mission file, and bring the mission down and up."
 
 
 class SwapModule(Message, frozen=True):
@@ -50,16 +64,31 @@ class SwapModule(Message, frozen=True):
     user: Mention = ""
 
 
-class Swapped(Message, frozen=True):
-    """Answer to ``SwapModule``.
+class SwapClass(Message, frozen=True):
+    """Exchange the class of this behavior, or of this RC's driver; the answer comes when the exchange is over.
 
     Attributes:
-        is_proved: True: the new one produces. False: the old one does.
+        class_path: As in ``SwapModule``, as are all others. A driver may also have the name of one that is built in.
+        parameters: Of the behavior; for a driver, its options.
+    """
+
+    class_path: Line
+    parameters: Values = {}
+    prove_s: Duration = PROVE_S
+    ready_within_s: Duration = READY_WITHIN_S
+    user: Mention = ""
+
+
+class Swapped(Message, frozen=True):
+    """Answer to ``SwapModule`` and ``SwapClass``.
+
+    Attributes:
+        is_proved: True: the new one does the work. False: the old one does.
         cause: Why the old one came back, or could not be kept; empty: the new one has proved itself.
         keeps_state: True if the new one went on with the state of the old one.
         warming_s: Mission time from its begin to the switch; without a switch, to the end.
         proving_s: Mission time from the switch to the end.
-        rounds: Rounds in which the new one produced during the exchange.
+        rounds: Rounds of a module, commands of a behavior or calls of a driver while it proved itself.
         remark: What the operator should know besides; empty: nothing.
     """
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Coroutine, Mapping, Sequence
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import msgspec
 
@@ -22,18 +22,23 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
+from backbone.component.process import load_class
 from backbone.debug_views import ListViews, LookAt
 from backbone.errors import LinkError, Refusal
+from backbone.exchange import SwapClass
 from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
+from backbone.reading_anew import WrongClass
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
+from mission_control.behavior_exchange import BehaviorExchanges
 from mission_control.behavior_hooks import BehaviorHooks, suspended_because
 from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw
 from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_by_placer, end_task, why
 from mission_control.children import Children, Decision
 from mission_control.children_loop import ChildrenLoop
 from mission_control.debug_views import DebugViews
+from mission_control.gated_bus import GatedBus
 from mission_control.keeper_reports import KeeperReports
 from mission_control.messages import (
     AskBehavior,
@@ -100,6 +105,19 @@ class NotYourOrder(Refusal):
     remedy = "Take the robot at a console; behaviors of the mission are stopped by 'scout-backbone stop'."
 
 
+def load_behavior(class_path: str) -> type[Behavior[BehaviorParameters]]:
+    """Return the behavior class at ``package.module:Class``.
+
+    Raises:
+        WrongClassPath: No component class has this path.
+        WrongClass: It is no behavior.
+    """
+    found = load_class(class_path)
+    if not issubclass(found, Behavior):
+        raise WrongClass(f"{class_path} is no behavior", remedy="Derive it from mission_control.behavior:Behavior.")
+    return found
+
+
 B = TypeVar("B", bound=BehaviorParameters)
 
 
@@ -113,14 +131,20 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
     accepts: ClassVar[Accepts | None] = (
-        ArcNotice | ChildReport | AskBehavior | TakeBranch | BreakOff | ListViews | LookAt
+        ArcNotice | ChildReport | AskBehavior | TakeBranch | BreakOff | ListViews | LookAt | SwapClass
     )
     children_together: ClassVar[bool] = True
     children_allowed: ClassVar[tuple[int, int] | None] = None
     may_claim: ClassVar[bool] = True
+    hands_over: ClassVar[frozenset[str]] = frozenset()
+    """Attributes with which another class in its place goes on, if that names the same; see ``behavior_exchange``."""
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
-        super().__init__(launch, bus, clock)
+        self.gate = bus if isinstance(bus, GatedBus) else GatedBus(bus)
+        """Its bus; shut while another class is in charge in its place."""
+        self.exchanges = BehaviorExchanges(self, load_behavior)
+        """The classes that were in charge; of the component."""
+        super().__init__(launch, self.gate, clock)
         self.status, self.payload = BehaviorStatus.RUNNING, dict[str, object]()
         self.rcs: Mapping[str, str] = {}
         """Role → name of the granted RCs; empty while suspended."""
@@ -128,16 +152,18 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """The granted RC that has a body; empty while suspended, and without one."""
         self.arc: ArcClient | None = None
         """The client of its ARC; None without an ARC."""
-        self.views = DebugViews(bus, clock)
+        self.views = DebugViews(self.gate, clock)
         """Its debug views: pictures and values that cost nothing unless a console looks."""
         self.times_resumed = self.times_suspended = self.frames_seen = 0
         self.child_nodes = {node.name: node for node in self.parameters.children}
         """Name of a child → its node of the tree."""
         self._children = ChildrenLoop(self, self.rules(list(self.child_nodes)))
         self._suspended_because = self._reported_because = ""
-        self._is_wound_up = self._has_begun = False
-        self._tree_version, self._left = 0, set[str]()
-        self._need: ArcNeed | None = None
+        self._is_wound_up = self.has_begun = False
+        self.tree_version, self._left = 0, set[str]()
+        self.claimed: ArcNeed | None = None
+        """What it asks of its ARC."""
+        self._has_other_times = self._resumes_again = False
         self._claim: dict[str, object] = {}
         self._parent: ParentReports | KeeperReports | None = None
         self._keeping: asyncio.Task[None] | None = None
@@ -176,13 +202,13 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Why it is not at work, see ``BehaviorState``."""
         if self.status.is_final:
             return ""
-        if self.parameters.keeper and not self._has_begun:
+        if self.parameters.keeper and not self.has_begun:
             return NO_GRANT_YET
         return self._suspended_because if self.arc is not None else self._children.rules.suspended_because
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
-        if self.status.is_final or not status.is_final:
+        if self.status.is_final or not status.is_final or not self.exchanges.may_finish(self, status, payload or {}):
             return
         self.status, self.payload = status, dict(payload or {})
         if status is BehaviorStatus.FAILURE and self._parent is None and not self._children.absences(has_finished=True):
@@ -196,6 +222,83 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if not self.status.is_final:
             self.payload = dict(payload)
             self._send_report()
+
+    @property
+    def is_ordered(self) -> bool:
+        """True: a console ordered it."""
+        return bool(self.parameters.keeper)
+
+    # ------------------------------------------------------------------ in charge, or beside the one in charge
+    async def run(self) -> None:
+        """Live, with every class that takes the place of this one; see ``Component.run``."""
+        life = super().run()
+        await (self.exchanges.run(life) if self.gate.is_first else life)
+
+    def end(self, reason: str) -> None:
+        """End the component in good order."""
+        present = self.exchanges.present
+        if self.gate.is_first and present is not self:  # its process ends it
+            present.end(reason)
+        else:
+            super().end(reason)
+
+    def fail(self, bug: BaseException) -> None:
+        """End because of a bug; the component ends if no other class is there."""
+        super().fail(bug)
+        self.exchanges.failed(self, bug)
+
+    def go_on_from(self, other: Self) -> None:
+        """Go on where another implementation is: its story, progress, grants and place in the tree."""
+        self.story, self.payload, self.claimed = other.story, other.payload, self.claimed or other.claimed
+        self.times_resumed, self.times_suspended = other.times_resumed, other.times_suspended
+        self.frames_seen, self.tree_version, self.pid = other.frames_seen, other.tree_version, other.pid
+
+    def take_charge(self) -> None:
+        """Command from now on, and keep the ARC."""
+        if self.gate.is_open:
+            return
+        self.gate.open()
+        if self.arc is not None and self.claimed is not None and self._keeping is None:
+            self._keeping = self.begin_task(self._keep(self.arc, self.claimed, is_there=True), "arc")
+        if self.rcs and not self.status.is_final and (self._acting is None or self._acting.done()):
+            self._acting = self.begin_task(self._act(), "act")
+        self.changed()
+
+    def stand_by(self) -> None:
+        """Command no more; keep the state, and hear of grants."""
+        self.gate.shut()
+        for task in (self._keeping, self._acting):
+            if task is not None and task is not asyncio.current_task():
+                task.cancel()
+        self._keeping = self._acting = None
+
+    def _compare_needs(self, need: ArcNeed | None) -> None:
+        """Note how its ARC is to change when it is in charge.
+
+        Raises:
+            WrongClass: It needs another ARC than the class in charge.
+        """
+        other = self._in_charge
+        had, same = other.claimed, need
+        if had is not None and need is not None:
+            times = need.minimum_runtime_s, need.maximum_runtime_s
+            same = msgspec.structs.replace(had, minimum_runtime_s=times[0], maximum_runtime_s=times[1])
+        if (had is None) != (need is None) or need != same:
+            raise WrongClass(f"{self.name} would need another ARC than now", remedy="Ask for the ARC of the tree.")
+        self.claimed, self._has_other_times = need, need != had
+        self._suspended_because = other.suspended_because
+
+    async def _hear_of_grant(self, arc: ArcClient) -> None:
+        """Know the grant of the class in charge."""
+        held = self._in_charge.arc
+        if held is not None and held.granted is not None:
+            await arc.handle(held.granted)
+
+    @property
+    def _in_charge(self) -> Behavior[Any]:
+        present = self.exchanges.present
+        assert isinstance(present, Behavior)  # noqa: S101  its exchanges are those of a behavior
+        return present
 
     # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
@@ -213,12 +316,17 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             await self._parent.wait_noted()
         await self.start()
         need = self.need()
+        if not self.gate.is_open:
+            self._compare_needs(need)
         if need is not None and not self.status.is_final:
             self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self, self.not_now)
             self.arc.frames(self._saw)
-            self._suspended_because = NO_GRANT_YET
-            self._keeping = self.begin_task(self._keep(self.arc, need), "arc")
-        self._has_begun = True
+            if self.gate.is_open:
+                self._suspended_because = NO_GRANT_YET
+                self._keeping = self.begin_task(self._keep(self.arc, need), "arc")
+            else:
+                await self._hear_of_grant(self.arc)
+        self.has_begun = True
         self._reported_because = self.suspended_because
         self._send_report()  # it takes the place of an earlier life's
         self._children.begin()
@@ -297,8 +405,13 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.story.note(self.name, f"resumed with {held}")
         self.report(f"holds {held}")
         self._send_report_if_suspension_changed()
-        await self.resumed(notice.rcs)
-        if self.rcs and not self.status.is_final:
+        try:
+            await self.resumed(notice.rcs)
+        except SwappedOut:
+            if self.gate.is_open:
+                raise
+            self._resumes_again = True  # when it is in charge
+        if self.rcs and not self.status.is_final and self.gate.is_open:
             await self._stop_acting()
             self._acting = self.begin_task(self._act(), "act")
 
@@ -337,13 +450,25 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             console=bool(self.parameters.keeper),
         )
 
-    async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
-        self._need, self._claim = need, self._claim_of(need)
+    async def _keep(self, arc: ArcClient, need: ArcNeed, *, is_there: bool = False) -> None:
+        self.claimed, self._claim = need, self._claim_of(need)
+        patience_s, changed = START_PATIENCE_S, self.changed
         try:
-            await arc.keep(self.clock, need.kind, self._claim, patience_s=START_PATIENCE_S, on_changed=self.changed)
+            if self._has_other_times:
+                self._has_other_times = False
+                await self._want_times(arc, need)
+            await arc.keep(
+                self.clock, need.kind, self._claim, patience_s=patience_s, on_changed=changed, is_there=is_there
+            )
         except Refusal as refusal:
             self.report(f"no ARC: {refusal}")
             self.finish(BehaviorStatus.FAILURE, why(refusal))
+
+    async def _want_times(self, arc: ArcClient, need: ArcNeed) -> None:
+        try:
+            await arc.want_runtime(need.minimum_runtime_s, need.maximum_runtime_s)
+        except (Refusal, LinkError) as error:  # it has those of the class before until it is claimed again
+            self.story.note(arc.arc, f"its run times were not changed: {error}")
 
     def _saw(self, frame: Frame) -> None:
         if self.rcs and not self.status.is_final:
@@ -353,12 +478,19 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     async def _act(self) -> None:
         while True:
             try:
+                if self._resumes_again:
+                    self._resumes_again = False
+                    await self.resumed(self.rcs)
                 return await self.act()
             except SwappedOut as refusal:  # the grant ended first; ``resumed`` begins the next turn
                 log.info("%s stopped acting: %s", self.name, refusal.detail)
                 return None
             except LinkError as error:
                 log.info("%s acts again: %s", self.name, error)
+            except SystemExit as left:
+                if self.gate.is_first:
+                    raise
+                raise WrongClass(f"SystemExit: {left}") from left  # of a class that has not proved itself
             except EmergencyStopped as stopped:
                 await self._wait_until_it_may_move(stopped)
                 continue
@@ -400,17 +532,17 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     # ------------------------------------------------------------------ the tree
     async def _take(self, taken: TakeBranch) -> BranchTaken:
         """Take the place in the changed tree; a message that comes again waits for the same ends."""
-        if taken.version >= self._tree_version:
-            anew = taken.anew if taken.version > self._tree_version else []
-            self._tree_version = taken.version
+        if taken.version >= self.tree_version:
+            anew = taken.anew if taken.version > self.tree_version else []
+            self.tree_version = taken.version
             arc, self.parameters = self.parameters.arc, self._with_parameters(taken.place)
             before, nodes = set(self.child_nodes), {node.name: node for node in self.parameters.children}
             self._left = (self._left | before) - nodes.keys()
             self.child_nodes.clear()
             self.child_nodes.update(nodes)
-            if self._need is not None:
-                self._need = (self.need() if self.parameters.arc != arc else None) or self._need
-                self._claim.update(self._claim_of(self._need))
+            if self.claimed is not None:
+                self.claimed = (self.need() if self.parameters.arc != arc else None) or self.claimed
+                self._claim.update(self._claim_of(self.claimed))
             self.story.note(self.name, f"takes its place in version {taken.version} of the tree")
             self.children_changed()
             await self._children.rearranged(self._left, anew)

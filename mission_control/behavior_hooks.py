@@ -62,6 +62,14 @@ class BehaviorHooks:
             deadline_s: Seconds left.
         """
 
+    def is_ready(self) -> bool:
+        """Return whether it can take the place of another class.
+
+        When: again and again while it runs beside that class (``scout-backbone swap``), after ``start``. What: True as
+        soon as it has seen enough, for instance pictures. Not: wait.
+        """
+        return True
+
     def not_now(self) -> float:
         """Return the time that is needed beyond the end of the slice.
 

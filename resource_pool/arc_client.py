@@ -170,6 +170,7 @@ class ArcClient:
         parameters: dict[str, object],
         *,
         rests: bool = False,
+        is_there: bool = False,
         patience_s: float = 0.0,
         on_changed: Callable[[], None] = lambda: None,
     ) -> None:
@@ -183,6 +184,7 @@ class ArcClient:
             parameters: Made by ``claim_parameters``.
             rests: True: the ARC was started with these parameters before and rests; it is only asked to want time
                 again, unless it is gone.
+            is_there: True: it was claimed for this owner before, and only has to be claimed again when it is gone.
             patience_s: Time in which a refused first start is repeated, seconds of the machine, because a host may be
                 returning or an ARC of an earlier life may be ending.
             on_changed: Called when ``wish.absence()`` may have changed.
@@ -191,7 +193,7 @@ class ArcClient:
             Refusal: The ARC did not start, or its request can never be served.
         """
         keeper = ArcKeeper(self._bus, self.arc, self.wish, self, clock, on_changed)
-        await keeper.keep(kind, parameters, rests=rests, patience_s=patience_s)
+        await keeper.keep(kind, parameters, rests=rests, is_there=is_there, patience_s=patience_s)
 
     async def handle(self, notice: ArcNotice) -> Noted:
         """Record a notice of the ARC and call the listener; return the reply to the ARC.

@@ -64,9 +64,11 @@ class ArcKeeper:
         self._bus, self._arc, self._wish, self._client = bus, arc, wish, client
         self._clock, self._on_changed = clock, on_changed
 
-    async def keep(self, kind: str, parameters: dict[str, object], *, rests: bool, patience_s: float) -> None:
+    async def keep(
+        self, kind: str, parameters: dict[str, object], *, rests: bool, patience_s: float, is_there: bool = False
+    ) -> None:
         """Claim the ARC, and claim it again whenever it is gone, until cancelled; see ``ArcClient.keep``."""
-        is_there = rests and await self._wake()
+        is_there = is_there or (rests and await self._wake())
         give_up_s = self._clock.now_s() + patience_s * self._clock.rate
         while True:
             if not is_there:

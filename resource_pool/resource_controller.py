@@ -24,6 +24,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
+from backbone.exchange import SwapClass
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.ranges import LONGEST_LEASE_S
@@ -42,6 +43,8 @@ from backbone.rc_manager.messages import (
 from backbone.scheduling.requests import Holder, Lease
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of
 from resource_pool.commands import OF_THE_BASE, Command
+from resource_pool.driver_exchange import DriverExchanges
+from resource_pool.driver_slot import slot_for
 from resource_pool.drivers.interface import (
     AdjustableDriver,
     DriverSite,
@@ -104,12 +107,16 @@ class ResourceController(Component[R], Generic[R]):
     outlasts_s: ClassVar[float] = 0.0
     """Time for which the effect of a command may outlast the process, mission seconds. For this time a restarted RC
     confirms no disconnection of an earlier hold. 0: the effect ends with the process."""
-    accepts: ClassVar[Accepts | None] = Connect | Disconnect | AskRc
+    driver_field: ClassVar[str] = "driver"
+    """Its parameter that names the driver."""
+    closed_most_s: ClassVar[float] = SAFE_WITHIN_S / 2
+    """Time for which its device may be closed in an exchange of the driver, because calls wait; machine seconds."""
+    accepts: ClassVar[Accepts | None] = Connect | Disconnect | AskRc | SwapClass
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
         if cls.commands is not None:
-            cls.accepts = Connect | Disconnect | AskRc | cls.commands
+            cls.accepts = Connect | Disconnect | AskRc | SwapClass | cls.commands
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(_sort_out_options(launch, self.parameters_type) if self.driver_kind else launch, bus, clock)
@@ -121,6 +128,7 @@ class ResourceController(Component[R], Generic[R]):
         self._unsafe: dict[str, Hold] = {}
         self._in_force = self.parameters
         self._drivers: list[Any] = []
+        self._exchanges = DriverExchanges(self)
         self._changing = asyncio.Lock()
         self._lease_changed = asyncio.Event()
 
@@ -178,6 +186,13 @@ class ResourceController(Component[R], Generic[R]):
         values = await self.obey(hold, order)
         return Applied(self.name, hold.epoch, self.clock.now_s(), order.word(), dict(values))
 
+    async def driver_exchanged(self) -> None:
+        """Bring the driver to the state of this RC.
+
+        When: after another driver has taken the place, or the old one is back. What: repeat what stands: tune, hear,
+        brightness; by default, nothing. Not: what a command gives anyway.
+        """
+
     def ranked(self, arc: str, epoch: int) -> None:
         """Apply the rank of this hold, if it is present. When: with each renewal."""
 
@@ -206,7 +221,9 @@ class ResourceController(Component[R], Generic[R]):
             UnknownDriver: No driver has this name.
             WrongParameter: The driver refuses its options.
         """
-        driver = build_driver(self.driver_kind, name or self.parameters.driver, self.driver_site())
+        named = name or self.parameters.driver
+        made = self._exchanges.made(lambda site: build_driver(self.driver_kind, named, site), self.driver_site())
+        driver = slot_for(made)
         self._drivers.append(driver)
         return driver
 
@@ -286,7 +303,11 @@ class ResourceController(Component[R], Generic[R]):
                 return Disconnected(self.holds.last_epoch)
             case AskRc():
                 return self.rc_state()
+            case SwapClass() as swap:
+                return await self._exchanges.swap(swap, self._drivers)
             case _:
+                for driver in self._drivers:
+                    await driver.wait_open()
                 self._check_sender(asked)
                 return await self.command(asked)
 
@@ -312,6 +333,10 @@ class ResourceController(Component[R], Generic[R]):
                 driver.adjust(site)
         self._in_force = now
         self.changed()
+
+    def has_driver(self, parameters: msgspec.Struct) -> None:
+        """Apply the parameters with another driver, which works already."""
+        self.parameters = self._in_force = self._with_parameters(msgspec.to_builtins(parameters))
 
     def publish_news(self) -> None:
         """Publish the holders, too."""

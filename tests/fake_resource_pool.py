@@ -24,8 +24,10 @@ from backbone.placer.messages import (
     Placement,
     Placements,
     PlacerQuestion,
+    ReviseStart,
     Start,
     Started,
+    StartRevised,
     StopComponent,
 )
 from backbone.wire import Envelope, Message
@@ -154,6 +156,7 @@ class FakePlacer:
         self.refusals: dict[str, Refusal] = {}
         self.placed: dict[str, Start] = {}
         self.requesters: dict[str, str] = {}
+        self.revised: list[ReviseStart] = []
         self.stopped: set[str] = set()
         self.stop_takes_s: dict[str, float] = {}
         self.on_arc: Callable[[FakeArc], None] = lambda arc: None
@@ -266,6 +269,9 @@ class FakePlacer:
             case StopComponent(name=name):
                 await self.clock.sleep_s(self.stop_takes_s.get(name, 0.0))
                 return await self._stop(name)
+            case ReviseStart() as revised:
+                self.revised.append(revised)
+                return StartRevised()
             case AskPlacement(name=name):
                 if name not in self.placed:
                     raise NotPlaced(f"{name} is not placed", stopped=name in self.stopped)

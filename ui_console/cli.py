@@ -13,6 +13,7 @@ from backbone.command_line.options import (
     SecretFile,
     Version,
     chosen,
+    complete_behavior,
     complete_mission,
     finite,
     hub_endpoint,
@@ -48,12 +49,6 @@ def complete_robot(ctx: typer.Context) -> list[str]:
     """Return the robots of the mission that is up, for a shell."""
     names = names_for(ctx)
     return names.robots if names is not None else []
-
-
-def complete_behavior(ctx: typer.Context) -> list[str]:
-    """Return the behaviors of the mission that is up, for a shell."""
-    names = names_for(ctx)
-    return names.behaviors if names is not None else []
 
 
 Mission = Annotated[

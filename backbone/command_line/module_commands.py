@@ -1,4 +1,4 @@
-"""``scout-backbone swap``: exchange a module of a mission that is up.
+"""``scout-backbone swap``: exchange a class of a mission that is up.
 
 Rules of this file: as those of ``cli``.
 """
@@ -14,6 +14,7 @@ from backbone.command_line.options import (
     MissionName,
     SecretFile,
     chosen,
+    complete_exchangeable,
     finite,
     named_value,
     run,
@@ -26,7 +27,14 @@ SILENT_S = 1.0  # as in exchange
 
 
 def swap(
-    module: Annotated[str, typer.Argument(metavar="MODULE", help="A module that runs.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME",
+            autocompletion=complete_exchangeable,
+            help="A module, a behavior, or a resource: its driver.",
+        ),
+    ],
     class_path: Annotated[
         str, typer.Argument(metavar="PACKAGE.MODULE:CLASS", help="Its new class; the file is read anew.")
     ],
@@ -53,18 +61,18 @@ def swap(
             min=0.0,
             max=LONGEST_S,
             callback=finite,
-            help="Mission seconds without an output that the old one has.",
+            help="Modules: mission seconds without an output that the old one has.",
         ),
     ] = SILENT_S,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Exchange a module while it runs: the old one comes back if the new one fails; 5 if it did."""
-    from backbone.command_line.swapping import swap_module
+    """Exchange a module, a behavior or a driver while it runs: the old one comes back if the new one fails (exit 5)."""
+    from backbone.command_line.swapping import swap_class
     from backbone.exchange import SwapModule
     from backbone.mission_log.operators import login_name
 
     where, values = chosen(mission, connect, secret_file), dict(map(named_value, parameter or []))
-    asked = SwapModule(module, class_path, values, prove_s, ready_within_s, silent_s, login_name())
-    run(lambda: swap_module(where, asked))
+    asked = SwapModule(name, class_path, values, prove_s, ready_within_s, silent_s, login_name())
+    run(lambda: swap_class(where, asked))

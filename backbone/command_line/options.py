@@ -183,6 +183,18 @@ def complete_resource(ctx: typer.Context) -> list[str]:
     return names.resources if names is not None else []
 
 
+def complete_behavior(ctx: typer.Context) -> list[str]:
+    """Return the behaviors of the mission that is up."""
+    names = names_for(ctx)
+    return names.behaviors if names is not None else []
+
+
+def complete_exchangeable(ctx: typer.Context) -> list[str]:
+    """Return the behaviors and resources of the mission that is up."""
+    names = names_for(ctx)
+    return sorted({*names.behaviors, *names.resources}) if names is not None else []
+
+
 def complete_type(ctx: typer.Context) -> list[str]:
     """Return the component types of the mission that is up."""
     names = names_for(ctx)

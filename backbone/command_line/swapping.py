@@ -1,73 +1,119 @@
-"""The work of ``scout-backbone swap``: a person exchanges a module, and the mission's log tells who did."""
+"""The work of ``scout-backbone swap``: a person exchanges a class, and the mission's log tells who did."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterable
 
-from backbone.addresses import NAMESERVER
+from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.interface import Bus
 from backbone.command_line.connection import connected
 from backbone.command_line.where import Where
-from backbone.component.messages import AskParameters, Parameters
-from backbone.errors import LinkError
-from backbone.exchange import SwapModule, Swapped, UnknownModule
+from backbone.component.messages import AskParameters, AskState, ComponentState, Parameters
+from backbone.errors import LinkError, Refusal
+from backbone.exchange import NotExchanged, Silent, SwapClass, SwapModule, Swapped, UnknownModule
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission.tables import EXECUTION_UNIT
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import did_you_mean
+from backbone.naming import Subsystem, component_of, did_you_mean
+from backbone.placer.messages import ListPlacements, Placements
 from backbone.spoken import counted
+from backbone.wire import UnknownMessage
 
 REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
 READ_WITHIN_S = 60.0  # chosen: an import of a large library on a busy machine, and the answer
 
 
-async def swap_module(where: Where, asked: SwapModule) -> ExitCode:
-    """Exchange the module, and print which of the two goes on.
+async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
+    """Exchange the module, the behavior's class or the resource's driver of this name, and print which goes on.
 
     Raises:
-        UnknownModule: The mission has no such module.
+        UnknownModule: Nothing of the mission that can be exchanged has this name.
+        Silent: What has this name does not answer; nothing was changed.
         Refusal: The new one cannot take the place; nothing was changed.
-        LinkError: The unit did not answer; the outcome is unknown.
+        LinkError: It did not answer; the outcome is unknown.
     """
     async with connected(where) as (bus, clock):
-        unit = await _unit_of(bus, asked.module)
+        at, question = await _question(bus, asked)
         publish_action(bus, clock, OperatorAction.SWAP, asked.module, f"for {asked.class_path}")
         within_s = (asked.ready_within_s + asked.prove_s) / clock.rate + READ_WITHIN_S
-        swapped = await bus.ask(unit, asked, Swapped, within_s=within_s)
-    show([_told(asked, swapped)])
+        try:
+            swapped = await bus.ask(at, question, Swapped, within_s=within_s)
+        except UnknownMessage:
+            raise NotExchanged(
+                f"{asked.module} is no module, behavior or resource", remedy="See 'scout-backbone status' for these."
+            ) from None
+    counts = "round" if question is asked else "command" if at.startswith(f"{Subsystem.MISSION_CONTROL}/") else "call"
+    show([_told(asked, swapped, counts)])
     if swapped.remark:
         say(swapped.remark)
     return ExitCode.DONE if swapped.is_proved else ExitCode.REFUSED
 
 
-def _told(asked: SwapModule, swapped: Swapped) -> str:
+def _told(asked: SwapModule, swapped: Swapped, counts: str) -> str:
     state = "with the state of the old one" if swapped.keeps_state else "from a fresh state"
     times = f"{swapped.warming_s:.2f} s beside the old one"
     if swapped.proving_s or swapped.is_proved:
-        times += f", {swapped.proving_s:.2f} s and {counted(swapped.rounds, 'round')} to prove itself"
+        times += f", {swapped.proving_s:.2f} s and {counted(swapped.rounds, counts)} to prove itself"
     if swapped.is_proved:
         after = f"; {swapped.cause}" if swapped.cause else ""
         return f"{asked.module}: proved, {asked.class_path} goes on {state} ({times}){after}"
     return f"{asked.module}: returned, the old one goes on ({times}): {swapped.cause}"
 
 
-async def _unit_of(bus: Bus, module: str) -> str:
-    """Return the address of the execution unit that runs a module."""
-    listed = await bus.ask(NAMESERVER, ListComponents(type=EXECUTION_UNIT), Components, within_s=REPLY_TIME_S)
-    units = [one.address for one in listed.components]
-    found = await asyncio.gather(*(_modules_of(bus, unit) for unit in units))
-    at = {name: unit for unit, names in zip(units, found, strict=True) for name in names}
-    if module not in at:
-        known = f"; there is: {', '.join(sorted(at))}" if at else ""
-        raise UnknownModule(f"no module {module!r} runs{did_you_mean(module, at)}{known}")
-    return at[module]
+async def _question(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | SwapClass]:
+    """Return whom to ask for the exchange, and what."""
+    listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
+    units = [one.address for one in listed.components if one.type == EXECUTION_UNIT]
+    at, silent = await _modules_of(bus, units)
+    if asked.module in at:
+        return at[asked.module], asked
+    others = {component_of(one.address): one.address for one in listed.components if _may_be_exchanged(one)}
+    if asked.module in others:
+        address = others[asked.module]
+        try:
+            await bus.ask(address, AskState(), ComponentState, within_s=REPLY_TIME_S)
+        except LinkError as error:
+            raise Silent(f"{asked.module} does not answer: {error}") from None
+        times = asked.prove_s, asked.ready_within_s
+        return address, SwapClass(asked.class_path, asked.parameters, *times, asked.user)
+    raise await _unknown(bus, asked.module, {*at, *others}, silent)
 
 
-async def _modules_of(bus: Bus, unit: str) -> list[str]:
+def _may_be_exchanged(one: ComponentState) -> bool:
+    pools = (f"{Subsystem.MISSION_CONTROL}/", f"{Subsystem.RESOURCE_POOL}/")
+    return one.address.startswith(pools) and one.type != EXECUTION_UNIT
+
+
+async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str]) -> Refusal:
+    """Return why nothing of this name can be exchanged."""
+    if silent:
+        units = ", ".join(map(component_of, silent))
+        return Silent(f"{name} is not known: {units} does not answer and may run it")
     try:
-        values = (await bus.ask(unit, AskParameters(), Parameters, within_s=REPLY_TIME_S)).values
-    except LinkError:  # it ends just now
-        return []
-    modules = values.get("modules", [])
-    return [str(one["name"]) for one in modules if isinstance(one, dict)] if isinstance(modules, list) else []
+        stopped = (await bus.ask(PLACER, ListPlacements(), Placements, within_s=REPLY_TIME_S)).stopped
+    except LinkError:
+        stopped = {}
+    if name in stopped:
+        remedy = "Start it: its owner does, or 'scout-backbone start'; then swap again."
+        return Silent(f"{name} is stopped: {stopped[name]}", remedy=remedy)
+    return UnknownModule(f"no module, behavior or resource {name!r} runs{did_you_mean(name, known)}")
+
+
+async def _modules_of(bus: Bus, units: list[str]) -> tuple[dict[str, str], list[str]]:
+    """Return module → address of the unit that runs it, and the units that did not answer."""
+
+    async def ask(unit: str) -> Parameters | None:
+        try:
+            return await bus.ask(unit, AskParameters(), Parameters, within_s=REPLY_TIME_S)
+        except LinkError:
+            return None
+
+    told = dict(zip(units, await asyncio.gather(*map(ask, units)), strict=True))
+    at = dict[str, str]()
+    for unit, answer in told.items():
+        modules = answer.values.get("modules") if answer is not None else None
+        listed = modules if isinstance(modules, list) else []
+        at |= {str(one["name"]): unit for one in listed if isinstance(one, dict)}
+    return at, [unit for unit, answer in told.items() if answer is None]

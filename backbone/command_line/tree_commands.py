@@ -17,7 +17,7 @@ from backbone.command_line.options import (
     MissionName,
     SecretFile,
     chosen,
-    complete_name,
+    complete_behavior,
     json_or_text,
     run,
 )
@@ -30,7 +30,7 @@ tree = typer.Typer(
 
 MOST_PLACES = 20_000  # as many elements as a mission file may have
 
-BehaviorName = Annotated[str, typer.Argument(autocompletion=complete_name, help="A behavior of the tree.")]
+BehaviorName = Annotated[str, typer.Argument(autocompletion=complete_behavior, help="A behavior of the tree.")]
 BranchFile = Annotated[Path, typer.Argument(metavar="BRANCH.xml", help="One <behavior> with all in it; '-': stdin.")]
 Place = Annotated[int, typer.Argument(min=0, max=MOST_PLACES, help="Number among its siblings, from 1; 0: the last.")]
 Seen = Annotated[
@@ -60,7 +60,7 @@ def show(
 def add(
     branch: BranchFile,
     below: Annotated[
-        str, typer.Option("--below", autocompletion=complete_name, help="Its parent; default: it is a root.")
+        str, typer.Option("--below", autocompletion=complete_behavior, help="Its parent; default: it is a root.")
     ] = "",
     place: Annotated[
         int, typer.Option("--place", min=0, max=MOST_PLACES, help="Number among its siblings, from 1; 0: the last.")
@@ -96,7 +96,8 @@ def remove(
 def move(
     name: BehaviorName,
     parent: Annotated[
-        str, typer.Argument(autocompletion=complete_name, help="Its parent from now on; the mission's name: a root.")
+        str,
+        typer.Argument(autocompletion=complete_behavior, help="Its parent from now on; the mission's name: a root."),
     ],
     place: Place = 0,
     seen: Seen = None,

@@ -95,10 +95,12 @@ class ReviseSpawn(Message, frozen=True):
 
     Attributes:
         parameters: All of them; the running process keeps its own.
+        class_path: Of its next life; empty: as before.
     """
 
     name: Name
     parameters: Values
+    class_path: Line = ""
 
 
 class SpawnRevised(Message, frozen=True):

@@ -166,8 +166,11 @@ class ProcessKeeper:
         except TimeoutError:
             raise self._failed(name, f"was not ready within {within_s:g} s") from None
 
-    def revise(self, name: str, parameters: dict[str, Any]) -> None:
+    def revise(self, name: str, parameters: dict[str, Any], class_path: str = "") -> None:
         """Start the component with these parameters from its next start on; its running process stays as it is.
+
+        Args:
+            class_path: Of the next start; empty: as before.
 
         Raises:
             NotHere: No component of this name is here.
@@ -175,8 +178,9 @@ class ProcessKeeper:
         kept = self._kept.get(name)
         if kept is None:
             raise NotHere(f"no {name} here", name=name)
-        kept.launch = msgspec.structs.replace(kept.launch, parameters=parameters)
-        kept.order = msgspec.structs.replace(kept.order, parameters=parameters)
+        class_path = class_path or kept.order.class_path
+        kept.launch = msgspec.structs.replace(kept.launch, parameters=parameters, class_path=class_path)
+        kept.order = msgspec.structs.replace(kept.order, parameters=parameters, class_path=class_path)
 
     # End
     async def end(

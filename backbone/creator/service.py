@@ -124,9 +124,9 @@ class Creator(Component[CreatorParameters]):
             case Spawn():
                 self._refuse_strangers(asked)
                 return await self._spawn(question)
-            case ReviseSpawn(name=name, parameters=parameters):
+            case ReviseSpawn(name=name, parameters=parameters, class_path=class_path):
                 self._refuse_strangers(asked)
-                self._keeper.revise(name, parameters)
+                self._keeper.revise(name, parameters, class_path)
                 self.story.note(name, "starts with other parameters from its next start on")
                 return SpawnRevised()
             case EndProcess(name=name, reason=reason, ask_s=ask_s, term_s=term_s):

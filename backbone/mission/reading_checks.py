@@ -1,4 +1,4 @@
-"""Whether conditions on readings name a resource, and a value that its class reports.
+"""Whether conditions on readings name a resource and a value that its class reports, and watchers a unit.
 
 Pure: elements and facts in, faults out. A class that is not known here is not judged.
 """
@@ -15,6 +15,8 @@ from backbone.naming import Subsystem, is_legal
 
 CONDITION = "mission_control.behaviors.condition:MessageCondition"
 """Class of the behaviors that judge messages."""
+WATCHER = "mission_control.behaviors.watch_for_motion:WatchForMotion"
+"""Class of the behaviors whose pictures a unit may judge: their parameter ``vision``."""
 READINGS = "Readings"
 """Their ``message``, if they judge what an RC measures."""
 VALUES = "values."
@@ -57,6 +59,19 @@ def check_readings(behavior: Element, tables: Tables, report: Report) -> None:
             given["field"].place_of("value"),
             f"readings of {name} have no {quoted(field)}{report.hint(near, forms)}",
             f"There is: {listed(forms)}",
+        )
+
+
+def check_vision(behavior: Element, tables: Tables, report: Report) -> None:
+    """Report a watcher whose pictures would be judged by a unit that there is not."""
+    kind = tables.types.get(behavior.text("type"))
+    given = {one.text("name"): one for one in behavior.all("parameter")}
+    name, units = _text(given, "vision"), [unit.text("name") for unit in tables.units]
+    if kind is not None and kind.text("class") == WATCHER and name and name not in units:
+        report.fault(
+            given["vision"].place_of("value"),
+            f"no unit is named {quoted(name)}{report.hint(name, units)}",
+            f"There is: {listed(units)}" if units else "Write the unit into <modules>, or leave the parameter out",
         )
 
 

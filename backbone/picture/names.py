@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from backbone.component_database.messages import TypeCount
 from backbone.creator.messages import TYPE as CREATOR
+from backbone.mission.tables import EXECUTION_UNIT
 from backbone.mission_log.people import is_console
 from backbone.naming import Subsystem, component_of
 from backbone.picture.mission import MissionPicture
@@ -25,10 +26,15 @@ def names_in(picture: MissionPicture, types: Iterable[TypeCount] = ()) -> Missio
         sorted(found - {""}),
         sorted(rc.rc for rc in rcs),
         sorted(rc.rc for rc in rcs if rc.is_robot),
-        sorted(component_of(at) for at in components if at.startswith(f"{Subsystem.MISSION_CONTROL}/")),
+        sorted(component_of(at) for at, one in components.items() if is_behavior(at, one.type)),
         sorted({one.user for at, one in components.items() if is_console(at) and is_word(one.user)}),
         sorted(one.component_type.name for one in types),
     )
+
+
+def is_behavior(at: str, kind: str) -> bool:
+    """Return whether the component is a behavior; an execution unit of the same subsystem is none."""
+    return at.startswith(f"{Subsystem.MISSION_CONTROL}/") and kind != EXECUTION_UNIT
 
 
 def is_word(text: str) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any
 
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
@@ -18,6 +17,7 @@ from backbone.creator.messages import (
     ProcessEnded,
     Processes,
     ReviseSpawn,
+    Spawn,
     SpawnRevised,
     creator_name,
 )
@@ -76,8 +76,8 @@ class Creators:
                 await self._news.or_at(self._clock.now_s() + ANSWER_EACH_S / 5 * self._clock.rate)
         return None
 
-    async def revise(self, host: str, name: str, parameters: dict[str, Any]) -> None:
-        """Have the component start with these parameters from its next start on this host on.
+    async def revise(self, host: str, spawn: Spawn) -> None:
+        """Have the component start with this class and these parameters from its next start on this host on.
 
         Raises:
             CreatorSilent: The creator lives but does not answer; the outcome is unknown.
@@ -87,7 +87,7 @@ class Creators:
                 self._bus,
                 self._clock,
                 creator_of(host),
-                ReviseSpawn(name, parameters),
+                ReviseSpawn(spawn.name, spawn.parameters, spawn.class_path),
                 SpawnRevised,
                 each_s=ANSWER_EACH_S,
                 within_s=ANSWER_WITHIN_S,
@@ -96,7 +96,7 @@ class Creators:
             return
         except LinkError as error:
             raise CreatorSilent(
-                f"{name}: {error}; {host} may start it as before", name=name, outcome="unknown"
+                f"{spawn.name}: {error}; {host} may start it as before", name=spawn.name, outcome="unknown"
             ) from error
 
     async def end(self, host: str, name: str, reason: str) -> EndedBy:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from backbone.creator.messages import EndedBy
 from backbone.errors import Refusal
-from backbone.ranges import FEW, MANY, Instant, Mention, NameOrNone, Pid, Text, Values
+from backbone.ranges import FEW, MANY, Instant, Line, Mention, NameOrNone, Pid, Text, Values
 from backbone.wire import Message
 
 
@@ -47,10 +47,12 @@ class ReviseStart(Message, frozen=True):
 
     Attributes:
         parameters: All of them; the running component keeps its own.
+        class_path: Of its next life; empty: as before.
     """
 
     name: Mention
     parameters: Values
+    class_path: Line = ""
 
 
 class StartRevised(Message, frozen=True):

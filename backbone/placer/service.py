@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import AsyncExitStack
 from functools import partial
 from itertools import chain, repeat
-from typing import Annotated, Any, assert_never
+from typing import Annotated, assert_never
 
 import msgspec
 
@@ -125,8 +125,8 @@ class Placer(Component[PlacerParameters]):
         match asked.body:
             case Start() as order:
                 return await self._start(order, asked.source)
-            case ReviseStart(name=name, parameters=parameters):
-                return await self._revise(name, parameters)
+            case ReviseStart() as revised:
+                return await self._revise(revised)
             case StopComponent(name=name, reason=reason):
                 return await self._stop(name, reason or f"asked by {asked.source}")
             case AskPlacement(name=name):
@@ -203,11 +203,12 @@ class Placer(Component[PlacerParameters]):
             raise NoHost(f"{name}: the component database does not admit it: {error}", name=name) from error
         return admitted.component_type
 
-    async def _revise(self, name: str, parameters: dict[str, Any]) -> StartRevised:
-        record = self._book.record(name)
-        record.spawn = msgspec.structs.replace(record.spawn, parameters=parameters)
+    async def _revise(self, revised: ReviseStart) -> StartRevised:
+        record = self._book.record(revised.name)
+        class_path = revised.class_path or record.spawn.class_path
+        record.spawn = msgspec.structs.replace(record.spawn, parameters=revised.parameters, class_path=class_path)
         if record.host:
-            await self._creators.revise(record.host, name, parameters)
+            await self._creators.revise(record.host, record.spawn)
         return StartRevised()
 
     # ------------------------------------------------------------------ stop

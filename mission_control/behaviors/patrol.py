@@ -47,6 +47,7 @@ class Patrol(Driver[PatrolParameters]):
     """Publishes ``WaypointReached`` once for each way point, in order, with any number of suspensions."""
 
     parameters_type = PatrolParameters
+    hands_over = frozenset({"route", "_published"})
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

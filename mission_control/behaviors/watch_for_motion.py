@@ -67,6 +67,7 @@ class WatchForMotion(Behavior[WatchParameters]):
     """
 
     parameters_type = WatchParameters
+    hands_over = frozenset({"_detector", "_pictures", "_rejected", "_robot", "_events", "_last_told_s"})
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

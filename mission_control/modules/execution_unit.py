@@ -19,7 +19,8 @@ from typing import NamedTuple
 import msgspec
 
 from backbone.errors import Refusal
-from mission_control.modules.exchange import Exchange, ExchangePhase, handed_over
+from backbone.exchange_course import ExchangePhase
+from mission_control.modules.exchange import Exchange, handed_over
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module
 from mission_control.modules.ports import Port

@@ -8,16 +8,16 @@ from typing import Annotated, TypeGuard
 
 import msgspec
 
-from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.ranges import Values
+from backbone.reading_anew import WrongClass
 from backbone.wire import Message
 from mission_control.modules.graph import Member
 from mission_control.modules.module import Module
 from mission_control.modules.unit_schedule import Trigger
 
 
-class WrongModule(Refusal):
+class WrongModule(WrongClass):
     """A class path leads to no module, or the module refuses its parameters."""
 
     code = "module.class"

@@ -13,16 +13,17 @@ from backbone.component.component import Component
 from backbone.component.log_level import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
+from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, complaint
 from backbone.naming import did_you_mean
 from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from backbone.reading_anew import ReadAnew
 from mission_control.modules.choice import SourceChoice
-from mission_control.modules.exchange import UNPROVED, Exchange, ExchangePhase, ExchangeRules, complaint
+from mission_control.modules.exchange import Exchange
 from mission_control.modules.exchangeable import graph_with, judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
 from mission_control.modules.graph import Graph
 from mission_control.modules.module import UNSEEN, Module
-from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule
-from mission_control.modules.reading_anew import ReadAnew
+from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, load_module_class
 
 REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
 LEAST_WAIT_S = 0.01  # chosen: a round that runs in a thread when its exchange's time is over ends soon
@@ -94,7 +95,9 @@ class UnitExchanges:
             self._running = ""
 
     async def _swap(self, asked: SwapModule) -> Swapped:
-        anew = await asyncio.to_thread(ReadAnew, asked.class_path)  # rounds go on while it imports
+        anew = await asyncio.to_thread(
+            ReadAnew, asked.class_path, load_module_class, WrongModule
+        )  # rounds go on while it imports
         try:
             candidate = await self._candidate(asked, anew.kind)
             wanted, changed = self._wanted(candidate)
@@ -161,7 +164,7 @@ class UnitExchanges:
         self._tell(candidate.asked, f"{old} {stays}, {new} failed: {exchange.cause}", LogLevel.WARNING)
         is_same = old.partition(":")[0] == new.partition(":")[0]
         remark = f"a new start of {self._component.name} reads the file as it is now" if is_same else ""
-        return _answer(exchange, self._component.clock.now_s(), remark)
+        return exchange.answer(self._component.clock.now_s(), remark)
 
     async def _proved(self, candidate: _Candidate, wanted: WantedExchange) -> Swapped:
         name, component, exchange = candidate.asked.module, self._component, wanted.exchange
@@ -172,7 +175,7 @@ class UnitExchanges:
         state = "with the state of" if exchange.keeps_state else "from a fresh state instead of"
         told = f"{candidate.order.class_path} goes on {state} {candidate.before.class_path}{after}"
         self._tell(candidate.asked, told, LogLevel.NOTICE)
-        return _answer(exchange, component.clock.now_s(), await self._revised())
+        return exchange.answer(component.clock.now_s(), await self._revised())
 
     async def _revised(self) -> str:
         """Have the next life of the component begin with the new class; return what an operator should know."""
@@ -203,20 +206,6 @@ def _made(order: ModuleOrder) -> Module:
         raise
     except UNPROVED as error:
         raise WrongModule(f"{order.class_path} cannot be made: {complaint(error)}") from error
-
-
-def _answer(exchange: Exchange, now_s: float, remark: str) -> Swapped:
-    ended_s = now_s if exchange.ended_s is None else exchange.ended_s
-    switched_s = ended_s if exchange.switched_s is None else exchange.switched_s
-    return Swapped(
-        exchange.phase is ExchangePhase.PROVED,
-        exchange.cause,
-        exchange.keeps_state,
-        switched_s - exchange.began_s,
-        ended_s - switched_s,
-        exchange.rounds,
-        remark,
-    )
 
 
 def _unless_closed(loop: asyncio.AbstractEventLoop, changed: asyncio.Event) -> None:

@@ -76,7 +76,11 @@ class RadioDriver(Protocol):
     """A transmitter of command packets."""
 
     async def open(self) -> None:
-        """Open the device. When: once, before readiness. Raise ``HardwareFault`` if it is missing."""
+        """Open the device.
+
+        When: before readiness, and after ``close`` if it comes back (``driver_exchange``). Raise ``HardwareFault`` if
+        it is missing.
+        """
 
     async def transmit(
         self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
@@ -233,6 +237,33 @@ class NoDevice:
         self._site = site
 
 
+def driver_path(kind: str, name: str, resource: str) -> str:
+    """Return the class path of the driver of this name.
+
+    Raises:
+        UnknownDriver: No driver has this name.
+    """
+    built_in = BUILT_IN.get(kind, {})
+    path = built_in.get(name, name)
+    if ":" not in path:
+        raise UnknownDriver(f"{resource}: no {kind} driver {name!r}; built in: {', '.join(built_in) or 'none'}")
+    return path
+
+
+def driver_class(path: str, resource: str) -> Callable[[DriverSite], Any]:
+    """Return the class at ``package.module:Class``; imports its file.
+
+    Raises:
+        UnknownDriver: There is none.
+    """
+    module_name, _, class_name = path.partition(":")
+    try:
+        found: Callable[[DriverSite], Any] = getattr(importlib.import_module(module_name), class_name)
+    except (ImportError, AttributeError) as error:
+        raise UnknownDriver(f"{resource}: {path}: {error}") from error
+    return found
+
+
 def build_driver(kind: str, name: str, site: DriverSite) -> Any:
     """Return the driver of this name, not open yet. Only this function imports its module, in the RC that needs it.
 
@@ -243,17 +274,9 @@ def build_driver(kind: str, name: str, site: DriverSite) -> Any:
         UnknownDriver: No driver has this name.
         WrongParameter: The driver refuses its options.
     """
-    built_in = BUILT_IN.get(kind, {})
-    path = built_in.get(name, name)
-    module_name, colon, class_name = path.partition(":")
-    if not colon:
-        raise UnknownDriver(f"{site.resource}: no {kind} driver {name!r}; built in: {', '.join(built_in) or 'none'}")
-    try:
-        driver_class = getattr(importlib.import_module(module_name), class_name)
-    except (ImportError, AttributeError) as error:
-        raise UnknownDriver(f"{site.resource}: {path}: {error}") from error
-    site.options(getattr(driver_class, "options_type", NoOptions))
-    return driver_class(site)
+    found = driver_class(driver_path(kind, name, site.resource), site.resource)
+    site.options(getattr(found, "options_type", NoOptions))
+    return found(site)
 
 
 def options_of_drivers(kind: str) -> dict[str, type[msgspec.Struct]]:

@@ -59,6 +59,7 @@ class RadioOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class SimulatedRadio:
     """A radio that sends its packets to the simulated world, in order."""
 
+    opens_beside = True
     options_type = RadioOptions
 
     def __init__(self, site: DriverSite) -> None:

@@ -48,6 +48,7 @@ class GrabberOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class SimulatedFramegrabber:
     """A receiver in the simulated world."""
 
+    opens_beside = True
     options_type = GrabberOptions
 
     def __init__(self, site: DriverSite) -> None:

@@ -86,6 +86,7 @@ class CommandRadio(ResourceController[RcParameters]):
         self._overruns = self._sent = 0
         self._worst_packet_s = self._on_air_s = 0.0
         self._links = LinkWatch()
+        self._heard_robots: set[int] = set()
 
     async def connect(self) -> None:
         """Open the device."""
@@ -228,7 +229,14 @@ class CommandRadio(ResourceController[RcParameters]):
     def _listen(self, network_id: int, robot: str) -> None:
         """Hear this robot's replies, if the radio can."""
         if isinstance(self._driver, AnsweringRadio) and self._links.add(network_id, robot):
+            self._heard_robots.add(network_id)
             self._driver.hear(network_id, functools.partial(self._heard, network_id))
+
+    async def driver_exchanged(self) -> None:
+        """Hear the same robots."""
+        if isinstance(self._driver, AnsweringRadio):
+            for network_id in sorted(self._heard_robots):
+                self._driver.hear(network_id, functools.partial(self._heard, network_id))
 
     def _heard(self, network_id: int, payload: bytes) -> None:
         """Publish a reply, or count one that is lost if there are no bytes."""

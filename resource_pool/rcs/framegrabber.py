@@ -13,7 +13,7 @@ import itertools
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Literal
 
 import msgspec
@@ -61,11 +61,13 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     shares_process = False
     commands = Tune
     driver_kind = "framegrabber"
+    closed_most_s = 5.0  # chosen: a camera starts in two; its RC waits for no call of its driver
     driver_parameters = frozenset({"options", "frame_rate_hz"})
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._driver: FramegrabberDriver = self.make_driver()
+        self._tuned: tuple[str, Callable[[Picture], None]] | None = None
         self._delivered = self._garbled = self._silent = self._foreign = 0
         self._kinds: Counter[str] = Counter()
         self._silent_since_s = math.inf
@@ -82,7 +84,15 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
 
     async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
         """Stop the delivery of pictures."""
+        self._tuned = None
         self._driver.stop()
+
+    async def driver_exchanged(self) -> None:
+        """Deliver on."""
+        if self._tuned is not None:
+            self._driver.tune(*self._tuned)
+        else:
+            self._driver.stop()
 
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Tune and begin to deliver."""
@@ -97,6 +107,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             self._deliver(hold, order, picture, numbers)
 
         self._silent_since_s = math.inf
+        self._tuned = order.frequency, deliver
         self._driver.tune(order.frequency, deliver)
         return {}
 

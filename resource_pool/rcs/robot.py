@@ -75,7 +75,7 @@ class RobotRc(ResourceController[P], Generic[P]):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RobotParameters
-    driver_kind = "robot"
+    driver_kind, driver_field = "robot", "protocol"
     is_robot = True
 
     def __init_subclass__(cls, **kwargs: object) -> None:

@@ -45,14 +45,21 @@ class Lamp(ResourceController[RcParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._driver: PaintedLamp = self.make_driver()
+        self._share = 0.0
 
     async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
         """Go dark."""
+        self._share = 0.0
         await self._driver.set_brightness(0.0)
+
+    async def driver_exchanged(self) -> None:
+        """Shine on with another driver, or with the old one again."""
+        await self._driver.set_brightness(self._share)
 
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Shine."""
         if not isinstance(order, Shine):
             return await super().obey(hold, order)
-        await self._driver.set_brightness(share := min(1.0, max(0.0, order.brightness)))
-        return {"brightness": share}
+        self._share = min(1.0, max(0.0, order.brightness))
+        await self._driver.set_brightness(self._share)
+        return {"brightness": self._share}

@@ -16,6 +16,8 @@ from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import Frame
 
 ARC = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
+MADE: list[Any] = []
+"""Implementations that a test's own class was made to."""
 Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
 
 

@@ -177,8 +177,15 @@ async def test_a_person_exchanges_a_module_and_a_new_start_has_the_new_class(
         assert "did you mean 'answerer'" in done.stderr
 
         edit(source, SOURCE)
+        pid = mission.component("answering")["pid"]
+        os.kill(pid, signal.SIGSTOP)
+        done = await command(mission, *words[:3])
+        os.kill(pid, signal.SIGCONT)
+        assert done.returncode == 5
+        assert "answering does not answer" in done.stderr
+
         talk.answered.clear()
-        os.kill(mission.component("answering")["pid"], signal.SIGKILL)
+        os.kill(pid, signal.SIGKILL)
         await talk.until_answered_by("second")
 
 

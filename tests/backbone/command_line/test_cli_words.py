@@ -89,13 +89,14 @@ def component(address: str, kind: str, user: str = "") -> ComponentState:
 def picture() -> MissionPicture:
     found = [
         component("backbone/creator-base", "creator"),
+        component("mission_control/seeing", "execution_unit"),
         component("mission_control/watch1", "watch_for_motion"),
         component("ui_console/console-7", "console", "anna"),
         component("ui_console/console-8", "console", "Ben B."),
     ]
     rc = RcView("scout1", "scout", "up", False, 1.0, [], 0, [], is_robot=True)
     request = RequestView(
-        "console-7-drive", found[2].address, RequestState.RUNNING, ["scout1"], 0.0, -1.0, -1.0, "", [], 5.0, "", 1
+        "console-7-drive", found[3].address, RequestState.RUNNING, ["scout1"], 0.0, -1.0, -1.0, "", [], 5.0, "", 1
     )
     return MissionPicture("m", 1.0, {one.address: one for one in found}, schedule=Schedule(1.0, [rc], [request], []))
 
@@ -103,7 +104,7 @@ def picture() -> MissionPicture:
 def test_what_can_be_asked_about_is_completed_and_nothing_a_shell_takes_apart() -> None:
     types = [TypeCount(ComponentType("scout", "x:Y", Subsystem.RESOURCE_POOL), 1)]
     assert names_in(picture(), types) == MissionNames(
-        ["anna", "base", "console-7", "console-7-drive", "console-8", "creator-base", "scout1", "watch1"],
+        ["anna", "base", "console-7", "console-7-drive", "console-8", "creator-base", "scout1", "seeing", "watch1"],
         ["scout1"],
         ["scout1"],
         ["watch1"],

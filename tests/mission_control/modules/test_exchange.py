@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_modules import Number
 
-from mission_control.modules.exchange import Exchange, ExchangePhase, ExchangeRules, Turned, complaint, handed_over
+from backbone.exchange_course import ExchangePhase, ExchangeRules, complaint
+from mission_control.modules.exchange import Exchange, Turned, handed_over
 from mission_control.modules.exchangeable import judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
 from mission_control.modules.graph import Graph, Member

@@ -32,11 +32,11 @@ from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModul
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.placer.messages import ReviseStart, StartRevised
+from backbone.reading_anew import ValuesChanged
 from backbone.wire import Envelope, Message
 from mission_control.modules.arrangement import UnitOrder, arranged
 from mission_control.modules.graph import GraphRefused
 from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule
-from mission_control.modules.reading_anew import ValuesChanged
 from mission_control.modules.unit_component import UnitComponent
 
 UNIT = "mission_control/one"

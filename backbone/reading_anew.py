@@ -1,4 +1,4 @@
-"""Reading the file of a module anew, so that the code of an exchange is what stands in the file now.
+"""Reading the file of a class anew, so that the code of an exchange is what stands in the file now.
 
 Rules of this file:
 
@@ -16,16 +16,24 @@ import importlib
 import importlib.machinery
 import importlib.util
 import sys
+from collections.abc import Callable
 from enum import Enum
 from types import ModuleType
+from typing import Generic, TypeVar
 
 import msgspec
 
 from backbone.errors import Refusal
-from mission_control.modules.exchange import UNPROVED, complaint
-from mission_control.modules.module import Module
-from mission_control.modules.orders import WrongModule, load_module_class
-from mission_control.modules.ports import type_name
+from backbone.exchange_course import UNPROVED, complaint
+
+T = TypeVar("T")
+
+
+class WrongClass(Refusal):
+    """A class path leads to no class that can take the place."""
+
+    code = "exchange.class"
+    remedy = "Mend what the message names, and swap again."
 
 
 class ValuesChanged(Refusal):
@@ -35,32 +43,34 @@ class ValuesChanged(Refusal):
     remedy = "Give the changed class another name, or bring the mission down and up."
 
 
-class ReadAnew:
-    """A module class whose file was read just now.
+class ReadAnew(Generic[T]):
+    """A class whose file was read just now.
 
     Args:
         class_path: ``package.module:Class``.
+        load: Returns the class at a path, or refuses it; imports its file.
+        wrong: What is raised if the file cannot be read.
 
     Attributes:
         kind: The class.
 
     Raises:
-        WrongModule: The file cannot be read, or has no such module class.
+        WrongClass: The file cannot be read.
         ValuesChanged: It declares classes of values otherwise.
     """
 
-    def __init__(self, class_path: str) -> None:
+    def __init__(self, class_path: str, load: Callable[[str], T], wrong: type[WrongClass] = WrongClass) -> None:
         self._file = class_path.partition(":")[0]
         self._before = sys.modules.get(self._file)
         try:
             if self._before is not None:
-                _read(self._file, self._before)
-            self.kind: type[Module] = load_module_class(class_path)
+                _read(self._file, self._before, wrong)
+            self.kind: T = load(class_path)
         except UNPROVED as error:
             self.undo()
             if isinstance(error, Refusal):
                 raise
-            raise WrongModule(f"{class_path}: {complaint(error)}", class_path=class_path) from error
+            raise wrong(f"{class_path}: {complaint(error)}", class_path=class_path) from error
 
     def undo(self) -> None:
         """Let imports find again what they found before."""
@@ -70,13 +80,13 @@ class ReadAnew:
             sys.modules.pop(self._file, None)
 
 
-def _read(file: str, before: ModuleType) -> None:
+def _read(file: str, before: ModuleType, wrong: type[WrongClass]) -> None:
     """Put the file as it is now in the place of what was imported before."""
     parent = sys.modules.get(file.rpartition(".")[0])
     importlib.invalidate_caches()
     spec = importlib.machinery.PathFinder.find_spec(file, getattr(parent, "__path__", None))
     if spec is None or not isinstance(loader := spec.loader, importlib.machinery.SourceFileLoader):
-        raise WrongModule(f"{file} has no file that can be read anew", remedy="Name a class in a Python file.")
+        raise wrong(f"{file} has no file that can be read anew", remedy="Name a class in a Python file.")
     fresh = importlib.util.module_from_spec(spec)
     code = loader.source_to_code(loader.get_data(loader.path), loader.path)
     _place(file, fresh)
@@ -120,7 +130,7 @@ def _declared(kind: object) -> object:
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         config = kind.__struct_config__
         fields = [
-            (one.name, one.encode_name, type_name(one.type), repr(one.default), repr(one.default_factory))
+            (one.name, one.encode_name, repr(one.type), repr(one.default), repr(one.default_factory))
             for one in msgspec.structs.fields(kind)
         ]
         return fields, config.tag, config.tag_field, config.array_like, config.frozen, config.forbid_unknown_fields

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from mission_control.modules.orders import WrongModule
-from mission_control.modules.reading_anew import ReadAnew, ValuesChanged
+from backbone.reading_anew import ReadAnew, ValuesChanged, WrongClass
+from mission_control.modules.orders import load_module_class
 
 PATH = "read_anew_package.inside:One"
 SOURCE = """
@@ -53,16 +53,16 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def test_what_was_never_imported_is_imported_and_after_an_undo_it_is_not(file: Path) -> None:
-    read = ReadAnew(PATH)
+    read = ReadAnew(PATH, load_module_class)
     assert read.kind.__name__ == "One"
     read.undo()
     assert "read_anew_package.inside" not in sys.modules
 
 
 def test_an_old_class_keeps_its_code_and_the_new_one_has_its_own(file: Path) -> None:
-    old = ReadAnew(PATH).kind
+    old = ReadAnew(PATH, load_module_class).kind
     file.write_text(SOURCE.replace("EDITION = 1", "EDITION = 2"))
-    read = ReadAnew(PATH)
+    read = ReadAnew(PATH, load_module_class)
     spots = [kind().update(kind.Inputs()).spot for kind in (old, read.kind)]
     assert [one.sizes for one in spots] == [[1], [2]]
     assert type(spots[0]) is type(spots[1]), "classes of values stay those that run"
@@ -83,13 +83,13 @@ def test_an_old_class_keeps_its_code_and_the_new_one_has_its_own(file: Path) -> 
     ],
 )
 def test_a_class_of_values_that_is_declared_otherwise_is_refused(file: Path, old: str, new: str, name: str) -> None:
-    before = ReadAnew(PATH).kind
+    before = ReadAnew(PATH, load_module_class).kind
     file.write_text(SOURCE.replace(old, new).replace("[EDITION]", ""))
     with pytest.raises(ValuesChanged, match=f"declares {name} otherwise"):
-        ReadAnew(PATH)
+        ReadAnew(PATH, load_module_class)
     assert sys.modules["read_anew_package.inside"].One is before
 
 
 def test_what_has_no_file_is_refused() -> None:
-    with pytest.raises(WrongModule, match="no file that can be read anew"):
-        ReadAnew("sys:One")
+    with pytest.raises(WrongClass, match="no file that can be read anew"):
+        ReadAnew("sys:One", load_module_class)

@@ -1,0 +1,402 @@
+"""The exchange of a behavior's class while the behavior runs: two implementations in one component.
+
+Rules of this file:
+
+* One of the two is in charge: the gates of their buses are never both open. While the new one warms, that is the old
+  one; while it proves itself, the new one.
+* Both hear everything, and of each grant. So the other one can take charge between two commands, without a new request:
+  name, path, ARC and epochs stay those of the component.
+* The new one takes charge when no command of the old one is under way. The old one hands over the attributes that both
+  classes name in ``hands_over``.
+* Whatever fails in the new one gives the charge back at once; then it ends as if it were killed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar, Protocol, Self
+
+import msgspec
+
+from backbone.addresses import PLACER
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import WrongParameter
+from backbone.component.launch import Launch
+from backbone.component.log_level import LogLevel
+from backbone.errors import LinkError, Refusal
+from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
+from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules, complaint, hand_over
+from backbone.launcher.messages import TakeBranch
+from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from backbone.reading_anew import ReadAnew, WrongClass
+from backbone.waiting import end_tasks
+from backbone.wire import Accepts, Envelope, Message
+from mission_control.behavior_tree import BehaviorNode
+from mission_control.gated_bus import GatedBus
+from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import AskBeat, Resumed, Suspended
+
+log = logging.getLogger(__name__)
+
+LOOK_EVERY_S = 0.05  # chosen: a person sees no delay; seconds of the machine
+REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
+
+
+class Implementation(Protocol):
+    """A behavior, as its exchange needs it."""
+
+    accepts: ClassVar[Accepts | None]
+    parameters_type: ClassVar[type[msgspec.Struct]]
+    launch: Launch
+    gate: GatedBus
+    clock: Clock
+    status: BehaviorStatus
+    exchanges: BehaviorExchanges
+    child_nodes: dict[str, BehaviorNode]
+    has_begun: bool
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None: ...
+
+    @property
+    def parameters(self) -> msgspec.Struct:
+        """Its parameters."""
+
+    @property
+    def is_ordered(self) -> bool:
+        """True: an operator ordered it."""
+
+    async def run(self) -> None:
+        """Live."""
+
+    def end(self, reason: str) -> None:
+        """End in good order."""
+
+    def fail(self, bug: BaseException) -> None:
+        """End because of a bug."""
+
+    def is_ready(self) -> bool:
+        """Return whether it can take charge."""
+
+    def parameters_changed(self) -> None:
+        """Apply the parameters."""
+
+    def go_on_from(self, other: Self) -> None:
+        """Go on where another implementation is."""
+
+    def take_charge(self) -> None:
+        """Act from now on."""
+
+    def stand_by(self) -> None:
+        """Act no more."""
+
+    def report(self, feedback: str) -> None:
+        """Set the feedback."""
+
+    def publish_event(self, subject: str, what: str, level: LogLevel = ...) -> None:
+        """Publish an event."""
+
+
+Load = Callable[[str], type[Implementation]]
+"""Returns the behavior class at a path, or refuses it."""
+
+
+@dataclass(slots=True)
+class _Exchange:
+    asked: SwapClass
+    old: Implementation
+    new: Implementation
+    course: ExchangeCourse
+
+
+class BehaviorExchanges:
+    """The implementations of one behavior, of which one is in charge.
+
+    Args:
+        first: With which the component begins.
+        load: Returns a class.
+    """
+
+    def __init__(self, first: Implementation, load: Load) -> None:
+        self.present = first
+        """The implementation in charge."""
+        self._load = load
+        self._lives: dict[Implementation, asyncio.Task[None]] = {}
+        self._exchange: _Exchange | None = None
+        self._is_busy = False
+        self._news = asyncio.Event()
+        self._copying: set[asyncio.Task[None]] = set()
+
+    # ------------------------------------------------------------------ the life of the component
+    async def run(self, life: Coroutine[object, None, None]) -> None:
+        """Return when the implementation in charge has ended; raise the bug that ended it."""
+        first = self.present
+        first.gate.route, first.gate.bus.on_bug = self.answer, self._bug
+        self._begin(first, life)
+        try:
+            while not self._lives[self.present].done():
+                self._news.clear()
+                await self._news.wait()
+            await self._lives[self.present]
+        finally:
+            await end_tasks(*self._lives.values(), *self._copying)
+            await first.gate.bus.close()
+
+    def _bug(self, bug: BaseException) -> None:
+        self.present.fail(bug)
+
+    def _begin(self, one: Implementation, life: Coroutine[object, None, None]) -> None:
+        self._lives[one] = asyncio.create_task(life, name=f"life of {one.launch.address}")
+        self._lives[one].add_done_callback(lambda ended: self._ended(one, ended))
+
+    def _ended(self, one: Implementation, life: asyncio.Task[None]) -> None:
+        if not life.cancelled():
+            bug = life.exception()
+            if bug is not None or one is not self.present:  # the one in charge ends the component
+                self.failed(one, bug or RuntimeError("it ended"))
+        self._news.set()
+
+    # ------------------------------------------------------------------ questions
+    async def answer(self, asked: Envelope[Message]) -> Message:
+        """Answer through the implementation in charge; the other one hears of grants and of its place in the tree."""
+        if isinstance(asked.body, SwapClass):
+            return await self.swap(asked.body)
+        beside = self._beside
+        if beside is not None and isinstance(asked.body, Resumed | Suspended | AskBeat | TakeBranch):
+            copying = asyncio.create_task(self._copy(beside, asked), name=f"copy for {beside.launch.address}")
+            self._copying.add(copying)
+            copying.add_done_callback(self._copying.discard)
+        present = self.present
+        try:
+            return await present.gate.answer(asked)
+        except (Refusal, LinkError):
+            raise
+        except Exception as bug:
+            present.fail(bug)
+            if self.present is present:
+                raise
+            return await self.present.gate.answer(asked)
+
+    async def _copy(self, beside: Implementation, asked: Envelope[Message]) -> None:
+        try:
+            await beside.gate.answer(asked)
+        except (Refusal, LinkError) as error:
+            log.info("%s beside the one in charge: %s", beside.launch.address, error)
+        except Exception as bug:
+            beside.fail(bug)
+
+    @property
+    def _beside(self) -> Implementation | None:
+        going = self._exchange
+        if going is None or going.course.is_over:
+            return None
+        return going.old if going.course.new_works else going.new
+
+    # ------------------------------------------------------------------ what the implementations say
+    def failed(self, one: Implementation, bug: BaseException) -> None:
+        """Note that an implementation ends because of this bug."""
+        going = self._exchange
+        if going is None:
+            return
+        now_s = one.clock.now_s()
+        if one is going.new:
+            going.course.fail(now_s, complaint(bug))
+        elif going.course.new_works:
+            told = f"the old one failed beside it and is gone: {complaint(bug)}"
+            going.course.end(ExchangePhase.PROVED, now_s, told)
+        else:
+            going.course.fail(now_s, "the old one ended")
+
+    def may_finish(self, one: Implementation, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
+        """Return whether it may finish; a new one that finishes with a failure has not proved itself."""
+        going = self._exchange
+        if going is None or going.course.is_over:
+            return True
+        if one is going.new and status is BehaviorStatus.FAILURE:
+            detail = payload.get("detail")
+            going.course.fail(one.clock.now_s(), f"it finished: {status}" + (f": {detail}" if detail else ""))
+            return False
+        if one is going.new and going.course.new_works:
+            going.course.end(ExchangePhase.PROVED, one.clock.now_s())
+        return bool(one.gate.is_open)
+
+    # ------------------------------------------------------------------ the exchange
+    async def swap(self, asked: SwapClass) -> Swapped:
+        """Exchange the class; return when the new one has proved itself, or the old one has come back.
+
+        Raises:
+            ExchangeRunning: Another exchange of this behavior is not over.
+            NotExchanged: This behavior cannot be exchanged as it is now.
+            WrongClass: The class cannot be read or made, or is no behavior that could take the place.
+            WrongParameter: It has no such parameters.
+            ValuesChanged: Its file declares values otherwise.
+        """
+        if self._is_busy:
+            raise ExchangeRunning(f"{self.present.launch.name} is being exchanged")
+        self._is_busy = True
+        try:
+            return await self._swap(asked)
+        except Refusal as refusal:
+            self._tell(f"is not exchanged: {refusal.detail}", LogLevel.WARNING)
+            raise
+        finally:
+            self._is_busy, self._exchange = False, None
+
+    async def _swap(self, asked: SwapClass) -> Swapped:
+        old = self.present
+        self._check(old)
+        anew = await asyncio.to_thread(ReadAnew, asked.class_path, self._load)  # it acts on while its file is imported
+        try:
+            new = self._made(asked, old, anew.kind)
+        except Refusal:
+            anew.undo()
+            raise
+        by = f" for {asked.user}" if asked.user else ""
+        self._tell(f"{asked.class_path} warms beside {class_path_of(old)}{by}")
+        rules = ExchangeRules(asked.prove_s, asked.ready_within_s)
+        course = ExchangeCourse(rules, self._changed, old.clock.now_s())
+        going = self._exchange = _Exchange(asked, old, new, course)
+        self._begin(new, _survived(new.run()))
+        await self._until_over(going)
+        remark = await (self._proved(going) if course.phase is ExchangePhase.PROVED else self._returned(going, anew))
+        return course.answer(old.clock.now_s(), remark)
+
+    def _check(self, old: Implementation) -> None:
+        name = old.launch.name
+        if old.status.is_final:
+            raise NotExchanged(f"{name} has finished", remedy="Start it again, with the new class in its mission file.")
+        if old.child_nodes:
+            raise NotExchanged(
+                f"{name} has children, which a new class would begin anew",
+                remedy=f"Exchange a behavior without children, or see 'scout-backbone tree replace {name}'.",
+            )
+        if old.is_ordered:
+            raise NotExchanged(f"{name} is an operator's order", remedy="Let the operator give the order anew.")
+        if not old.has_begun:
+            raise NotExchanged(f"{name} is still starting", remedy="Swap again in a moment.")
+
+    def _made(self, asked: SwapClass, old: Implementation, kind: type[Implementation]) -> Implementation:
+        """Return the new implementation, which does not live yet.
+
+        Raises:
+            WrongClass: It cannot be made, or answers other questions.
+            WrongParameter: It has no such parameters.
+        """
+        if kind.accepts != old.accepts:
+            raise WrongClass(
+                f"{asked.class_path} answers other questions than {class_path_of(old)}",
+                remedy="Accept the same messages, or change the mission file.",
+            )
+        has = {one.encode_name for one in msgspec.structs.fields(kind.parameters_type)}
+        kept = {name: value for name, value in msgspec.to_builtins(old.parameters).items() if name in has}
+        launch = msgspec.structs.replace(
+            old.launch, class_path=asked.class_path, parameters={**kept, **asked.parameters}
+        )
+        gate = GatedBus(old.gate.bus, is_first=False)
+        try:
+            new = kind(launch, gate, old.clock)
+        except WrongParameter as wrong:
+            raise WrongParameter(
+                f"{asked.class_path} refuses its parameters: {wrong.detail}", remedy="Give them with --set NAME=VALUE."
+            ) from None
+        except UNPROVED as error:
+            raise WrongClass(f"{asked.class_path} cannot be made: {complaint(error)}") from error
+        new.exchanges = self
+        new.go_on_from(old)
+        return new
+
+    async def _until_over(self, going: _Exchange) -> None:
+        course, clock = going.course, going.old.clock
+        while not course.is_over:
+            is_warm = course.phase is ExchangePhase.WARMING and going.new.has_begun
+            if is_warm and course.tried(clock.now_s(), going.new.is_ready):
+                await self._take_over(going)
+            course.let_pass(clock.now_s())
+            if not course.is_over:
+                left_s = max(0.0, course.due_s - clock.now_s())
+                await clock.sleep_s(min(LOOK_EVERY_S * clock.rate, left_s))
+
+    async def _take_over(self, going: _Exchange) -> None:
+        """Give the new one the charge, between two commands."""
+        old, new, course = going.old, going.new, going.course
+        old.gate.shut()
+        await old.gate.wait_quiet()
+        if course.is_over:
+            return
+        now_s = old.clock.now_s()
+        course.keeps_state = bool(course.tried(now_s, partial(_handed_over, old, new)))
+        course.switch(now_s)
+
+    def _changed(self) -> None:
+        """Let the implementation that does the work be in charge, and only this one."""
+        going = self._exchange
+        assert going is not None  # noqa: S101  it is its course that has changed
+        works, beside = (going.new, going.old) if going.course.new_works else (going.old, going.new)
+        beside.stand_by()
+        self.present = works
+        works.take_charge()
+        self._news.set()
+        if going.course.phase is ExchangePhase.PROVING:
+            self._tell(f"{going.asked.class_path} is in charge, and has to prove itself", LogLevel.INFO)
+        elif going.course.is_over and beside in self._lives:
+            self._lives[beside].cancel()
+
+    async def _returned(self, going: _Exchange, anew: ReadAnew[type[Implementation]]) -> str:
+        anew.undo()
+        await self._forget(going.new)
+        old, new = class_path_of(going.old), going.asked.class_path
+        stays = "goes on" if going.course.switched_s is None else "is back"
+        self._tell(f"{old} {stays}, {new} failed: {going.course.cause}", LogLevel.WARNING)
+        is_same = old.partition(":")[0] == new.partition(":")[0]
+        return f"a new start of {going.old.launch.name} reads the file as it is now" if is_same else ""
+
+    async def _proved(self, going: _Exchange) -> str:
+        await self._forget(going.old)
+        going.course.rounds = going.new.gate.commands
+        after = f": {going.course.cause}" if going.course.cause else ""
+        state = "with the state of" if going.course.keeps_state else "from a fresh state instead of"
+        self._tell(f"{going.asked.class_path} goes on {state} {class_path_of(going.old)}{after}")
+        new = going.new
+        order = ReviseStart(new.launch.name, msgspec.to_builtins(new.parameters), going.asked.class_path)
+        try:
+            await new.gate.bus.ask(PLACER, order, StartRevised, within_s=REVISED_WITHIN_S)
+        except NotPlaced:  # started by hand
+            return ""
+        except (LinkError, Refusal) as error:
+            return f"a new start of {new.launch.name} has the old class again: {error}"
+        return ""
+
+    async def _forget(self, one: Implementation) -> None:
+        life = self._lives[one]
+        await end_tasks(life)
+        del self._lives[one]
+
+    def _tell(self, what: str, level: LogLevel = LogLevel.NOTICE) -> None:
+        self.present.publish_event(self.present.launch.name, what, level)
+        self.present.report(what)
+
+
+def _handed_over(old: Implementation, new: Implementation) -> bool:
+    """Let the new one go on where the old one is; its own parameters, if they are others, count."""
+    new.go_on_from(old)
+    is_kept = hand_over(old, new)
+    given, had = msgspec.to_builtins(new.parameters), msgspec.to_builtins(old.parameters)
+    if any(had.get(name, value) != value for name, value in given.items()):
+        new.parameters_changed()
+    return is_kept
+
+
+def class_path_of(one: object) -> str:
+    """Return where the class of an implementation stands."""
+    return f"{type(one).__module__}:{type(one).__qualname__}"
+
+
+async def _survived(life: Coroutine[object, None, None]) -> None:
+    """Live; an exit that the class asks for is its failure, and not the end of the process."""
+    try:
+        await life
+    except SystemExit as error:
+        raise WrongClass(complaint(error)) from error

@@ -1,0 +1,214 @@
+"""GatedBus: the bus of one implementation of a behavior, which acts only while the implementation is in charge.
+
+Rules of this file:
+
+* Everything is heard. So an implementation beside the one in charge has its inputs.
+* Of what is sent, only questions for knowledge pass the closed gate: their classes begin with ``Ask`` or ``List``. The
+  resource pool gets no command, as without a grant. All other questions wait until the gate opens; publications are
+  dropped.
+* The name, the tokens and the address stay those of the first implementation: the component is the same.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import cast
+
+from backbone.bus.interface import (
+    Answer,
+    Bus,
+    BusStatistics,
+    LifeListener,
+    LinkListener,
+    Listener,
+    Overhearer,
+    Overhearing,
+    Reply,
+    Subscription,
+)
+from backbone.component.messages import Register, Registered
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
+from resource_pool.arc_client import SwappedOut
+
+READS = ("Ask", "List")
+POOL = f"{Subsystem.RESOURCE_POOL}/"
+
+
+async def _unready(asked: Envelope[Message]) -> Message:
+    raise UnknownMessage(f"{type(asked.body).__name__} comes before its start is over")
+
+
+class GatedBus:
+    """The bus of one implementation.
+
+    Args:
+        bus: The component's.
+        is_first: True: the implementation with which the component began.
+
+    Attributes:
+        is_open: True: the implementation is in charge.
+        answer: Answers questions to the component.
+        commands: Commands to the resource pool that were answered.
+    """
+
+    def __init__(self, bus: Bus, *, is_first: bool = True) -> None:
+        self.bus, self.is_first = bus, is_first
+        self.answer: Answer = _unready
+        self.route: Answer | None = None
+        """Gets the component's questions; None: ``answer`` does."""
+        self.on_bug: Callable[[BaseException], None] = bus.on_bug
+        self.commands = 0
+        self._opened, self._quiet = asyncio.Event(), asyncio.Event()
+        self._quiet.set()
+        self._under_way = 0
+        self._heard: dict[HeardThrough, None] = {}
+        if is_first:
+            self._opened.set()
+
+    # ------------------------------------------------------------------ the gate
+    @property
+    def is_open(self) -> bool:
+        """True: the implementation is in charge."""
+        return self._opened.is_set()
+
+    def open(self) -> None:
+        """Let everything pass."""
+        self._opened.set()
+
+    def shut(self) -> None:
+        """Let nothing more pass that acts on others."""
+        self._opened.clear()
+
+    async def wait_quiet(self) -> None:
+        """Return when no command is under way."""
+        await self._quiet.wait()
+
+    # ------------------------------------------------------------------ what acts
+    async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
+        """Ask, if the gate lets the question pass; see ``Bus.ask``."""
+        if isinstance(question, Register) and not self.is_first:
+            return cast(Reply, Registered())
+        if type(question).__name__.startswith(READS):
+            return await self.bus.ask(address, question, reply, within_s=within_s)
+        if not address.startswith(POOL):
+            await self._opened.wait()
+            return await self.bus.ask(address, question, reply, within_s=within_s)
+        if not self.is_open:
+            raise SwappedOut(
+                f"{self.source}: another class is in charge", reason="exchange", by="", expected_start_s=-1
+            )
+        self._under_way += 1
+        self._quiet.clear()
+        try:
+            answered = await self.bus.ask(address, question, reply, within_s=within_s)
+            self.commands += 1
+            return answered
+        finally:
+            self._under_way -= 1
+            if not self._under_way:
+                self._quiet.set()
+
+    def publish(self, address: str, conversation: Conversation, message: Message) -> None:
+        """Publish through the open gate; see ``Bus.publish``."""
+        if self.is_open:
+            self.bus.publish(address, conversation, message)
+
+    def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
+        """Pass on through the open gate; see ``Bus.pass_on``."""
+        if self.is_open:
+            self.bus.pass_on(address, conversation, envelope)
+
+    # ------------------------------------------------------------------ what is heard
+    def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
+        """Answer questions to the component while in charge; see ``Bus.serve``."""
+        self.answer = answer
+        if self.is_first:
+            return self.bus.serve(address, accepts, self.route or answer)
+        return NoDeclaration()
+
+    def declare_alive(self, address: str) -> Subscription:
+        """Raise a token of the component, which the first implementation has done for all; see ``Bus``."""
+        return self.bus.declare_alive(address) if self.is_first else NoDeclaration()
+
+    def subscribe(
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
+    ) -> Subscription:
+        """Hear publications; see ``Bus.subscribe``."""
+        return self._keep(self.bus.subscribe(address, conversation, accepts, self._mine(listener), latest=latest))
+
+    def overhear(
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+    ) -> Overhearing:
+        """Overhear; see ``Bus.overhear``."""
+        return self._keep(self.bus.overhear(conversation, self._mine(listener), most_waiting_bytes, of))
+
+    def watch_alive(self, address: str, listener: LifeListener) -> Subscription:
+        """Watch tokens; see ``Bus.watch_alive``."""
+        return self._keep(self.bus.watch_alive(address, self._mine(listener)))
+
+    def watch_link(self, listener: LinkListener) -> Subscription:
+        """Watch the own link; see ``Bus.watch_link``."""
+        return self._keep(self.bus.watch_link(self._mine(listener)))
+
+    # ------------------------------------------------------------------ the rest
+    @property
+    def mission(self) -> str:
+        """Name of the mission."""
+        return self.bus.mission
+
+    @property
+    def source(self) -> str:
+        """Address of the component."""
+        return self.bus.source
+
+    def statistics(self) -> BusStatistics:
+        """Return the counts of the component."""
+        return self.bus.statistics()
+
+    async def close(self) -> None:
+        """Hear nothing more; the component's bus stays open."""
+        for heard in list(self._heard):
+            heard.close()
+
+    def _keep(self, declared: Subscription) -> HeardThrough:
+        heard = HeardThrough(declared, self._heard)
+        self._heard[heard] = None
+        return heard
+
+    def _mine(self, listener: Callable[..., None]) -> Callable[..., None]:
+        """Return a listener whose bug is one of this implementation."""
+
+        def heard(*what: object) -> None:
+            try:
+                listener(*what)
+            except Exception as bug:
+                self.on_bug(bug)
+
+        return heard
+
+
+class HeardThrough:
+    """A declaration of one implementation, which ends with it."""
+
+    def __init__(self, declared: Subscription, among: dict[HeardThrough, None]) -> None:
+        self._declared, self._among = declared, among
+
+    @property
+    def dropped(self) -> int:
+        """Number of messages that were dropped; see ``Overhearing``."""
+        return int(getattr(self._declared, "dropped", 0))
+
+    def close(self) -> None:
+        """Withdraw the declaration."""
+        self._among.pop(self, None)
+        self._declared.close()
+
+
+class NoDeclaration:
+    """Stands for a declaration that is the component's."""
+
+    def close(self) -> None:
+        """Change nothing."""

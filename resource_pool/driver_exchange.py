@@ -1,0 +1,327 @@
+"""The exchange of an RC's driver while the RC works.
+
+Rules of this file:
+
+* The RC, its holds and their epochs do not take part: only the driver in its slot changes, between two calls.
+* If both drivers say so (``opens_beside``), or have nothing to open, the new one is opened beside the old one. Else the
+  old one is closed first, and calls wait until a device is open again.
+* The first failure of the new one in its time of proof brings the old one back, which does the same call.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
+
+import msgspec
+
+from backbone.addresses import PLACER
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import WrongParameter
+from backbone.component.log_level import LogLevel
+from backbone.errors import LinkError, Refusal
+from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
+from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules, complaint, hand_over
+from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from backbone.reading_anew import ReadAnew, WrongClass
+from backbone.waiting import set_within
+from resource_pool.driver_slot import DriverSlot, methods_of
+from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions, driver_class, driver_path
+
+log = logging.getLogger(__name__)
+
+CLOSES_WITHIN_S = 2.0  # chosen: a device that does not close by then hangs; machine seconds
+REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
+
+
+class RcOfDrivers(Protocol):
+    """The RC, as the exchange of its driver needs it."""
+
+    bus: Bus
+    clock: Clock
+    driver_kind: ClassVar[str]
+    driver_field: ClassVar[str]
+    closed_most_s: ClassVar[float]
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def parameters(self) -> msgspec.Struct:
+        """Its parameters; ``options`` are the driver's."""
+
+    def driver_site(self) -> DriverSite:
+        """Return the interface for a driver."""
+
+    async def driver_exchanged(self) -> None:
+        """Bring the driver to the state of the RC."""
+
+    def has_driver(self, parameters: msgspec.Struct) -> None:
+        """Apply the parameters with another driver."""
+
+    def fail(self, bug: BaseException) -> None:
+        """End because of a bug."""
+
+    def publish_event(self, subject: str, what: str, level: LogLevel = ...) -> None:
+        """Publish an event."""
+
+
+@dataclass(slots=True)
+class _Exchange:
+    asked: SwapClass
+    slot: DriverSlot
+    old: object
+    new: object
+    parameters: msgspec.Struct
+    course: ExchangeCourse
+    is_beside: bool
+    back: asyncio.Event = field(default_factory=asyncio.Event)
+    """Set when the old one works again."""
+
+
+class DriverExchanges:
+    """Exchanges the driver of one RC, one exchange at a time."""
+
+    def __init__(self, rc: RcOfDrivers) -> None:
+        self._rc = rc
+        self._going: _Exchange | None = None
+        self._is_busy = False
+        self._news = asyncio.Event()
+
+    def made(self, build: Callable[[DriverSite], object], site: DriverSite) -> object:
+        """Return a driver whose own failures count as those of this driver."""
+        mine: list[object] = []
+        driver = build(dataclasses.replace(site, fail=lambda bug: self._driver_failed(mine[0] if mine else None, bug)))
+        mine.append(driver)
+        return driver
+
+    def _driver_failed(self, driver: object, bug: BaseException) -> None:
+        going = self._going
+        if going is not None and driver is going.new and going.course.phase is not ExchangePhase.PROVED:
+            going.course.fail(self._rc.clock.now_s(), complaint(bug))
+            self._failed(bug)
+            return
+        if going is not None and driver is going.old and going.course.new_works:
+            told = f"the old one failed beside it and is gone: {complaint(bug)}"
+            going.course.end(ExchangePhase.PROVED, self._rc.clock.now_s(), told)
+            return
+        self._rc.fail(bug)
+
+    def _failed(self, error: BaseException) -> asyncio.Event | None:
+        """Let the old one come back if the new one is not proved; return what is set when it works."""
+        going = self._going
+        if going is None or going.course.phase is ExchangePhase.PROVED or going.slot.works is not going.new:
+            return None
+        going.course.fail(self._rc.clock.now_s(), complaint(error))
+        if going.is_beside:
+            self._put_back(going)
+        elif not going.back.is_set():
+            going.slot.shut()
+        return going.back
+
+    def _put_back(self, going: _Exchange) -> None:
+        going.slot.works, going.slot.is_tried = going.old, False
+        going.slot.open_gate()
+        going.back.set()
+
+    # ------------------------------------------------------------------ the exchange
+    async def swap(self, asked: SwapClass, slots: Sequence[DriverSlot]) -> Swapped:
+        """Exchange the driver; return when the new one has proved itself, or the old one has come back.
+
+        Raises:
+            ExchangeRunning: Another exchange of this driver is not over.
+            NotExchanged: The RC has not one driver.
+            UnknownDriver: No driver has this name.
+            WrongClass: The class cannot be read or made, or is no driver of this kind.
+            WrongParameter: The driver refuses its options.
+            ValuesChanged: Its file declares values otherwise.
+        """
+        if self._is_busy:
+            remedy = "Wait until it is over; 'scout-backbone log' shows it."
+            raise ExchangeRunning(f"the driver of {self._rc.name} is being exchanged", remedy=remedy)
+        if len(slots) != 1:
+            count = f"{len(slots)} drivers" if slots else "no driver"
+            raise NotExchanged(f"{self._rc.name} has {count}, and not one that could be exchanged")
+        self._is_busy = True
+        try:
+            return await self._swap(asked, slots[0])
+        except Refusal as refusal:
+            self._tell(f"is not exchanged: {refusal.detail}", LogLevel.WARNING)
+            raise
+        finally:
+            self._is_busy, self._going = False, None
+
+    async def _swap(self, asked: SwapClass, slot: DriverSlot) -> Swapped:
+        path = driver_path(self._rc.driver_kind, asked.class_path, self._rc.name)
+        anew = await asyncio.to_thread(ReadAnew, path, lambda named: driver_class(named, self._rc.name))
+        try:
+            going = self._going = self._made(asked, slot, anew.kind)
+        except Refusal:
+            anew.undo()
+            raise
+        by = f" for {asked.user}" if asked.user else ""
+        self._tell(f"{asked.class_path} warms beside {_path_of(going.old)}{by}")
+        await self._opened(going)
+        if not going.course.is_over:
+            await self._taken_over(going)
+        bringing_up = asyncio.create_task(self._brought_up(going), name=f"{self._rc.name}: bring up the driver")
+        try:
+            remark = await self._over(going)
+        finally:
+            await asyncio.gather(bringing_up)
+        if going.course.phase is ExchangePhase.RETURNED:
+            anew.undo()
+        return going.course.answer(self._now_s(), remark)
+
+    async def _over(self, going: _Exchange) -> str:
+        """Return what an operator should know when one of the two is there alone."""
+        while not going.course.is_over:
+            self._news.clear()
+            await set_within(self._news, max(0.0, going.course.due_s - self._now_s()) / self._rc.clock.rate)
+            going.course.let_pass(self._now_s())
+        return await (self._proved(going) if going.course.phase is ExchangePhase.PROVED else self._returned(going))
+
+    def _made(self, asked: SwapClass, slot: DriverSlot, kind: Callable[[DriverSite], object]) -> _Exchange:
+        """Return the exchange with the new driver, not open yet."""
+        old, rc = slot.works, self._rc
+        if missing := methods_of(old) - methods_of(kind):
+            raise WrongClass(
+                f"{asked.class_path} is no driver for {rc.name}: it lacks {', '.join(sorted(missing))}",
+                remedy=f"Give it the methods of {_path_of(old)}.",
+            )
+        options_type = getattr(kind, "options_type", NoOptions)
+        has = {one.encode_name for one in msgspec.structs.fields(options_type)}
+        options: dict[str, object] = getattr(rc.parameters, "options", {})
+        kept = {name: value for name, value in options.items() if name in has}
+        changed = {rc.driver_field: asked.class_path, "options": {**kept, **asked.parameters}}
+        parameters = msgspec.structs.replace(rc.parameters, **changed)
+        site = dataclasses.replace(rc.driver_site(), parameters=parameters)
+        try:
+            site.options(options_type)
+            new = self.made(kind, site)
+        except WrongParameter as wrong:
+            raise WrongParameter(
+                f"{asked.class_path} refuses its options: {wrong.detail}", remedy="Give them with --set NAME=VALUE."
+            ) from None
+        except UNPROVED as error:
+            raise WrongClass(f"{asked.class_path} cannot be made: {complaint(error)}") from error
+        rules = ExchangeRules(asked.prove_s, asked.ready_within_s)
+        course = ExchangeCourse(rules, self._news.set, self._now_s())
+        both_open = all(getattr(one, "opens_beside", False) for one in (old, new))
+        return _Exchange(asked, slot, old, new, parameters, course, both_open or not hasattr(new, "open"))
+
+    async def _opened(self, going: _Exchange) -> None:
+        """Open the new driver; if the device allows one only, close the old one first."""
+        if not hasattr(going.new, "open"):
+            return
+        if not going.is_beside:
+            going.slot.shut()
+            await going.slot.wait_quiet()
+            await self._close(going.old)
+        within_s = going.asked.ready_within_s / self._rc.clock.rate
+        if not going.is_beside:
+            within_s = min(within_s, self._rc.closed_most_s)
+        try:
+            async with asyncio.timeout(within_s):
+                await _open(going.new)
+        except TimeoutError:
+            going.course.fail(self._now_s(), f"not open within {within_s:g} s")
+        except UNPROVED as error:
+            going.course.fail(self._now_s(), complaint(error))
+
+    async def _taken_over(self, going: _Exchange) -> None:
+        """Let the new one work, between two calls."""
+        going.slot.shut()
+        await going.slot.wait_quiet()
+        if going.course.is_over:  # it failed by itself meanwhile
+            return
+        now_s = self._now_s()
+        going.course.keeps_state = bool(going.course.tried(now_s, lambda: hand_over(going.old, going.new)))
+        if going.course.cause:
+            return
+        going.slot.works, going.slot.on_trial, going.slot.is_tried = going.new, self._failed, True
+        going.slot.calls = 0
+        going.course.switch(now_s)
+        going.slot.open_gate()
+        self._tell(f"{going.asked.class_path} works, and has to prove itself", LogLevel.INFO)
+
+    async def _brought_up(self, going: _Exchange) -> None:
+        """Have the RC repeat what stands; a fault in it is one of the driver that works."""
+        if going.course.switched_s is None:
+            return
+        try:
+            await self._rc.driver_exchanged()
+        except HardwareFault as fault:
+            if going.slot.works is going.old:
+                self._rc.fail(fault)
+
+    async def _returned(self, going: _Exchange) -> str:
+        if not going.is_beside:
+            await self._close(going.new)
+            try:
+                await _open(going.old)
+            except HardwareFault as fault:
+                self._put_back(going)
+                self._rc.fail(fault)  # its creator starts it again, and it opens the device
+                return ""
+        self._put_back(going)
+        old, new = _path_of(going.old), going.asked.class_path
+        stays = "goes on" if going.course.switched_s is None else "is back"
+        self._tell(f"{old} {stays}, {new} failed: {going.course.cause}", LogLevel.WARNING)
+        await self._brought_up(going)
+        if going.is_beside:
+            await self._close(going.new)
+        is_same = old.partition(":")[0] == new.partition(":")[0]
+        return f"a new start of {self._rc.name} reads the file as it is now" if is_same else ""
+
+    async def _proved(self, going: _Exchange) -> str:
+        going.slot.is_tried, going.course.rounds = False, going.slot.calls
+        self._rc.has_driver(going.parameters)
+        if going.is_beside:
+            await self._close(going.old)
+        after = f": {going.course.cause}" if going.course.cause else ""
+        state = "with the state of" if going.course.keeps_state else "from a fresh state instead of"
+        self._tell(f"{going.asked.class_path} goes on {state} {_path_of(going.old)}{after}")
+        order = ReviseStart(self._rc.name, msgspec.to_builtins(self._rc.parameters))
+        try:
+            await self._rc.bus.ask(PLACER, order, StartRevised, within_s=REVISED_WITHIN_S)
+        except NotPlaced:  # started by hand
+            return ""
+        except (LinkError, Refusal) as error:
+            return f"a new start of {self._rc.name} has the old class again: {error}"
+        return ""
+
+    async def _close(self, driver: object) -> None:
+        """Close a driver that works no more; that it cannot is told, and changes nothing."""
+        close = getattr(driver, "close", None)
+        if close is None:
+            return
+        try:
+            async with asyncio.timeout(CLOSES_WITHIN_S):
+                await close()
+        except UNPROVED as error:
+            log.warning("%s: %s does not close: %s", self._rc.name, _path_of(driver), complaint(error))
+
+    def _now_s(self) -> float:
+        return self._rc.clock.now_s()
+
+    def _tell(self, what: str, level: LogLevel = LogLevel.NOTICE) -> None:
+        self._rc.publish_event(self._rc.name, what, level)
+
+
+async def _open(driver: object) -> None:
+    opening: Callable[[], Awaitable[None]] = getattr(driver, "open", _nothing)
+    await opening()
+
+
+async def _nothing() -> None:
+    pass
+
+
+def _path_of(driver: object) -> str:
+    return f"{type(driver).__module__}:{type(driver).__qualname__}"

@@ -1,0 +1,152 @@
+"""DriverSlot: stands in an RC where its driver stands, so that another driver can take the place between two calls.
+
+Rules of this file:
+
+* At any instant one driver works: all calls go to it, and only its callbacks arrive.
+* Another one takes over when no call is under way. Calls that come while no device is open wait.
+* While a driver is on trial, its bugs and hardware faults, and calls that hang, reach the RC only if the old driver
+  cannot do the same call.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+from collections.abc import Callable, Mapping
+
+from backbone.errors import Refusal
+from backbone.exchange_course import UNPROVED
+from resource_pool.drivers.interface import HardwareFault
+
+HANGS_S = 0.2  # chosen: the old driver still has as long until the RC itself gives a call up; machine seconds
+
+
+class DriverSlot:
+    """The place of a driver; made by ``slot_for``, which adds the methods of the driver.
+
+    Attributes:
+        works: The driver that works.
+        on_trial: Called with the exception when the driver that works fails; returns None if it is not on trial, else
+            an event that is set when the old one works again.
+        calls: Calls that were answered.
+        is_tried: True: the driver that works is on trial.
+    """
+
+    def __init__(self, driver: object) -> None:
+        self.works = driver
+        self.on_trial: Callable[[BaseException], asyncio.Event | None] = lambda _error: None
+        self.calls, self.is_tried = 0, False
+        self._opened, self._quiet = asyncio.Event(), asyncio.Event()
+        self._opened.set()
+        self._quiet.set()
+        self._under_way = 0
+
+    def __getattr__(self, name: str) -> object:
+        found: object = getattr(self.__dict__["works"], name)
+        return found
+
+    # ------------------------------------------------------------------ for the exchange
+    def shut(self) -> None:
+        """Let calls wait."""
+        self._opened.clear()
+
+    def open_gate(self) -> None:
+        """Let calls go to the driver that works."""
+        self._opened.set()
+
+    async def wait_open(self) -> None:
+        """Return when calls go to a driver."""
+        await self._opened.wait()
+
+    async def wait_quiet(self) -> None:
+        """Return when no call is under way."""
+        await self._quiet.wait()
+
+    # ------------------------------------------------------------------ calls
+    def call(self, name: str, arguments: tuple[object, ...], named: Mapping[str, object]) -> object:
+        """Call a method that does not wait."""
+        driver = self.works
+        try:
+            done: object = getattr(driver, name)(*(self._while_works(driver, one) for one in arguments), **named)
+        except UNPROVED as error:
+            back = None if _is_no_fault(error) else self.on_trial(error)
+            if back is None:
+                raise
+            if not back.is_set():  # its device has to be opened first, and this caller cannot wait
+                raise HardwareFault(f"{name}: {error}") from error
+            return self.call(name, arguments, named)
+        self.calls += 1
+        return done
+
+    async def call_later(self, name: str, arguments: tuple[object, ...], named: Mapping[str, object]) -> object:
+        """Call a method that waits."""
+        await self._opened.wait()
+        driver, back = self.works, None
+        self._under_way += 1
+        self._quiet.clear()
+        try:
+            given = [self._while_works(driver, one) for one in arguments]
+            async with asyncio.timeout(HANGS_S if self.is_tried else None):
+                done: object = await getattr(driver, name)(*given, **named)
+            self.calls += 1
+            return done
+        except UNPROVED as error:
+            fault = HardwareFault(f"{name} took longer than {HANGS_S} s") if isinstance(error, TimeoutError) else error
+            if not _is_no_fault(error) and self.works is driver:
+                back = self.on_trial(fault)
+            if back is None and self.works is driver:
+                raise
+        finally:
+            self._under_way -= 1
+            if not self._under_way:
+                self._quiet.set()
+        if back is not None:
+            await back.wait()
+        return await self.call_later(name, arguments, named)
+
+    def _while_works(self, driver: object, given: object) -> object:
+        """Return a callback that arrives only while this driver works, and any other argument as it is."""
+        if not callable(given):
+            return given
+
+        def heard(*what: object) -> object:
+            return given(*what) if self.works is driver else None
+
+        return heard
+
+
+def slot_for(driver: object) -> DriverSlot:
+    """Return a slot with this driver, which has its methods."""
+    methods = {
+        name: _waiting(name) if inspect.iscoroutinefunction(method) else _at_once(name)
+        for name, method in inspect.getmembers(type(driver), callable)
+        if not name.startswith("_") and not isinstance(method, type)
+    }
+    kind = type("DriverSlot", (DriverSlot,), methods)
+    slot: DriverSlot = kind(driver)
+    return slot
+
+
+def methods_of(driver: object) -> set[str]:
+    """Return the names of the methods by which an RC may call this driver."""
+    found = inspect.getmembers(driver if isinstance(driver, type) else type(driver), callable)
+    return {name for name, method in found if not name.startswith("_") and not isinstance(method, type)}
+
+
+def _waiting(name: str) -> Callable[..., object]:
+    async def method(self: DriverSlot, *arguments: object, **named: object) -> object:
+        return await self.call_later(name, arguments, named)
+
+    return method
+
+
+def _at_once(name: str) -> Callable[..., object]:
+    def method(self: DriverSlot, *arguments: object, **named: object) -> object:
+        return self.call(name, arguments, named)
+
+    return method
+
+
+def _is_no_fault(error: BaseException) -> bool:
+    """Return whether a driver that works well may raise this: a refusal of what it was given."""
+    return isinstance(error, Refusal) and not isinstance(error, HardwareFault)

@@ -1,0 +1,20 @@
+"""What the drivers of ``exchanged_drivers`` have done; their file is read anew, this one is not."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class Bench:
+    """What the drivers of a device have done."""
+
+    opened: ClassVar[list[str]] = []
+    shone: ClassVar[list[tuple[str, float]]] = []
+    most_open: ClassVar[int] = 0
+    fault: ClassVar[str] = ""
+
+    @classmethod
+    def clear(cls) -> None:
+        cls.opened.clear()
+        cls.shone.clear()
+        cls.most_open, cls.fault = 0, ""

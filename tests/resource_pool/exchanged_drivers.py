@@ -1,0 +1,79 @@
+"""Drivers for tests of their exchange."""
+
+from __future__ import annotations
+
+import asyncio
+
+from driver_bench import Bench
+
+from resource_pool.drivers.interface import DriverSite, HardwareFault
+from resource_pool.drivers.simulated import SimulatedScoutProtocol
+
+
+class First:
+    """A driver of a device that can be opened once."""
+
+    hands_over = frozenset({"count"})
+
+    def __init__(self, site: DriverSite) -> None:
+        self.site, self.count, self.who = site, 0, type(self).__name__
+
+    async def set_brightness(self, share: float) -> None:
+        self.count += 1
+        await asyncio.sleep(0.01)
+        Bench.shone.append((self.who, share))
+
+    async def open(self) -> None:
+        await asyncio.sleep(0.1)
+        Bench.opened.append(self.who)
+        Bench.most_open = max(Bench.most_open, len(Bench.opened))
+
+    async def close(self) -> None:
+        if self.who in Bench.opened:
+            Bench.opened.remove(self.who)
+
+
+class Second(First):
+    """Another one, which fails as the test says."""
+
+    async def open(self) -> None:
+        match Bench.fault:
+            case "open":
+                raise HardwareFault("no such device")
+            case "open late":
+                await asyncio.sleep(60.0)
+            case "open wrongly":
+                raise ZeroDivisionError
+        await super().open()
+
+    async def set_brightness(self, share: float) -> None:
+        match Bench.fault:
+            case "call":
+                raise HardwareFault("the lamp is loose")
+            case "call wrongly":
+                raise ValueError("planted")
+            case "hang":
+                await asyncio.Event().wait()
+            case "task":
+                self.site.fail(OSError("pulled"))
+        await super().set_brightness(share)
+
+
+class FirstBeside(First):
+    opens_beside = True
+
+
+class SecondBeside(Second):
+    opens_beside = True
+
+
+class NoLamp:
+    def __init__(self, site: DriverSite) -> None:
+        pass
+
+
+class LoudProtocol(SimulatedScoutProtocol):
+    def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
+        if Bench.fault == "call":
+            raise ValueError("too loud")
+        return super().drive(left_rad_s, right_rad_s)

@@ -1,0 +1,252 @@
+"""Drivers are exchanged while their RC works: the old one does the calls that the new one cannot."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from driver_bench import Bench
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pool_on_local_network import Pool, WiretappedRadio, a_pool
+from pool_orders import command, connect_robot
+
+from backbone.bus.clock import run_virtual
+from backbone.component.component import WrongParameter
+from backbone.component.messages import AskParameters, Parameters
+from backbone.errors import Refusal
+from backbone.exchange import ExchangeRunning, SwapClass, Swapped
+from backbone.keys import Conversation
+from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected
+from backbone.reading_anew import WrongClass
+from backbone.scheduling.requests import RcUse
+from resource_pool.commands import Drive, Tune
+from resource_pool.drivers.interface import HardwareFault, UnknownDriver
+from resource_pool.messages import Applied, Frame
+from resource_pool.rcs.skeleton import Lamp, Shine
+
+DRIVERS = "exchanged_drivers"
+AT = "resource_pool/lamp1"
+
+
+class OpenedLamp(Lamp):
+    """The lamp, whose device is opened."""
+
+    async def connect(self) -> None:
+        await super().connect()
+        await self._driver.open()  # type: ignore[attr-defined]
+
+
+PAIRS = [("First", "Second"), ("FirstBeside", "SecondBeside")]
+FAULTS = ["open", "open late", "open wrongly", "call", "call wrongly", "hang", "task"]
+
+
+@pytest.fixture(autouse=True)
+def _fresh_bench() -> None:
+    Bench.clear()
+
+
+async def swap(pool: Pool, name: str, prove_s: float = 1.0, at: str = AT, **options: Any) -> Swapped:
+    path = name if ":" in name or name == "simulated" else f"{DRIVERS}:{name}"
+    asked = SwapClass(path, options, prove_s, 2.0, user="anna")
+    return await pool.voice_of("ui_console/tester").ask(at, asked, Swapped, within_s=60.0)
+
+
+async def shine(pool: Pool, brightness: float) -> Applied:
+    return await pool.voice("one").ask(AT, Shine(brightness).under("one", 1), Applied, within_s=2)
+
+
+async def lit(pool: Pool, driver: str) -> None:
+    await pool.start(OpenedLamp, "lamp1", {"driver": f"{DRIVERS}:{driver}"})
+    await pool.manager_voice.ask(AT, Connect("one", 1, 30.0, RcUse(), {}), Connected, within_s=1)
+
+
+def bench(local_mission: Any, driver: str, scene: Callable[[Pool], Awaitable[None]]) -> None:
+    """Let a lamp with this driver be held, and play the scene."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            await lit(pool, driver)
+            await scene(pool)
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(("old", "new"), PAIRS)
+def test_another_driver_works_on_between_two_calls_with_the_state(local_mission: Any, old: str, new: str) -> None:
+    async def scene(pool: Pool) -> None:
+        await shine(pool, 0.5)
+        swapped = await swap(pool, new)
+        assert (swapped.is_proved, swapped.cause, swapped.keeps_state) == (True, "", True)
+        assert Bench.shone == [(old, 0.5), (new, 0.5)], "the lamp shines on"
+        await shine(pool, 0.7)
+        assert Bench.shone[-1] == (new, 0.7)
+        assert Bench.opened == [new]
+        assert Bench.most_open == (2 if old == "FirstBeside" else 1)
+        told = await pool.voice("one").ask(AT, AskParameters(), Parameters, within_s=1)
+        assert told.values["driver"] == f"{DRIVERS}:{new}"
+        assert (await swap(pool, old)).is_proved, "and back"
+
+    bench(local_mission, old, scene)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(("old", "new"), PAIRS)
+def test_the_old_driver_does_what_the_new_one_cannot(local_mission: Any, old: str, new: str, fault: str) -> None:
+    async def scene(pool: Pool) -> None:
+        await shine(pool, 0.5)
+        Bench.fault = fault
+        swapping = asyncio.create_task(swap(pool, new))
+        for _ in range(10):
+            await pool.clock.sleep_s(0.05)
+            await shine(pool, 0.7)
+        swapped = await swapping
+        cause = {"open late": "not open", "open wrongly": "Zero", "call wrongly": "planted", "hang": "longer"}
+        assert not swapped.is_proved
+        assert cause.get(fault, {"open": "no such", "call": "loose", "task": "pulled"}.get(fault, "")) in swapped.cause
+        assert Bench.opened == [old]
+        await shine(pool, 0.9)
+        assert Bench.shone[-1] == (old, 0.9)
+        assert pool.is_alive("lamp1")
+        Bench.fault = ""
+        assert (await swap(pool, new)).is_proved
+
+    bench(local_mission, old, scene)
+
+
+def test_refusals_change_nothing(local_mission: Any) -> None:
+    async def scene(pool: Pool) -> None:
+        with pytest.raises(WrongClass, match="lacks close, open, set_brightness"):
+            await swap(pool, "NoLamp")
+        with pytest.raises(UnknownDriver):
+            await swap(pool, "simulated")
+        with pytest.raises(Refusal, match="no_such"):
+            await swap(pool, "no_such_file:Lamp")
+        with pytest.raises(WrongParameter, match="refuses its options"):
+            await swap(pool, "Second", color="red")
+        first = asyncio.create_task(swap(pool, "Second", 3.0))
+        await pool.clock.sleep_s(0.5)
+        with pytest.raises(ExchangeRunning):
+            await swap(pool, "First")
+        assert (await first).is_proved
+        await pool.rc("scout1")
+        with pytest.raises(WrongClass, match="lacks"):
+            await swap(pool, "Second", at="resource_pool/scout1")
+
+    bench(local_mission, "First", scene)
+
+
+@contextmanager
+def the_pool_is_read_anew() -> Iterator[None]:
+    """Let the module of the pool be the old one again afterwards."""
+    mine = sys.modules["pool_on_local_network"]
+    try:
+        yield
+    finally:
+        sys.modules["pool_on_local_network"] = mine
+
+
+EVENTS = st.lists(
+    st.tuples(st.sampled_from(["shine", "connect", "disconnect", "swap"]), st.sampled_from(["", *FAULTS])), max_size=10
+)
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])  # the bench is cleared by each example
+@given(EVENTS)
+def test_no_call_is_lost_and_nothing_shines_without_a_holder(
+    local_mission: Any, pair: tuple[str, str], events: Sequence[tuple[str, str]]
+) -> None:
+    async def scene(pool: Pool) -> None:
+        epoch, brightness, swaps = 1, 0.0, list[asyncio.Task[Swapped]]()
+        for number, (event, fault) in enumerate(events):
+            match event:
+                case "shine" if epoch:
+                    brightness = (number + 1) / 100
+                    await pool.voice("one").ask(AT, Shine(brightness).under("one", epoch), Applied, within_s=5)
+                case "connect" if not epoch:
+                    epoch = number + 2
+                    await pool.manager_voice.ask(AT, Connect("one", epoch, 30.0, RcUse(), {}), Connected, within_s=1)
+                case "disconnect" if epoch:
+                    await pool.manager_voice.ask(AT, Disconnect("one", epoch), Disconnected, within_s=1)
+                    epoch, brightness = 0, 0.0
+                case "swap":
+                    Bench.fault = fault
+                    swaps.append(asyncio.create_task(swap(pool, pair[1] if number % 2 else pair[0], 0.5)))
+            if Bench.shone:
+                assert Bench.shone[-1][1] == brightness
+        await asyncio.gather(*swaps, return_exceptions=True)
+        Bench.fault = ""
+        assert pool.is_alive("lamp1")
+        assert len(Bench.opened) == 1
+        assert Bench.shone == [] or Bench.shone[-1] == (Bench.opened[0], brightness)
+
+    Bench.clear()
+    bench(local_mission, pair[0], scene)
+
+
+def test_a_radio_goes_on_under_the_same_grant(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+            swapped = await swap(pool, "pool_on_local_network:WiretappedRadio", at="resource_pool/radio")
+            assert swapped.is_proved, swapped.cause
+            assert swapped.rounds > 3
+            before, after = WiretappedRadio.built[0], sys.modules["pool_on_local_network"].WiretappedRadio.built[0]
+            assert before.closed == 1
+            assert not {packet.at_s for packet in before.heard} & {packet.at_s for packet in after.heard}
+            assert after.heard[0].robot_epoch == before.heard[-1].robot_epoch
+            after.breaks = True
+            assert isinstance(await pool.outcome("radio"), HardwareFault), "a proved driver that breaks ends its RC"
+
+    with the_pool_is_read_anew():
+        run_virtual(main())
+
+
+def test_a_grabber_delivers_on_and_only_once(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["video", "grabber"], manager=False) as pool:
+            frames: list[Frame] = []
+            ear = pool.voice("ear")
+            ear.subscribe("resource_pool/one", Conversation.FRAMES, Frame, lambda heard: frames.append(heard.body))
+            grabber = "resource_pool/grabber"
+            await pool.manager_voice.ask(grabber, Connect("one", 7, 30.0, RcUse(), {}), Connected, within_s=1)
+            await pool.voice("one").ask(grabber, Tune("video", "scout1").under("one", 7), Applied, within_s=1)
+            old = pool.grabber_driver
+            swapping = asyncio.create_task(swap(pool, "pool_on_local_network:HandOperatedGrabber", at=grabber))
+            await pool.clock.sleep_s(0.5)
+            new = sys.modules["pool_on_local_network"].HandOperatedGrabber.built[-1]
+            for driver in (old, new):
+                driver.deliver(driver.picture())
+            await pool.clock.sleep_s(0.1)
+            assert (new.frequency, [(one.number, one.epoch) for one in frames]) == ("video", [(1, 7)])
+            await pool.manager_voice.ask(grabber, Disconnect("one", 7), Disconnected, within_s=1)
+            assert new.frequency == ""
+            assert (await swapping).is_proved
+
+    with the_pool_is_read_anew():
+        run_virtual(main())
+
+
+def test_a_protocol_is_exchanged_under_the_robot_s_name(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"], manager=False) as pool:
+            await connect_robot(pool, "one", 1)
+            at = "resource_pool/scout1"
+            Bench.fault = "call"
+            swapping = asyncio.create_task(swap(pool, "exchanged_drivers:LoudProtocol", at=at))
+            await pool.clock.sleep_s(0.2)
+            await command(pool, "one", 1, Drive(2.0, 2.0))
+            assert "too loud" in (await swapping).cause
+            Bench.fault = ""
+            assert (await swap(pool, "exchanged_drivers:LoudProtocol", at=at)).is_proved
+            told = await pool.voice("one").ask(at, AskParameters(), Parameters, within_s=1)
+            assert told.values["protocol"] == "exchanged_drivers:LoudProtocol"
+            await command(pool, "one", 1, Drive(3.0, 3.0))
+
+    run_virtual(main())
