@@ -24,7 +24,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
 from backbone.component.process import load_class
 from backbone.debug_views import ListViews, LookAt
-from backbone.errors import LinkError, Refusal
+from backbone.errors import Refusal
 from backbone.exchange import SwapClass
 from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
@@ -32,9 +32,9 @@ from backbone.naming import Subsystem, address, component_of
 from backbone.reading_anew import WrongClass
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_exchange import BehaviorExchanges
-from mission_control.behavior_hooks import BehaviorHooks, suspended_because
+from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.behavior_tree import ArcNeed, BehaviorNode, draw
-from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_by_placer, end_task, why
+from mission_control.child_keeper import end_by_placer
 from mission_control.children import Children, Decision
 from mission_control.children_loop import ChildrenLoop
 from mission_control.debug_views import DebugViews
@@ -49,28 +49,13 @@ from mission_control.messages import (
     ChildReport,
     ReportNoted,
 )
+from mission_control.own_arc import NO_GRANT_YET, OwnArc
 from mission_control.parent_reports import ParentReports
-from resource_pool.arc_client import (
-    ArcClient,
-    ArcNotice,
-    EmergencyStopped,
-    Frame,
-    NotMyArc,
-    PathNode,
-    Resumed,
-    Suspended,
-    Suspending,
-    SwappedOut,
-    Usage,
-    arc_name,
-    claim_parameters,
-)
+from resource_pool.arc_client import ArcClient, ArcNotice
 
 log = logging.getLogger(__name__)
 
 DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before SIGTERM
-REST_S = 0.5  # chosen: as a slice's end gives; a behavior that stops needs one command
-NO_GRANT_YET = "no grant yet"
 
 
 class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -146,28 +131,17 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """The classes that were in charge; of the component."""
         super().__init__(launch, self.gate, clock)
         self.status, self.payload = BehaviorStatus.RUNNING, dict[str, object]()
-        self.rcs: Mapping[str, str] = {}
-        """Role → name of the granted RCs; empty while suspended."""
-        self.robot = ""
-        """The granted RC that has a body; empty while suspended, and without one."""
-        self.arc: ArcClient | None = None
-        """The client of its ARC; None without an ARC."""
+        self.own_arc = OwnArc(self, self)
+        """Its claim of its ARC, and the grants."""
         self.views = DebugViews(self.gate, clock)
         """Its debug views: pictures and values that cost nothing unless a console looks."""
-        self.times_resumed = self.times_suspended = self.frames_seen = 0
         self.child_nodes = {node.name: node for node in self.parameters.children}
         """Name of a child → its node of the tree."""
         self._children = ChildrenLoop(self, self.rules(list(self.child_nodes)))
-        self._suspended_because = self._reported_because = ""
+        self._reported_because = ""
         self._is_wound_up = self.has_begun = False
         self.tree_version, self._left = 0, set[str]()
-        self.claimed: ArcNeed | None = None
-        """What it asks of its ARC."""
-        self._has_other_times = self._resumes_again = False
-        self._claim: dict[str, object] = {}
         self._parent: ParentReports | KeeperReports | None = None
-        self._keeping: asyncio.Task[None] | None = None
-        self._acting: asyncio.Task[None] | None = None
 
     # ------------------------------------------------------------------ hooks with a default of their own
     def need(self) -> ArcNeed | None:
@@ -193,6 +167,21 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         return self.parameters.path or [(self.name, 0)]
 
     @property
+    def arc(self) -> ArcClient | None:
+        """The client of its ARC; None without an ARC."""
+        return self.own_arc.client
+
+    @property
+    def rcs(self) -> Mapping[str, str]:
+        """Role → name of the granted RCs; empty while suspended."""
+        return self.own_arc.rcs
+
+    @property
+    def robot(self) -> str:
+        """The granted RC that has a body; empty while suspended, and without one."""
+        return self.own_arc.robot
+
+    @property
     def children(self) -> Mapping[str, BehaviorStatus]:
         """Status of each child that was started."""
         return self._children.rules.status
@@ -204,7 +193,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             return ""
         if self.parameters.keeper and not self.has_begun:
             return NO_GRANT_YET
-        return self._suspended_because if self.arc is not None else self._children.rules.suspended_because
+        return self.own_arc.suspended_because if self.arc is not None else self._children.rules.suspended_because
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
@@ -249,50 +238,22 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     def go_on_from(self, other: Self) -> None:
         """Go on where another implementation is: its story, progress, grants and place in the tree."""
-        self.story, self.payload, self.claimed = other.story, other.payload, self.claimed or other.claimed
-        self.times_resumed, self.times_suspended = other.times_resumed, other.times_suspended
-        self.frames_seen, self.tree_version, self.pid = other.frames_seen, other.tree_version, other.pid
+        self.story, self.payload, self.pid = other.story, other.payload, other.pid
+        self.tree_version = other.tree_version
+        self.own_arc.go_on_from(other.own_arc)
 
     def take_charge(self) -> None:
         """Command from now on, and keep the ARC."""
         if self.gate.is_open:
             return
         self.gate.open()
-        if self.arc is not None and self.claimed is not None and self._keeping is None:
-            self._keeping = self.begin_task(self._keep(self.arc, self.claimed, is_there=True), "arc")
-        if self.rcs and not self.status.is_final and (self._acting is None or self._acting.done()):
-            self._acting = self.begin_task(self._act(), "act")
+        self.own_arc.take_charge()
         self.changed()
 
     def stand_by(self) -> None:
         """Command no more; keep the state, and hear of grants."""
         self.gate.shut()
-        for task in (self._keeping, self._acting):
-            if task is not None and task is not asyncio.current_task():
-                task.cancel()
-        self._keeping = self._acting = None
-
-    def _compare_needs(self, need: ArcNeed | None) -> None:
-        """Note how its ARC is to change when it is in charge.
-
-        Raises:
-            WrongClass: It needs another ARC than the class in charge.
-        """
-        other = self._in_charge
-        had, same = other.claimed, need
-        if had is not None and need is not None:
-            times = need.minimum_runtime_s, need.maximum_runtime_s
-            same = msgspec.structs.replace(had, minimum_runtime_s=times[0], maximum_runtime_s=times[1])
-        if (had is None) != (need is None) or need != same:
-            raise WrongClass(f"{self.name} would need another ARC than now", remedy="Ask for the ARC of the tree.")
-        self.claimed, self._has_other_times = need, need != had
-        self._suspended_because = other.suspended_because
-
-    async def _hear_of_grant(self, arc: ArcClient) -> None:
-        """Know the grant of the class in charge."""
-        held = self._in_charge.arc
-        if held is not None and held.granted is not None:
-            await arc.handle(held.granted)
+        self.own_arc.stand_by()
 
     @property
     def _in_charge(self) -> Behavior[Any]:
@@ -315,17 +276,11 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             self.begin_task(self._end_with_keeper(self._parent), "keeper")
             await self._parent.wait_noted()
         await self.start()
-        need = self.need()
-        if not self.gate.is_open:
-            self._compare_needs(need)
+        need, other = self.need(), None if self.gate.is_open else self._in_charge.own_arc
+        if other is not None:
+            self.own_arc.compare(need, other)
         if need is not None and not self.status.is_final:
-            self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self, self.not_now)
-            self.arc.frames(self._saw)
-            if self.gate.is_open:
-                self._suspended_because = NO_GRANT_YET
-                self._keeping = self.begin_task(self._keep(self.arc, need), "arc")
-            else:
-                await self._hear_of_grant(self.arc)
+            await self.own_arc.begin(need, other)
         self.has_begun = True
         self._reported_because = self.suspended_because
         self._send_report()  # it takes the place of an earlier life's
@@ -353,9 +308,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 self.finish(BehaviorStatus.FAILURE, {"detail": "broken off by its operator"})
                 return BrokenOff()
             case body if isinstance(body, ArcNotice):
-                if self.arc is None:
-                    raise NotMyArc(f"{self.name} claims no ARC")
-                return await self.arc.handle(body)
+                return await self.own_arc.handle(body)
             case _:
                 raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 
@@ -367,23 +320,19 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """
         try:
             async with asyncio.timeout(DRAIN_TIME_S):
-                await self._release()
+                await self.own_arc.release()
         except TimeoutError:  # the ARC watches its owner's token and ends with it
             log.warning("%s leaves before its ARC has ended", self.name)
 
     def absences(self) -> list[Absence]:
         """Return the missing children and ARC, and the children that it has given up."""
         of_children = self._children.absences(has_finished=self.status.is_final)
-        arc = self.arc.wish.absence() if self.arc is not None and self._keeping is not None else None
+        arc = self.own_arc.absence()
         return of_children if arc is None or self.status.is_final else [arc, *of_children]
 
     def statistics(self) -> dict[str, float]:
         """Return counts of grants and pictures."""
-        return {
-            "times_resumed": self.times_resumed,
-            "times_suspended": self.times_suspended,
-            "frames_seen": self.frames_seen,
-        }
+        return self.own_arc.statistics()
 
     def behavior_state(self) -> BehaviorState:
         """Return its progress."""
@@ -396,139 +345,6 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         tree = draw([node], rules.remarks() | {self.name: about_it}, in_file_order=rules.in_file_order)
         return BehaviorState(self.name, self.status, self.payload, dict(self.rcs), self.suspended_because, tree)
 
-    # ------------------------------------------------------------------ the ARC
-    async def arc_resumed(self, notice: Resumed) -> None:
-        """Call the hooks; see ``ArcListener``."""
-        self.rcs, self.robot, self._suspended_because = notice.rcs, notice.robot, ""
-        self.times_resumed += 1
-        held = ", ".join(f"{kind} {name}" for kind, name in notice.rcs.items())
-        self.story.note(self.name, f"resumed with {held}")
-        self.report(f"holds {held}")
-        self._send_report_if_suspension_changed()
-        try:
-            await self.resumed(notice.rcs)
-        except SwappedOut:
-            if self.gate.is_open:
-                raise
-            self._resumes_again = True  # when it is in charge
-        if self.rcs and not self.status.is_final and self.gate.is_open:
-            await self._stop_acting()
-            self._acting = self.begin_task(self._act(), "act")
-
-    async def arc_suspending(self, notice: Suspending) -> None:
-        """Call the hooks; see ``ArcListener``."""
-        await self._stop_acting()
-        await self.suspending(notice.deadline_s)
-
-    async def arc_suspended(self, notice: Suspended) -> None:
-        """Call the hooks; see ``ArcListener``."""
-        self.rcs, self.robot = {}, ""
-        self._suspended_because = suspended_because(notice.reason, notice.by)
-        self.times_suspended += 1
-        self.story.note(self.name, f"suspended: {self._suspended_because}")
-        self.report(f"suspended: {self._suspended_because}")
-        self._send_report_if_suspension_changed()
-        await self._stop_acting()
-        await self.suspended(notice.reason, notice.by)
-
-    @property
-    def _commands_nothing(self) -> bool:
-        """True if it sends no commands, because it overrides neither ``act`` nor ``suspending``."""
-        return type(self).act is BehaviorHooks.act and type(self).suspending is BehaviorHooks.suspending
-
-    def _claim_of(self, need: ArcNeed) -> dict[str, object]:
-        return claim_parameters(
-            self.address,
-            path=[PathNode(name, priority) for name, priority in self.path],
-            minimum_runtime_s=need.minimum_runtime_s,
-            maximum_runtime_s=need.maximum_runtime_s,
-            wish=need.wish,
-            features=need.features,
-            usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
-            stops_at_once=self._commands_nothing,
-            may_say_not_now=type(self).not_now is not BehaviorHooks.not_now,
-            console=bool(self.parameters.keeper),
-        )
-
-    async def _keep(self, arc: ArcClient, need: ArcNeed, *, is_there: bool = False) -> None:
-        self.claimed, self._claim = need, self._claim_of(need)
-        patience_s, changed = START_PATIENCE_S, self.changed
-        try:
-            if self._has_other_times:
-                self._has_other_times = False
-                await self._want_times(arc, need)
-            await arc.keep(
-                self.clock, need.kind, self._claim, patience_s=patience_s, on_changed=changed, is_there=is_there
-            )
-        except Refusal as refusal:
-            self.report(f"no ARC: {refusal}")
-            self.finish(BehaviorStatus.FAILURE, why(refusal))
-
-    async def _want_times(self, arc: ArcClient, need: ArcNeed) -> None:
-        try:
-            await arc.want_runtime(need.minimum_runtime_s, need.maximum_runtime_s)
-        except (Refusal, LinkError) as error:  # it has those of the class before until it is claimed again
-            self.story.note(arc.arc, f"its run times were not changed: {error}")
-
-    def _saw(self, frame: Frame) -> None:
-        if self.rcs and not self.status.is_final:
-            self.frames_seen += 1
-            self.see(frame)
-
-    async def _act(self) -> None:
-        while True:
-            try:
-                if self._resumes_again:
-                    self._resumes_again = False
-                    await self.resumed(self.rcs)
-                return await self.act()
-            except SwappedOut as refusal:  # the grant ended first; ``resumed`` begins the next turn
-                log.info("%s stopped acting: %s", self.name, refusal.detail)
-                return None
-            except LinkError as error:
-                log.info("%s acts again: %s", self.name, error)
-            except SystemExit as left:
-                if self.gate.is_first:
-                    raise
-                raise WrongClass(f"SystemExit: {left}") from left  # of a class that has not proved itself
-            except EmergencyStopped as stopped:
-                await self._wait_until_it_may_move(stopped)
-                continue
-            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
-
-    async def _wait_until_it_may_move(self, stopped: EmergencyStopped) -> None:
-        """Report the stop, and return when it is lifted or its state is unknown."""
-        assert self.arc is not None  # noqa: S101  it refused the command
-        held = self.feedback
-        self.report(stopped.detail)
-        try:
-            await self.arc.wait_stop_lifted(str(stopped.facts["rc"]))
-        except LinkError as error:
-            log.info("%s does not know whether the stop is lifted: %s", self.name, error)
-            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
-        else:
-            self.report(held)
-
-    async def _stop_acting(self) -> None:
-        acting, self._acting = self._acting, None
-        await end_task(acting)
-
-    async def _release(self) -> None:
-        keeping, self._keeping = self._keeping, None
-        if keeping is None or self.arc is None:
-            return None
-        await end_task(keeping)
-        self.changed()
-        while True:
-            try:
-                return await self.arc.release(f"{self.name} is done")
-            except LinkError as error:
-                log.info("%s: released without an answer: %s", self.arc.arc, error)
-            except Refusal as refusal:  # it has another owner by now
-                log.info("%s is not released: %s", self.arc.arc, refusal)
-                return None
-            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
-
     # ------------------------------------------------------------------ the tree
     async def _take(self, taken: TakeBranch) -> BranchTaken:
         """Take the place in the changed tree; a message that comes again waits for the same ends."""
@@ -540,9 +356,8 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             self._left = (self._left | before) - nodes.keys()
             self.child_nodes.clear()
             self.child_nodes.update(nodes)
-            if self.claimed is not None:
-                self.claimed = (self.need() if self.parameters.arc != arc else None) or self.claimed
-                self._claim.update(self._claim_of(self.claimed))
+            if self.own_arc.claimed is not None:
+                self.own_arc.claim_as_now(self.need() if self.parameters.arc != arc else None)
             self.story.note(self.name, f"takes its place in version {taken.version} of the tree")
             self.children_changed()
             await self._children.rearranged(self._left, anew)
@@ -552,18 +367,18 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     def rules_applied(self) -> None:
         """Report what the rules of the children have made of an event; see ``ParentOfChildren``."""
         self.children_arranged()
-        self._send_report_if_suspension_changed()
+        self.suspension_changed()
 
     async def _wind_up(self) -> None:
         """Give the ARC back, end the children, and repeat the report until the parent notes it.
 
         A behavior that a console ordered keeps its ARC, so that no lower ARC has the robot before the operator.
         """
-        await self._stop_acting()
+        await self.own_arc.acting.stop()
         if isinstance(self._parent, KeeperReports):
             await self._keep_for_operator(self._parent)
             return
-        await asyncio.gather(self._release(), self._children.end())
+        await asyncio.gather(self.own_arc.release(), self._children.end())
         if self._parent is not None:
             self._is_wound_up = True
             await self._parent.conclude()
@@ -573,22 +388,19 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         why_over = await keeper.run()
         self.status = BehaviorStatus.FAILURE
         self.publish_event(self.name, f"ends with its order: {why_over}", LogLevel.NOTICE)
-        await self._stop_acting()
-        await self._release()
+        await self.own_arc.acting.stop()
+        await self.own_arc.release()
         await end_by_placer(self.bus, self.clock, self.name, f"its order is over: {why_over}")
 
     async def _keep_for_operator(self, keeper: KeeperReports) -> None:
         """Bring the robot to rest, and keep it until the console has it and ends this behavior."""
-        if self.rcs and not self._commands_nothing:
-            try:
-                await self.suspending(REST_S)
-            except (Refusal, LinkError) as error:  # the grant ended first, or the robot is stopped
-                log.info("%s did not bring its robot to rest: %s", self.name, error)
+        await self.own_arc.rest()
         await self._children.end()
         self._is_wound_up = True
         keeper.send()
 
-    def _send_report_if_suspension_changed(self) -> None:
+    def suspension_changed(self) -> None:
+        """Report it, if the reason of its suspension is another one; see ``OwnerOfArc``."""
         if self.suspended_because != self._reported_because:
             self._reported_because = self.suspended_because
             self._send_report()

@@ -1,0 +1,116 @@
+"""Acting: the task in which a behavior commands its robot during a grant.
+
+Rule of this file: it never outlives the grant, and begins again after what passes: a cut link, an operator's stop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Coroutine
+from typing import Protocol
+
+from backbone.bus.interface import Clock
+from backbone.errors import LinkError
+from backbone.reading_anew import WrongClass
+from mission_control.behavior_hooks import BehaviorHooks
+from mission_control.child_keeper import AGAIN_AFTER_S, end_task
+from mission_control.gated_bus import GatedBus
+from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import ArcClient, EmergencyStopped, SwappedOut
+
+log = logging.getLogger(__name__)
+
+
+class Actor(Protocol):
+    """The behavior, as its acting needs it."""
+
+    gate: GatedBus
+    clock: Clock
+    status: BehaviorStatus
+    feedback: str
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
+        """Run work as a task, unless the behavior is ending."""
+
+    def report(self, feedback: str) -> None:
+        """Set the feedback."""
+
+
+class Acting:
+    """Runs ``BehaviorHooks.act``.
+
+    Args:
+        actor: The behavior.
+        hooks: Its hooks; the same behavior.
+
+    Attributes:
+        resumes_again: True: ``resumed`` is called before the next act, because it could not command the robot before.
+    """
+
+    def __init__(self, actor: Actor, hooks: BehaviorHooks) -> None:
+        self.resumes_again = False
+        self._actor, self._hooks, self._clock = actor, hooks, actor.clock
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def is_under_way(self) -> bool:
+        """True: it acts."""
+        return self._task is not None and not self._task.done()
+
+    def begin(self, arc: ArcClient) -> None:
+        """Act with the grant of this ARC."""
+        self._task = self._actor.begin_task(self._act(arc), "act")
+
+    async def stop(self) -> None:
+        """Return when it acts no more."""
+        task, self._task = self._task, None
+        await end_task(task)
+
+    def drop(self) -> None:
+        """Let it act no more, without waiting for this."""
+        task, self._task = self._task, None
+        cancel(task)
+
+    async def _act(self, arc: ArcClient) -> None:
+        while True:
+            try:
+                if self.resumes_again:
+                    self.resumes_again = False
+                    await self._hooks.resumed(arc.granted.rcs if arc.granted is not None else {})
+                return await self._hooks.act()
+            except SwappedOut as refusal:  # the grant ended first; ``resumed`` begins the next turn
+                log.info("%s stopped acting: %s", self._actor.name, refusal.detail)
+                return None
+            except LinkError as error:
+                log.info("%s acts again: %s", self._actor.name, error)
+            except SystemExit as left:
+                if self._actor.gate.is_first:
+                    raise
+                raise WrongClass(f"SystemExit: {left}") from left  # of a class that has not proved itself
+            except EmergencyStopped as stopped:
+                await self._wait_until_it_may_move(arc, stopped)
+                continue
+            await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+
+    async def _wait_until_it_may_move(self, arc: ArcClient, stopped: EmergencyStopped) -> None:
+        """Report the stop, and return when it is lifted or its state is unknown."""
+        held = self._actor.feedback
+        self._actor.report(stopped.detail)
+        try:
+            await arc.wait_stop_lifted(str(stopped.facts["rc"]))
+        except LinkError as error:
+            log.info("%s does not know whether the stop is lifted: %s", self._actor.name, error)
+            await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+        else:
+            self._actor.report(held)
+
+
+def cancel(task: asyncio.Task[None] | None) -> None:
+    """Cancel a task, unless it is the one that asks for this."""
+    if task is not None and task is not asyncio.current_task():
+        task.cancel()

@@ -1,0 +1,287 @@
+"""OwnArc: a behavior's claim of its one ARC, and the grants of it.
+
+Rule of this file: only the behavior in charge claims the ARC and acts; one beside it hears of each grant, so that it
+can go on with the same one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import msgspec
+
+from backbone.component.messages import Absence
+from backbone.component.story import StoryBook
+from backbone.errors import LinkError, Refusal
+from backbone.mission.behavior_orders import PathStep
+from backbone.reading_anew import WrongClass
+from mission_control.acting import Acting, Actor, cancel
+from mission_control.behavior_hooks import BehaviorHooks, suspended_because
+from mission_control.behavior_tree import ArcNeed
+from mission_control.child_keeper import AGAIN_AFTER_S, START_PATIENCE_S, end_task, why
+from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import (
+    ArcClient,
+    ArcNotice,
+    Frame,
+    Noted,
+    NotMyArc,
+    PathNode,
+    Resumed,
+    Suspended,
+    Suspending,
+    SwappedOut,
+    Usage,
+    arc_name,
+    claim_parameters,
+)
+
+log = logging.getLogger(__name__)
+
+REST_S = 0.5  # chosen: as a slice's end gives; a behavior that stops needs one command
+NO_GRANT_YET = "no grant yet"
+
+
+class OwnerOfArc(Actor, Protocol):
+    """The behavior, as its ARC needs it; see ``BehaviorHooks`` for its decisions."""
+
+    story: StoryBook
+
+    @property
+    def address(self) -> str:
+        """Its address."""
+
+    @property
+    def path(self) -> Sequence[PathStep]:
+        """Names and priorities from the mission's root to it, as they are now."""
+
+    @property
+    def is_ordered(self) -> bool:
+        """True: an operator ordered it."""
+
+    def changed(self) -> None:
+        """Note that ``absences`` may have changed."""
+
+    def suspension_changed(self) -> None:
+        """Note that the reason of its suspension may have changed."""
+
+    def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
+        """Finish."""
+
+
+class OwnArc:
+    """Claims the ARC, keeps it, calls the hooks at the begin and end of grants, and gives it back; an ``ArcListener``.
+
+    Args:
+        owner: The behavior.
+        hooks: Its hooks; the same behavior.
+
+    Attributes:
+        client: The client of the ARC; None without an ARC.
+        claimed: What is asked of it; None: not yet claimed.
+        rcs: Role → name of the granted RCs; empty while suspended.
+        robot: The granted RC that has a body; empty while suspended, and without one.
+        suspended_because: Why there is no grant, as part of a sentence.
+        acting: What the behavior does with the grant.
+    """
+
+    def __init__(self, owner: OwnerOfArc, hooks: BehaviorHooks) -> None:
+        self.client: ArcClient | None = None
+        self.claimed: ArcNeed | None = None
+        self.rcs: Mapping[str, str] = {}
+        self.robot = self.suspended_because = ""
+        self.acting = Acting(owner, hooks)
+        self._owner, self._hooks, self._gate, self._clock = owner, hooks, owner.gate, owner.clock
+        self._times_resumed = self._times_suspended = self._frames_seen = 0
+        self._has_other_times = False
+        self._claim: dict[str, object] = {}
+        self._keeping: asyncio.Task[None] | None = None
+
+    # ------------------------------------------------------------------ claimed, and given back
+    async def begin(self, need: ArcNeed, beside: OwnArc | None) -> None:
+        """Claim the ARC or, beside the behavior in charge, know its grant."""
+        self.client = ArcClient(self._gate, arc_name(self._gate, need.kind), self, self._hooks.not_now)
+        self.client.frames(self._saw)
+        if beside is None:
+            self.suspended_because = NO_GRANT_YET
+            self._begin_keeping(self.client, need)
+        elif beside.client is not None and beside.client.granted is not None:
+            await self.client.handle(beside.client.granted)
+
+    async def handle(self, notice: ArcNotice) -> Noted:
+        """Handle a notice of the ARC; see ``ArcClient.handle``.
+
+        Raises:
+            NotMyArc: No ARC is claimed, or another one.
+        """
+        if self.client is None:
+            raise NotMyArc(f"{self._owner.name} claims no ARC")
+        return await self.client.handle(notice)
+
+    def claim_as_now(self, need: ArcNeed | None) -> None:
+        """Let the next claim have the owner's path as it is now and, if it is given, this need."""
+        if self.claimed is not None:
+            self.claimed = need or self.claimed
+            self._claim.update(self._claim_of(self.claimed))
+
+    async def release(self) -> None:
+        """Return when the ARC is given back, or has another owner."""
+        keeping, self._keeping = self._keeping, None
+        if keeping is None or self.client is None:
+            return None
+        await end_task(keeping)
+        self._owner.changed()
+        while True:
+            try:
+                return await self.client.release(f"{self._owner.name} is done")
+            except LinkError as error:
+                log.info("%s: released without an answer: %s", self.client.arc, error)
+            except Refusal as refusal:  # it has another owner by now
+                log.info("%s is not released: %s", self.client.arc, refusal)
+                return None
+            await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
+
+    def absence(self) -> Absence | None:
+        """Return the ARC, if it is wanted and missing."""
+        return self.client.wish.absence() if self.client is not None and self._keeping is not None else None
+
+    def statistics(self) -> dict[str, float]:
+        """Return counts of grants and pictures."""
+        return {
+            "times_resumed": self._times_resumed,
+            "times_suspended": self._times_suspended,
+            "frames_seen": self._frames_seen,
+        }
+
+    def _claim_of(self, need: ArcNeed) -> dict[str, object]:
+        return claim_parameters(
+            self._owner.address,
+            path=[PathNode(name, priority) for name, priority in self._owner.path],
+            minimum_runtime_s=need.minimum_runtime_s,
+            maximum_runtime_s=need.maximum_runtime_s,
+            wish=need.wish,
+            features=need.features,
+            usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
+            stops_at_once=self._commands_nothing,
+            may_say_not_now=type(self._hooks).not_now is not BehaviorHooks.not_now,
+            console=self._owner.is_ordered,
+        )
+
+    @property
+    def _commands_nothing(self) -> bool:
+        """True if it sends no commands, because it overrides neither ``act`` nor ``suspending``."""
+        kind = type(self._hooks)
+        return kind.act is BehaviorHooks.act and kind.suspending is BehaviorHooks.suspending
+
+    def _begin_keeping(self, arc: ArcClient, need: ArcNeed, *, is_there: bool = False) -> None:
+        self._keeping = self._owner.begin_task(self._keep(arc, need, is_there), "arc")
+
+    async def _keep(self, arc: ArcClient, need: ArcNeed, is_there: bool) -> None:
+        self.claimed, self._claim = need, self._claim_of(need)
+        patience_s, changed = START_PATIENCE_S, self._owner.changed
+        try:
+            if self._has_other_times:
+                self._has_other_times = False
+                await self._want_times(arc, need)
+            await arc.keep(
+                self._clock, need.kind, self._claim, patience_s=patience_s, on_changed=changed, is_there=is_there
+            )
+        except Refusal as refusal:
+            self._owner.report(f"no ARC: {refusal}")
+            self._owner.finish(BehaviorStatus.FAILURE, why(refusal))
+
+    async def _want_times(self, arc: ArcClient, need: ArcNeed) -> None:
+        try:
+            await arc.want_runtime(need.minimum_runtime_s, need.maximum_runtime_s)
+        except (Refusal, LinkError) as error:  # it has those of the class before until it is claimed again
+            self._owner.story.note(arc.arc, f"its run times were not changed: {error}")
+
+    # ------------------------------------------------------------------ in charge, or beside the one in charge
+    def go_on_from(self, other: OwnArc) -> None:
+        """Go on with the claim and the counts of another implementation."""
+        self.claimed = self.claimed or other.claimed
+        self._times_resumed, self._times_suspended = other._times_resumed, other._times_suspended
+        self._frames_seen = other._frames_seen
+
+    def compare(self, need: ArcNeed | None, other: OwnArc) -> None:
+        """Note how the ARC of the class in charge is to change when the owner is in charge.
+
+        Raises:
+            WrongClass: It would be another ARC.
+        """
+        had, same = other.claimed, need
+        if had is not None and need is not None:
+            times = need.minimum_runtime_s, need.maximum_runtime_s
+            same = msgspec.structs.replace(had, minimum_runtime_s=times[0], maximum_runtime_s=times[1])
+        if (had is None) != (need is None) or need != same:
+            raise WrongClass(
+                f"{self._owner.name} would need another ARC than now", remedy="Ask for the ARC of the tree."
+            )
+        self.claimed, self._has_other_times = need, need != had
+        self.suspended_because = other.suspended_because
+
+    def take_charge(self) -> None:
+        """Keep the ARC and act from now on."""
+        if self.client is not None and self.claimed is not None and self._keeping is None:
+            self._begin_keeping(self.client, self.claimed, is_there=True)
+        if self.client is not None and self.rcs and not self._owner.status.is_final and not self.acting.is_under_way:
+            self.acting.begin(self.client)
+
+    def stand_by(self) -> None:
+        """Keep and act no more; the ARC stays with its owner's component."""
+        keeping, self._keeping = self._keeping, None
+        cancel(keeping)
+        self.acting.drop()
+
+    # ------------------------------------------------------------------ grants
+    async def arc_resumed(self, notice: Resumed) -> None:
+        """Call the hooks; see ``ArcListener``."""
+        owner = self._owner
+        self.rcs, self.robot, self.suspended_because = notice.rcs, notice.robot, ""
+        self._times_resumed += 1
+        held = ", ".join(f"{kind} {name}" for kind, name in notice.rcs.items())
+        owner.story.note(owner.name, f"resumed with {held}")
+        owner.report(f"holds {held}")
+        owner.suspension_changed()
+        try:
+            await self._hooks.resumed(notice.rcs)
+        except SwappedOut:
+            if self._gate.is_open:
+                raise
+            self.acting.resumes_again = True  # when it is in charge
+        if self.client is not None and self.rcs and not owner.status.is_final and self._gate.is_open:
+            await self.acting.stop()
+            self.acting.begin(self.client)
+
+    async def arc_suspending(self, notice: Suspending) -> None:
+        """Call the hooks; see ``ArcListener``."""
+        await self.acting.stop()
+        await self._hooks.suspending(notice.deadline_s)
+
+    async def arc_suspended(self, notice: Suspended) -> None:
+        """Call the hooks; see ``ArcListener``."""
+        owner = self._owner
+        self.rcs, self.robot = {}, ""
+        self.suspended_because = suspended_because(notice.reason, notice.by)
+        self._times_suspended += 1
+        owner.story.note(owner.name, f"suspended: {self.suspended_because}")
+        owner.report(f"suspended: {self.suspended_because}")
+        owner.suspension_changed()
+        await self.acting.stop()
+        await self._hooks.suspended(notice.reason, notice.by)
+
+    async def rest(self) -> None:
+        """Bring the robot to rest, if the owner commands one, and keep it."""
+        if self.rcs and not self._commands_nothing:
+            try:
+                await self._hooks.suspending(REST_S)
+            except (Refusal, LinkError) as error:  # the grant ended first, or the robot is stopped
+                log.info("%s did not bring its robot to rest: %s", self._owner.name, error)
+
+    def _saw(self, frame: Frame) -> None:
+        if self.rcs and not self._owner.status.is_final:
+            self._frames_seen += 1
+            self._hooks.see(frame)
