@@ -24,11 +24,10 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
 from backbone.component.process import load_class
 from backbone.debug_views import ListViews, LookAt
-from backbone.errors import Refusal
 from backbone.exchange import SwapClass
 from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
-from backbone.naming import Subsystem, address, component_of
+from backbone.naming import component_of
 from backbone.reading_anew import WrongClass
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_exchange import BehaviorExchanges
@@ -47,10 +46,12 @@ from mission_control.messages import (
     BreakOff,
     BrokenOff,
     ChildReport,
+    NotAChild,
+    NotYourOrder,
     ReportNoted,
 )
 from mission_control.own_arc import NO_GRANT_YET, OwnArc
-from mission_control.parent_reports import ParentReports
+from mission_control.own_reports import OwnReports
 from resource_pool.arc_client import ArcClient, ArcNotice
 
 log = logging.getLogger(__name__)
@@ -74,20 +75,6 @@ class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True
     children: list[BehaviorNode] = []
     is_last: bool = False
     keeper: str = ""
-
-
-class NotAChild(Refusal):
-    """The sender of the report is no child of this behavior."""
-
-    code = "behavior.not_a_child"
-    remedy = "Report to the behavior named before you in your path."
-
-
-class NotYourOrder(Refusal):
-    """The sender is not the console that ordered this behavior."""
-
-    code = "behavior.not_your_order"
-    remedy = "Take the robot at a console; behaviors of the mission are stopped by 'scout-backbone stop'."
 
 
 def load_behavior(class_path: str) -> type[Behavior[BehaviorParameters]]:
@@ -138,10 +125,10 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.child_nodes = {node.name: node for node in self.parameters.children}
         """Name of a child → its node of the tree."""
         self._children = ChildrenLoop(self, self.rules(list(self.child_nodes)))
-        self._reported_because = ""
-        self._is_wound_up = self.has_begun = False
+        self.has_begun = False
         self.tree_version, self._left = 0, set[str]()
-        self._parent: ParentReports | KeeperReports | None = None
+        self.own_reports = OwnReports(self)
+        """What it tells its parent, or the console that ordered it."""
 
     # ------------------------------------------------------------------ hooks with a default of their own
     def need(self) -> ArcNeed | None:
@@ -200,9 +187,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if self.status.is_final or not status.is_final or not self.exchanges.may_finish(self, status, payload or {}):
             return
         self.status, self.payload = status, dict(payload or {})
-        if status is BehaviorStatus.FAILURE and self._parent is None and not self._children.absences(has_finished=True):
-            self._children.give_up(self.name, self.payload)
         failed = status is BehaviorStatus.FAILURE
+        if failed and not self.own_reports.has_reader and not self._children.absences(has_finished=True):
+            self._children.give_up(self.name, self.payload)
         self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self.begin_task(self._wind_up(), "wind-up")
 
@@ -210,7 +197,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Send a report of progress to the parent; while the parent cannot be reached, only the newest is kept."""
         if not self.status.is_final:
             self.payload = dict(payload)
-            self._send_report()
+            self.own_reports.send()
 
     @property
     def is_ordered(self) -> bool:
@@ -264,17 +251,14 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
         """Watch the parent: a behavior, or the console of an order; the first step of a path is no behavior."""
-        if self.parameters.keeper:
-            self._parent = KeeperReports(self.bus, self.clock, self.parameters.keeper, self._report)
-        elif len(self.path) > 2:
-            parent = address(Subsystem.MISSION_CONTROL, self.path[-2][0])
-            self._parent = ParentReports(self.bus, self.clock, parent, self._report, self.begin_task)
+        self.own_reports.connect(self.parameters.keeper)
 
     async def serve(self) -> None:
         """Start, claim the ARC, start the children; then react to events."""
-        if isinstance(self._parent, KeeperReports):
-            self.begin_task(self._end_with_keeper(self._parent), "keeper")
-            await self._parent.wait_noted()
+        keeper = self.own_reports.keeper
+        if keeper is not None:
+            self.begin_task(self._end_with_keeper(keeper), "keeper")
+            await keeper.wait_noted()
         await self.start()
         need, other = self.need(), None if self.gate.is_open else self._in_charge.own_arc
         if other is not None:
@@ -282,8 +266,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if need is not None and not self.status.is_final:
             await self.own_arc.begin(need, other)
         self.has_begun = True
-        self._reported_because = self.suspended_because
-        self._send_report()  # it takes the place of an earlier life's
+        self.own_reports.begin()
         self._children.begin()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
@@ -375,13 +358,12 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         A behavior that a console ordered keeps its ARC, so that no lower ARC has the robot before the operator.
         """
         await self.own_arc.acting.stop()
-        if isinstance(self._parent, KeeperReports):
-            await self._keep_for_operator(self._parent)
-            return
-        await asyncio.gather(self.own_arc.release(), self._children.end())
-        if self._parent is not None:
-            self._is_wound_up = True
-            await self._parent.conclude()
+        if self.own_reports.keeper is not None:
+            await self.own_arc.rest()
+            await self._children.end()
+        else:
+            await asyncio.gather(self.own_arc.release(), self._children.end())
+        await self.own_reports.conclude()
 
     async def _end_with_keeper(self, keeper: KeeperReports) -> None:
         """Give the robot back when the console that ordered this is over, then ask the placer to end this behavior."""
@@ -392,27 +374,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         await self.own_arc.release()
         await end_by_placer(self.bus, self.clock, self.name, f"its order is over: {why_over}")
 
-    async def _keep_for_operator(self, keeper: KeeperReports) -> None:
-        """Bring the robot to rest, and keep it until the console has it and ends this behavior."""
-        await self.own_arc.rest()
-        await self._children.end()
-        self._is_wound_up = True
-        keeper.send()
-
     def suspension_changed(self) -> None:
         """Report it, if the reason of its suspension is another one; see ``OwnerOfArc``."""
-        if self.suspended_because != self._reported_because:
-            self._reported_because = self.suspended_because
-            self._send_report()
-
-    def _send_report(self) -> None:
-        if self._parent is not None and not self.status.is_final:
-            self._parent.send()
-
-    def _report(self) -> ChildReport:
-        """Return the newest report; it has the final status only after the ARC and the children are given back."""
-        status = self.status if self._is_wound_up else BehaviorStatus.RUNNING
-        return ChildReport(self.name, status, self.payload, self.suspended_because)
+        self.own_reports.suspension_changed()
 
     def begin_task(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:
         """Run the coroutine as a task, unless the component is ending."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
+from backbone.errors import Refusal
 from backbone.mission.behavior_reports import BehaviorStatus, BreakOff, BrokenOff, ChildReport, ReportNoted
 from backbone.ranges import FEW, MANY, Count, Instant, Mention, PixelCount, PixelPlace, Pixels, Text, Values
 from backbone.wire import Message
@@ -17,6 +18,8 @@ __all__ = [
     "ChildReport",
     "GreyPicture",
     "MotionSeen",
+    "NotAChild",
+    "NotYourOrder",
     "PictureJudged",
     "Region",
     "ReportNoted",
@@ -134,3 +137,17 @@ class WaypointReached(Message, frozen=True):
     robot: Mention
     number: Count
     waypoint: Count
+
+
+class NotAChild(Refusal):
+    """The sender of the report is no child of this behavior."""
+
+    code = "behavior.not_a_child"
+    remedy = "Report to the behavior named before you in your path."
+
+
+class NotYourOrder(Refusal):
+    """The sender is not the console that ordered this behavior."""
+
+    code = "behavior.not_your_order"
+    remedy = "Take the robot at a console; behaviors of the mission are stopped by 'scout-backbone stop'."

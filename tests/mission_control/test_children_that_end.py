@@ -7,9 +7,8 @@ from behaviors_of_a_placer import ARC, Parent, Run, node, root, stop
 from fake_resource_pool import FakePlacer
 
 from backbone.placer.messages import NoHost
-from mission_control.behavior import NotAChild
 from mission_control.children import Decision
-from mission_control.messages import BehaviorStatus, ChildReport, ReportNoted
+from mission_control.messages import BehaviorStatus, ChildReport, NotAChild, ReportNoted
 
 
 def test_a_childs_end_is_told_to_a_parent_that_was_away(placer_world: Run) -> None:

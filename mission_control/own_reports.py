@@ -1,0 +1,100 @@
+"""OwnReports: what a behavior reports to its parent, or to the console that ordered it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine, Sequence
+from typing import Protocol
+
+from backbone.bus.interface import Bus, Clock
+from backbone.mission.behavior_orders import PathStep
+from backbone.naming import Subsystem, address
+from mission_control.keeper_reports import KeeperReports
+from mission_control.messages import BehaviorStatus, ChildReport
+from mission_control.parent_reports import ParentReports
+
+
+class Reporter(Protocol):
+    """The behavior, as its reports need it."""
+
+    bus: Bus
+    clock: Clock
+    status: BehaviorStatus
+    payload: dict[str, object]
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def path(self) -> Sequence[PathStep]:
+        """Names and priorities from the mission's root to it."""
+
+    @property
+    def suspended_because(self) -> str:
+        """Why it is not at work."""
+
+    def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
+        """Run work as a task, unless the behavior is ending."""
+
+
+class OwnReports:
+    """Sends the newest report whenever there is news.
+
+    Args:
+        behavior: On whom it reports.
+
+    Attributes:
+        keeper: The reports to the console that ordered the behavior; None: it is a node of the mission's tree.
+    """
+
+    def __init__(self, behavior: Reporter) -> None:
+        self.keeper: KeeperReports | None = None
+        self._behavior = behavior
+        self._parent: ParentReports | None = None
+        self._told_because = ""
+        self._is_wound_up = False
+
+    def connect(self, keeper: str) -> None:
+        """Watch the console of this address or, if it is empty, the parent; the first step of a path is no behavior."""
+        of = self._behavior
+        if keeper:
+            self.keeper = KeeperReports(of.bus, of.clock, keeper, self._newest)
+        elif len(of.path) > 2:
+            parent = address(Subsystem.MISSION_CONTROL, of.path[-2][0])
+            self._parent = ParentReports(of.bus, of.clock, parent, self._newest, of.begin_task)
+
+    @property
+    def has_reader(self) -> bool:
+        """True: somebody gets the reports."""
+        return self.keeper is not None or self._parent is not None
+
+    def send(self) -> None:
+        """Send a report soon, unless the behavior has finished."""
+        reader = self.keeper or self._parent
+        if reader is not None and not self._behavior.status.is_final:
+            reader.send()
+
+    def begin(self) -> None:
+        """Send the first report; it takes the place of an earlier life's."""
+        self._told_because = self._behavior.suspended_because
+        self.send()
+
+    def suspension_changed(self) -> None:
+        """Send a report if the reason of the suspension is another one."""
+        if self._behavior.suspended_because != self._told_because:
+            self.begin()
+
+    async def conclude(self) -> None:
+        """Send the final status; return when the parent has noted it. A console gets it until it ends the behavior."""
+        self._is_wound_up = True
+        if self.keeper is not None:
+            self.keeper.send()
+        elif self._parent is not None:
+            await self._parent.conclude()
+
+    def _newest(self) -> ChildReport:
+        """Return the newest report; it has the final status only after the ARC and the children are given back."""
+        of = self._behavior
+        status = of.status if self._is_wound_up else BehaviorStatus.RUNNING
+        return ChildReport(of.name, status, of.payload, of.suspended_because)
