@@ -224,9 +224,9 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.exchanges.failed(self, bug)
 
     def go_on_from(self, other: Self) -> None:
-        """Go on where another implementation is: its story, progress, grants and place in the tree."""
-        self.story, self.payload, self.pid = other.story, other.payload, other.pid
-        self.tree_version = other.tree_version
+        """Go on where another implementation is: its exchanges, story, progress, grants and place in the tree."""
+        self.exchanges, self.story, self.payload = other.exchanges, other.story, other.payload
+        self.tree_version, self.pid = other.tree_version, other.pid
         self.own_arc.go_on_from(other.own_arc)
 
     def take_charge(self) -> None:

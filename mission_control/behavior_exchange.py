@@ -15,28 +15,30 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Coroutine, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar, Protocol, Self
 
 import msgspec
 
 from backbone.addresses import PLACER
-from backbone.bus.interface import Bus, Clock
-from backbone.component.component import WrongParameter
-from backbone.component.launch import Launch
 from backbone.component.log_level import LogLevel
 from backbone.errors import LinkError, Refusal
-from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
-from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules, complaint, hand_over
+from backbone.exchange import ExchangeRunning, SwapClass, Swapped
+from backbone.exchange_course import ExchangeCourse, ExchangePhase, ExchangeRules, complaint
 from backbone.launcher.messages import TakeBranch
 from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
 from backbone.reading_anew import ReadAnew, WrongClass
 from backbone.waiting import end_tasks
-from backbone.wire import Accepts, Envelope, Message
-from mission_control.behavior_tree import BehaviorNode
-from mission_control.gated_bus import GatedBus
+from backbone.wire import Envelope, Message
+from mission_control.implementation import (
+    Implementation,
+    Load,
+    check_exchangeable,
+    class_path_of,
+    handed_over,
+    made_beside,
+)
 from mission_control.messages import BehaviorStatus
 from resource_pool.arc_client import AskBeat, Resumed, Suspended
 
@@ -44,64 +46,6 @@ log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 0.05  # chosen: a person sees no delay; seconds of the machine
 REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
-
-
-class Implementation(Protocol):
-    """A behavior, as its exchange needs it."""
-
-    accepts: ClassVar[Accepts | None]
-    parameters_type: ClassVar[type[msgspec.Struct]]
-    launch: Launch
-    gate: GatedBus
-    clock: Clock
-    status: BehaviorStatus
-    exchanges: BehaviorExchanges
-    child_nodes: dict[str, BehaviorNode]
-    has_begun: bool
-
-    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None: ...
-
-    @property
-    def parameters(self) -> msgspec.Struct:
-        """Its parameters."""
-
-    @property
-    def is_ordered(self) -> bool:
-        """True: an operator ordered it."""
-
-    async def run(self) -> None:
-        """Live."""
-
-    def end(self, reason: str) -> None:
-        """End in good order."""
-
-    def fail(self, bug: BaseException) -> None:
-        """End because of a bug."""
-
-    def is_ready(self) -> bool:
-        """Return whether it can take charge."""
-
-    def parameters_changed(self) -> None:
-        """Apply the parameters."""
-
-    def go_on_from(self, other: Self) -> None:
-        """Go on where another implementation is."""
-
-    def take_charge(self) -> None:
-        """Act from now on."""
-
-    def stand_by(self) -> None:
-        """Act no more."""
-
-    def report(self, feedback: str) -> None:
-        """Set the feedback."""
-
-    def publish_event(self, subject: str, what: str, level: LogLevel = ...) -> None:
-        """Publish an event."""
-
-
-Load = Callable[[str], type[Implementation]]
-"""Returns the behavior class at a path, or refuses it."""
 
 
 @dataclass(slots=True)
@@ -247,10 +191,10 @@ class BehaviorExchanges:
 
     async def _swap(self, asked: SwapClass) -> Swapped:
         old = self.present
-        self._check(old)
+        check_exchangeable(old)
         anew = await asyncio.to_thread(ReadAnew, asked.class_path, self._load)  # it acts on while its file is imported
         try:
-            new = self._made(asked, old, anew.kind)
+            new = made_beside(old, asked, anew.kind)
         except Refusal:
             anew.undo()
             raise
@@ -263,50 +207,6 @@ class BehaviorExchanges:
         await self._until_over(going)
         remark = await (self._proved(going) if course.phase is ExchangePhase.PROVED else self._returned(going, anew))
         return course.answer(old.clock.now_s(), remark)
-
-    def _check(self, old: Implementation) -> None:
-        name = old.launch.name
-        if old.status.is_final:
-            raise NotExchanged(f"{name} has finished", remedy="Start it again, with the new class in its mission file.")
-        if old.child_nodes:
-            raise NotExchanged(
-                f"{name} has children, which a new class would begin anew",
-                remedy=f"Exchange a behavior without children, or see 'scout-backbone tree replace {name}'.",
-            )
-        if old.is_ordered:
-            raise NotExchanged(f"{name} is an operator's order", remedy="Let the operator give the order anew.")
-        if not old.has_begun:
-            raise NotExchanged(f"{name} is still starting", remedy="Swap again in a moment.")
-
-    def _made(self, asked: SwapClass, old: Implementation, kind: type[Implementation]) -> Implementation:
-        """Return the new implementation, which does not live yet.
-
-        Raises:
-            WrongClass: It cannot be made, or answers other questions.
-            WrongParameter: It has no such parameters.
-        """
-        if kind.accepts != old.accepts:
-            raise WrongClass(
-                f"{asked.class_path} answers other questions than {class_path_of(old)}",
-                remedy="Accept the same messages, or change the mission file.",
-            )
-        has = {one.encode_name for one in msgspec.structs.fields(kind.parameters_type)}
-        kept = {name: value for name, value in msgspec.to_builtins(old.parameters).items() if name in has}
-        launch = msgspec.structs.replace(
-            old.launch, class_path=asked.class_path, parameters={**kept, **asked.parameters}
-        )
-        gate = GatedBus(old.gate.bus, is_first=False)
-        try:
-            new = kind(launch, gate, old.clock)
-        except WrongParameter as wrong:
-            raise WrongParameter(
-                f"{asked.class_path} refuses its parameters: {wrong.detail}", remedy="Give them with --set NAME=VALUE."
-            ) from None
-        except UNPROVED as error:
-            raise WrongClass(f"{asked.class_path} cannot be made: {complaint(error)}") from error
-        new.exchanges = self
-        new.go_on_from(old)
-        return new
 
     async def _until_over(self, going: _Exchange) -> None:
         course, clock = going.course, going.old.clock
@@ -327,7 +227,7 @@ class BehaviorExchanges:
         if course.is_over:
             return
         now_s = old.clock.now_s()
-        course.keeps_state = bool(course.tried(now_s, partial(_handed_over, old, new)))
+        course.keeps_state = bool(course.tried(now_s, partial(handed_over, old, new)))
         course.switch(now_s)
 
     def _changed(self) -> None:
@@ -377,21 +277,6 @@ class BehaviorExchanges:
     def _tell(self, what: str, level: LogLevel = LogLevel.NOTICE) -> None:
         self.present.publish_event(self.present.launch.name, what, level)
         self.present.report(what)
-
-
-def _handed_over(old: Implementation, new: Implementation) -> bool:
-    """Let the new one go on where the old one is; its own parameters, if they are others, count."""
-    new.go_on_from(old)
-    is_kept = hand_over(old, new)
-    given, had = msgspec.to_builtins(new.parameters), msgspec.to_builtins(old.parameters)
-    if any(had.get(name, value) != value for name, value in given.items()):
-        new.parameters_changed()
-    return is_kept
-
-
-def class_path_of(one: object) -> str:
-    """Return where the class of an implementation stands."""
-    return f"{type(one).__module__}:{type(one).__qualname__}"
 
 
 async def _survived(life: Coroutine[object, None, None]) -> None:

@@ -1,0 +1,143 @@
+"""Implementations of a behavior: which may be exchanged, how another one is made beside it, and goes on with its state.
+
+Rule of this file: nothing waits or begins here; ``behavior_exchange`` carries out the exchange.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar, Protocol, Self
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import WrongParameter
+from backbone.component.launch import Launch
+from backbone.component.log_level import LogLevel
+from backbone.exchange import NotExchanged, SwapClass
+from backbone.exchange_course import UNPROVED, complaint, hand_over
+from backbone.reading_anew import WrongClass
+from backbone.wire import Accepts
+from mission_control.behavior_tree import BehaviorNode
+from mission_control.gated_bus import GatedBus
+from mission_control.messages import BehaviorStatus
+
+
+class Implementation(Protocol):
+    """A behavior, as its exchange needs it."""
+
+    accepts: ClassVar[Accepts | None]
+    parameters_type: ClassVar[type[msgspec.Struct]]
+    launch: Launch
+    gate: GatedBus
+    clock: Clock
+    status: BehaviorStatus
+    child_nodes: dict[str, BehaviorNode]
+    has_begun: bool
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None: ...
+
+    @property
+    def parameters(self) -> msgspec.Struct:
+        """Its parameters."""
+
+    @property
+    def is_ordered(self) -> bool:
+        """True: an operator ordered it."""
+
+    async def run(self) -> None:
+        """Live."""
+
+    def end(self, reason: str) -> None:
+        """End in good order."""
+
+    def fail(self, bug: BaseException) -> None:
+        """End because of a bug."""
+
+    def is_ready(self) -> bool:
+        """Return whether it can take charge."""
+
+    def parameters_changed(self) -> None:
+        """Apply the parameters."""
+
+    def go_on_from(self, other: Self) -> None:
+        """Go on where another implementation of the component is, and in its exchanges."""
+
+    def take_charge(self) -> None:
+        """Act from now on."""
+
+    def stand_by(self) -> None:
+        """Act no more."""
+
+    def report(self, feedback: str) -> None:
+        """Set the feedback."""
+
+    def publish_event(self, subject: str, what: str, level: LogLevel = ...) -> None:
+        """Publish an event."""
+
+
+Load = Callable[[str], type[Implementation]]
+"""Returns the behavior class at a path, or refuses it."""
+
+
+def check_exchangeable(old: Implementation) -> None:
+    """Refuse an exchange that would lose what the running behavior has.
+
+    Raises:
+        NotExchanged: It has finished, has children, is an operator's order, or is still starting.
+    """
+    name = old.launch.name
+    if old.status.is_final:
+        raise NotExchanged(f"{name} has finished", remedy="Start it again, with the new class in its mission file.")
+    if old.child_nodes:
+        raise NotExchanged(
+            f"{name} has children, which a new class would begin anew",
+            remedy=f"Exchange a behavior without children, or see 'scout-backbone tree replace {name}'.",
+        )
+    if old.is_ordered:
+        raise NotExchanged(f"{name} is an operator's order", remedy="Let the operator give the order anew.")
+    if not old.has_begun:
+        raise NotExchanged(f"{name} is still starting", remedy="Swap again in a moment.")
+
+
+def made_beside(old: Implementation, asked: SwapClass, kind: type[Implementation]) -> Implementation:
+    """Return the new implementation, which does not live yet.
+
+    Raises:
+        WrongClass: It cannot be made, or answers other questions.
+        WrongParameter: It has no such parameters.
+    """
+    if kind.accepts != old.accepts:
+        raise WrongClass(
+            f"{asked.class_path} answers other questions than {class_path_of(old)}",
+            remedy="Accept the same messages, or change the mission file.",
+        )
+    has = {one.encode_name for one in msgspec.structs.fields(kind.parameters_type)}
+    kept = {name: value for name, value in msgspec.to_builtins(old.parameters).items() if name in has}
+    launch = msgspec.structs.replace(old.launch, class_path=asked.class_path, parameters={**kept, **asked.parameters})
+    gate = GatedBus(old.gate.bus, is_first=False)
+    try:
+        new = kind(launch, gate, old.clock)
+    except WrongParameter as wrong:
+        raise WrongParameter(
+            f"{asked.class_path} refuses its parameters: {wrong.detail}", remedy="Give them with --set NAME=VALUE."
+        ) from None
+    except UNPROVED as error:
+        raise WrongClass(f"{asked.class_path} cannot be made: {complaint(error)}") from error
+    new.go_on_from(old)
+    return new
+
+
+def handed_over(old: Implementation, new: Implementation) -> bool:
+    """Let the new one go on where the old one is; its own parameters, if they are others, count."""
+    new.go_on_from(old)
+    is_kept = hand_over(old, new)
+    given, had = msgspec.to_builtins(new.parameters), msgspec.to_builtins(old.parameters)
+    if any(had.get(name, value) != value for name, value in given.items()):
+        new.parameters_changed()
+    return is_kept
+
+
+def class_path_of(one: object) -> str:
+    """Return where the class of an implementation stands."""
+    return f"{type(one).__module__}:{type(one).__qualname__}"
