@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import math
 import os
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
 from typing import Any, assert_never
 
 import msgspec
@@ -22,6 +20,7 @@ from backbone.component.heartbeat import forget_heartbeat, read_vitals
 from backbone.component.launch import Launch
 from backbone.component.membership import PROCESSES, read_process_address
 from backbone.component.messages import Absence, Stop, Stopping
+from backbone.creator.alarm import Alarm
 from backbone.creator.decisions import (
     AskToStop,
     ForkComponent,
@@ -35,7 +34,8 @@ from backbone.creator.decisions import (
     SendSignal,
     SupervisionWakesAt,
 )
-from backbone.creator.failed_starts import log_of, start_failed
+from backbone.creator.failed_starts import log_of
+from backbone.creator.kept_components import Kept, KeptComponents, Report, as_spawn
 from backbone.creator.messages import (
     READY_WITHIN_S,
     EndProcess,
@@ -54,7 +54,6 @@ from backbone.creator.supervision import Phase, Supervision
 from backbone.creator.zygote import Forks, NoProcess
 from backbone.errors import BackboneError
 from backbone.naming import IllegalName, component_of
-from backbone.waiting import settle
 
 log = logging.getLogger(__name__)
 
@@ -96,16 +95,12 @@ class ProcessKeeper:
             report=self._carry_out,
             task=self._task,
         )
-        self._kept: dict[str, _Kept] = {}
-        self._failures: dict[str, StartFailed] = {}
-        self._starting: dict[str, list[asyncio.Future[int]]] = {}
-        self._ending: dict[str, list[asyncio.Future[ProcessEnded]]] = {}
+        self._kept = KeptComponents()
         self._tasks: set[asyncio.Task[None]] = set()
         self._signs = SignsOfLife(read_vitals)
         self._zygote_trouble, self._zygote_trouble_since_s = "", 0.0
         self._looking: asyncio.Task[None] | None = None
-        self._alarm: asyncio.Task[None] | None = None
-        self._alarm_s = math.inf
+        self._alarm = Alarm(self._clock, self._task, self._woken, "supervision's alarm")
         self._is_closing = False
         self._lives, self._pid = 0, pid or os.getpid()
         zygote.on_exit = self._exited
@@ -132,8 +127,8 @@ class ProcessKeeper:
             StartFailed: It did not become ready, and its whole process tree has ended.
             AlreadyHere: A component of this name runs, starts or ends here.
         """
-        self._begin(launch, order or _as_spawn(launch, policy, ready_within_s), is_hub=False)
-        return await self._readiness(launch.name)
+        self._begin(launch, order or as_spawn(launch, policy, ready_within_s), is_hub=False)
+        return await self._kept.wait_ready(launch.name)
 
     async def start_hub(self, launch: Launch, policy: RestartPolicy) -> int:
         """Start the process of the hub and return its pid; its readiness can be seen only after ``use``.
@@ -143,7 +138,7 @@ class ProcessKeeper:
             AlreadyHere: A component of this name runs, starts or ends here.
         """
         forked: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-        self._begin(launch, _as_spawn(launch, policy, READY_WITHIN_S), is_hub=True, forked=forked)
+        self._begin(launch, as_spawn(launch, policy, READY_WITHIN_S), is_hub=True, forked=forked)
         return await forked
 
     async def wait_ready(self, name: str, within_s: float) -> int:
@@ -155,16 +150,16 @@ class ProcessKeeper:
         """
         one = self._supervision.find(name)
         if one is None:
-            raise self._failures.get(name) or NotHere(f"no {name} here", name=name)
+            raise self._kept.failure(name) or NotHere(f"no {name} here", name=name)
         if one.end is not None:
-            raise self._failed(name, f"is {one.phase}; {one.last_end}")
+            raise self._kept.failed(name, f"is {one.phase}; {one.last_end}")
         if one.phase is Phase.READY:
             return one.pid
         try:
             async with asyncio.timeout(within_s):
-                return await self._readiness(name)
+                return await self._kept.wait_ready(name)
         except TimeoutError:
-            raise self._failed(name, f"was not ready within {within_s:g} s") from None
+            raise self._kept.failed(name, f"was not ready within {within_s:g} s") from None
 
     def revise(self, name: str, parameters: dict[str, Any], class_path: str = "") -> None:
         """Start the component with these parameters from its next start on; its running process stays as it is.
@@ -175,12 +170,7 @@ class ProcessKeeper:
         Raises:
             NotHere: No component of this name is here.
         """
-        kept = self._kept.get(name)
-        if kept is None:
-            raise NotHere(f"no {name} here", name=name)
-        class_path = class_path or kept.order.class_path
-        kept.launch = msgspec.structs.replace(kept.launch, parameters=parameters, class_path=class_path)
-        kept.order = msgspec.structs.replace(kept.order, parameters=parameters, class_path=class_path)
+        self._kept.revise(name, parameters, class_path)
 
     # End
     async def end(
@@ -198,8 +188,7 @@ class ProcessKeeper:
         """
         instructions = self._supervision.end_ordered(name, ask_s, term_s, self._now_s())
         self._kept[name].end_reason = reason
-        ended: asyncio.Future[ProcessEnded] = asyncio.get_running_loop().create_future()
-        self._ending.setdefault(name, []).append(ended)
+        ended = self._kept.ended(name)
         self._carry_out(instructions)
         return await ended
 
@@ -259,30 +248,17 @@ class ProcessKeeper:
         return absent
 
     # Events
-    def _begin(
-        self,
-        launch: Launch,
-        order: Spawn,
-        *,
-        is_hub: bool,
-        forked: asyncio.Future[int] | None = None,
-    ) -> None:
+    def _begin(self, launch: Launch, order: Spawn, *, is_hub: bool, forked: asyncio.Future[int] | None = None) -> None:
         name = launch.name
         if self._is_closing:
             raise StartFailed(f"{name}: everything here is being ended", name=name)
         instructions = self._supervision.start_ordered(
             name, order.policy, order.ready_within_s, self._now_s(), asked_by_signal=is_hub
         )
-        self._kept[name] = _Kept(launch, order)
+        self._kept.begin(launch, order)
         if self._looking is None and launch.run_directory:
             self._looking = self._task(self._look_for_life(launch.run_directory), "look for signs of life")
-        self._failures.pop(name, None)
         self._carry_out(instructions, forked)
-
-    async def _readiness(self, name: str) -> int:
-        ready: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-        self._starting.setdefault(name, []).append(ready)
-        return await ready
 
     def _token_changed(self, address: str, stands: bool) -> None:
         name = component_of(address)
@@ -333,13 +309,13 @@ class ProcessKeeper:
         except NoProcess as error:
             self._carry_out(self._supervision.fork_failed(name, str(error), self._now_s()))
             if forked is not None and not forked.done():
-                forked.set_exception(self._failures[name])
+                forked.set_exception(self._kept.failure(name) or self._kept.failed(name, str(error)))
             return
         if forked is not None and not forked.done():
             forked.set_result(pid)
         self._carry_out(self._supervision.forked(name, pid, self._now_s()))
 
-    async def _ask_to_stop(self, kept: _Kept, within_s: float) -> None:
+    async def _ask_to_stop(self, kept: Kept, within_s: float) -> None:
         try:
             if self._bus is None:
                 raise NoProcess("there is no bus to ask on")
@@ -349,8 +325,7 @@ class ProcessKeeper:
             log.info("%s could not be asked to stop: %s", kept.launch.name, error)
             self._carry_out(self._supervision.ask_failed(kept.launch.name, self._now_s()))
 
-    async def _ring(self, at_s: float) -> None:
-        await self._clock.sleep_until_s(at_s * self._clock.rate)
+    def _woken(self) -> None:
         self._carry_out(self._supervision.woken(self._now_s()))
 
     # Instructions
@@ -366,34 +341,27 @@ class ProcessKeeper:
                 case SendSignal(name=name, pid=pid, number=number):
                     log.info("%s to %s, pid %d", number.name, name, pid)
                     self._zygote.kill(pid, number)
-                case ReportReady(name=name, pid=pid):
-                    _settle(self._starting.pop(name, []), pid)
-                case ReportStartFailed(name=name, how=how):
-                    failure, waiting = self._failed(name, how), self._starting.pop(name, [])
-                    if not waiting:  # a hub's failure: raised at the next ``wait_ready``
-                        self._failures[name] = failure
-                    _settle(waiting, failure)
-                case ReportEnded(name=name, by=by, exit_code=exit_code):
-                    _settle(self._starting.pop(name, []), self._failed(name, "was ended"))
-                    _settle(self._ending.pop(name, []), ProcessEnded(name, by, exit_code))
-                case ReportLeft(name=name):
-                    log.info("%s ended by itself in good order", name)
-                    _settle(self._starting.pop(name, []), self._failed(name, "ended by itself"))
-                case ReportFell(name=name, how=how, restart_in_s=restart_in_s, failing=failing):
-                    if restart_in_s < 0:
-                        _settle(self._starting.pop(name, []), self._failed(name, how))
-                    self.on_fell(ProcessFell(name, how, restart_in_s, log_of(self._launch_of(name)), failing))
+                case ReportReady() | ReportStartFailed() | ReportEnded() | ReportLeft() | ReportFell():
+                    self._kept.settle(instruction)
+                    self._tell(instruction)
                 case ReportSilent(name=name, silent_s=silent_s):
                     self.on_silent(name, silent_s)
                 case SupervisionWakesAt(at_s=at_s):
-                    self._set_alarm(at_s)
+                    self._alarm.set(at_s)
                 case _:
                     assert_never(instruction)
         if any(not isinstance(each, SupervisionWakesAt | AskToStop | SendSignal) for each in instructions):
-            self._kept = {one.name: self._kept[one.name] for one in self._supervision}
+            self._kept.retain([one.name for one in self._supervision])
             self.on_changed()
 
-    def _begin_life(self, kept: _Kept, forked: asyncio.Future[int] | None) -> None:
+    def _tell(self, report: Report) -> None:
+        match report:
+            case ReportLeft(name=name):
+                log.info("%s ended by itself in good order", name)
+            case ReportFell(name=name, how=how, restart_in_s=restart_in_s, failing=failing):
+                self.on_fell(ProcessFell(name, how, restart_in_s, log_of(self._kept.launch_of(name)), failing))
+
+    def _begin_life(self, kept: Kept, forked: asyncio.Future[int] | None) -> None:
         self._lives += 1
         launch = kept.launch
         incarnation = f"{launch.host}.{self._pid}.{self._lives}"
@@ -402,14 +370,6 @@ class ProcessKeeper:
             self._shared.wanted(launch)
         else:
             self._task(self._fork(launch, forked), f"fork {launch.name}")
-
-    def _set_alarm(self, at_s: float) -> None:
-        if self._alarm is not None and self._alarm is not asyncio.current_task():
-            if self._alarm_s == at_s and not self._alarm.done():
-                return
-            self._alarm.cancel()
-        self._alarm_s = at_s
-        self._alarm = self._task(self._ring(at_s), "supervision's alarm")
 
     def _task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         task = asyncio.create_task(work, name=name)
@@ -422,43 +382,8 @@ class ProcessKeeper:
         if not task.cancelled() and (bug := task.exception()) is not None:
             self.on_bug(bug)
 
-    def _failed(self, name: str, how: str) -> StartFailed:
-        return start_failed(name, how, self._launch_of(name))
-
-    def _launch_of(self, name: str) -> Launch | None:
-        kept = self._kept.get(name)
-        return kept.launch if kept is not None else None
-
     def _now_s(self) -> float:
         return self._clock.now_s() / self._clock.rate
-
-
-@dataclass
-class _Kept:
-    """The keeper's record of a supervised component."""
-
-    launch: Launch
-    order: Spawn
-    end_reason: str = ""
-
-
-def _as_spawn(launch: Launch, policy: RestartPolicy, ready_within_s: float) -> Spawn:
-    return Spawn(
-        launch.subsystem,
-        launch.name,
-        launch.type,
-        launch.class_path,
-        launch.parameters,
-        launch.requester,
-        policy,
-        ready_within_s,
-        process=launch.process,
-    )
-
-
-def _settle(waiting: list[asyncio.Future[Any]], outcome: object) -> None:
-    for future in waiting:
-        settle(future, outcome)
 
 
 def _ignore(_fell: ProcessFell) -> None:

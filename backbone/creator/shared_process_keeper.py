@@ -23,6 +23,7 @@ from backbone.component.membership import (
     MemberEnding,
     process_address,
 )
+from backbone.creator.alarm import Alarm
 from backbone.creator.decisions import Instruction
 from backbone.creator.shared_processes import (
     AdmitMember,
@@ -74,7 +75,7 @@ class SharedProcessKeeper:
         self._launch_of, self._report, self._task = launch_of, report, task
         self._shared = SharedProcesses()
         self._bus: Bus | None = None
-        self._alarm: asyncio.Task[None] | None = None
+        self._alarm = Alarm(clock, task, self._woken, "shared processes' alarm")
         self._talks: dict[int, set[asyncio.Task[None]]] = {}
 
     def use(self, bus: Bus) -> None:
@@ -133,9 +134,7 @@ class SharedProcessKeeper:
                 case MemberGone(name=name, returncode=returncode, how=how):
                     self._report(self._supervision.left(name, returncode, how, self._now_s()))
                 case ProcessesWakeAt(at_s=at_s):
-                    if self._alarm is not None and self._alarm is not asyncio.current_task():
-                        self._alarm.cancel()
-                    self._alarm = self._task(self._ring(at_s), "shared processes' alarm")
+                    self._alarm.set(at_s)
                 case _:
                     assert_never(instruction)
 
@@ -177,8 +176,7 @@ class SharedProcessKeeper:
         except BackboneError as error:  # supervision's next step is to kill the process
             log.info("%s did not accept the order to end a member: %s", at, error)
 
-    async def _ring(self, at_s: float) -> None:
-        await self._clock.sleep_until_s(at_s * self._clock.rate)
+    def _woken(self) -> None:
         self._carry_out(self._shared.woken(self._now_s()))
 
     def _required_bus(self) -> Bus:
