@@ -89,6 +89,10 @@ class HoldTable:
         """Return whether the ARC holds the RC under this epoch."""
         return self.find(arc, epoch) is not None
 
+    def has_lost(self, arc: str, epoch: int) -> bool:
+        """Return whether this is a hold of the RC that has ended."""
+        return epoch <= self.last_epoch and not self.has(arc, epoch)
+
     def disconnect(self, arc: str, epoch: int) -> Hold | None:
         """End the ARC's hold if its epoch is this one or older; return the ended hold."""
         self.last_epoch = max(self.last_epoch, epoch)

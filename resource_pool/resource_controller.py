@@ -13,7 +13,7 @@ import asyncio
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -22,7 +22,6 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.abilities import Abilities, CameraForm, command_form, field_forms
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
 from backbone.exchange import SwapClass
 from backbone.keys import Conversation
@@ -40,7 +39,7 @@ from backbone.rc_manager.messages import (
     StaleEpoch,
     most_epoch,
 )
-from backbone.scheduling.requests import Holder, Lease
+from backbone.scheduling.requests import Holder
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of
 from resource_pool.commands import OF_THE_BASE, Command
 from resource_pool.driver_exchange import DriverExchanges
@@ -48,38 +47,18 @@ from resource_pool.driver_slot import slot_for
 from resource_pool.drivers.interface import (
     AdjustableDriver,
     DriverSite,
-    HardwareFault,
     NoOptions,
     build_driver,
     options_of_drivers,
 )
+from resource_pool.hold_ends import SAFE_WITHIN_S, HoldEnds
 from resource_pool.holds import Hold, HoldTable
 from resource_pool.messages import Applied, ImpossibleUse, NeedsRestart, NotFromYou
+from resource_pool.rc_parameters import RcParameters, sort_out_options
+
+__all__ = ["RcParameters", "ResourceController"]
 
 log = logging.getLogger(__name__)
-
-SAFE_WITHIN_S = 0.4  # chosen: below the RC manager's limit, so that the reason reaches it; machine seconds
-
-
-class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Parameters of every RC; derive and add the parameters of the kind.
-
-    Attributes:
-        driver: Name of the driver, or ``package.module:Class``.
-        sharable: True if several ARCs may hold it.
-        capacity: Share of its time that it can give, 0 to 1.
-        links: Resources with which it can be combined: kind → names.
-        world: Simulated world that plays the hardware; only for simulated drivers.
-        options: Options of the driver: all parameters of the mission file that are not the RC's own. The driver's
-            ``options_type`` checks them.
-    """
-
-    driver: str = "simulated"
-    sharable: bool = False
-    capacity: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1.0
-    links: dict[str, list[str]] = {}
-    world: str = "world"
-    options: dict[str, Any] = {}
 
 
 R = TypeVar("R", bound=RcParameters)
@@ -119,13 +98,13 @@ class ResourceController(Component[R], Generic[R]):
             cls.accepts = Connect | Disconnect | AskRc | SwapClass | cls.commands
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
-        super().__init__(_sort_out_options(launch, self.parameters_type) if self.driver_kind else launch, bus, clock)
+        super().__init__(sort_out_options(launch, self.parameters_type) if self.driver_kind else launch, bus, clock)
         self._born_s = clock.now_s()
         self._first_epoch = int(self._born_s * EPOCHS_PER_S)
         self.holds = HoldTable(self.name, sharable=self.parameters.sharable, last_epoch=self._first_epoch)
         self.applied = self.refused_stale = self.refused_strangers = 0
-        self._connects = self._lease_ends = self._faults = 0
-        self._unsafe: dict[str, Hold] = {}
+        self._connects = self._lease_ends = 0
+        self._ends = HoldEnds(self)
         self._in_force = self.parameters
         self._drivers: list[Any] = []
         self._exchanges = DriverExchanges(self)
@@ -276,13 +255,13 @@ class ResourceController(Component[R], Generic[R]):
                 self._lease_ends += len(over)
                 for hold in over:
                     log.warning("the lease of %s has expired", hold.arc)
-                await self._end_holds(over, "its lease is over")
+                await self._ends.end_all(over, "its lease is over")
 
     async def drain(self) -> None:
         """End all holds, in the safe state if the hardware obeys."""
         async with self._changing:
             ended = [self.holds.disconnect(hold.arc, hold.epoch) for hold in self.holds.holds()]
-            await self._end_holds([hold for hold in ended if hold is not None], "the RC ends")
+            await self._ends.end_all([hold for hold in ended if hold is not None], "the RC ends")
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the RC manager, and carry out commands."""
@@ -295,9 +274,9 @@ class ResourceController(Component[R], Generic[R]):
                 return await self._connect(order, asked.stamp_s)
             case Disconnect(arc=arc, epoch=epoch, reason=reason):
                 async with self._changing:
-                    hold = self.holds.disconnect(arc, epoch) or self._unsafe.get(arc)
+                    hold = self.holds.disconnect(arc, epoch) or self._ends.unsafe(arc)
                     if hold is not None:
-                        await self._end_hold(hold, reason)
+                        await self._ends.end(hold, reason)
                 if epoch <= self._first_epoch:  # a grant to an earlier process, whose hardware may not be safe yet
                     await self.clock.sleep_until_s(self._born_s + self.outlasts_s)
                 return Disconnected(self.holds.last_epoch)
@@ -351,7 +330,7 @@ class ResourceController(Component[R], Generic[R]):
             "refused_strangers": self.refused_strangers,
             "connects": self._connects,
             "lease_ends": self._lease_ends,
-            "safety_faults": self._faults,
+            "safety_faults": self._ends.faults,
         }
 
     def _check_sender(self, asked: Envelope[Message]) -> None:
@@ -382,9 +361,8 @@ class ResourceController(Component[R], Generic[R]):
             former = self.holds.check(hold)
             if former is not None:
                 self.holds.disconnect(former.arc, former.epoch)
-                await self._end_hold(former, f"connected anew under epoch {order.epoch}")
-            for unsafe in list(self._unsafe.values()):
-                await self._end_hold(unsafe, "made up for")
+                await self._ends.end(former, f"connected anew under epoch {order.epoch}")
+            await self._ends.make_up()
             self.holds.connect(hold)
             try:
                 await self.connected(hold)
@@ -394,70 +372,15 @@ class ResourceController(Component[R], Generic[R]):
             self._connects += 1
             self._lease_changed.set()
             self.story.note(order.arc, f"connected under epoch {order.epoch}")
-            self._report_holders()
+            self._ends.report_holders()
         return Connected(order.epoch)
-
-    async def _end_hold(self, hold: Hold, reason: str) -> None:
-        """Bring the resource of the ended hold into its safe state.
-
-        Raises:
-            HardwareFault: It is not safe; the RC tries again before the next connection.
-        """
-        self._unsafe[hold.arc] = hold
-        try:
-            async with asyncio.timeout(SAFE_WITHIN_S):
-                await self.make_safe(hold)
-        except (HardwareFault, TimeoutError) as error:
-            detail = error.detail if isinstance(error, HardwareFault) else f"nothing within {SAFE_WITHIN_S} s"
-            self._faults += 1
-            unsafe = f"disconnected ({reason}), but {self.name} is not safe: {detail}"
-            self.publish_event(hold.arc, unsafe, LogLevel.ALARM)
-            self._report_holders()
-            raise HardwareFault(f"{self.name} is not safe after {hold.arc}: {detail}", arc=hold.arc) from error
-        del self._unsafe[hold.arc]
-        self.story.note(hold.arc, f"disconnected: {reason}")
-        self._report_holders()
-
-    async def _end_holds(self, ended: list[Hold], reason: str) -> None:
-        """End these holds; a fault of the hardware at one of them stops neither the others nor the caller."""
-        for hold in ended:
-            try:
-                await self._end_hold(hold, reason)
-            except HardwareFault as fault:
-                log.warning("%s", fault)
-
-    def _report_holders(self) -> None:
-        holders = ", ".join(hold.arc for hold in self.holds.holds())
-        unsafe = f", not safe after {', '.join(self._unsafe)}" if self._unsafe else ""
-        self.report(f"held by {holders}{unsafe}" if holders else f"free{unsafe}")
-        self.changed()  # the holder may be the same with a new epoch
 
     def _heard_leases(self, envelope: Envelope[Leases]) -> None:
         leases = envelope.body
         until_s = min(envelope.stamp_s, self.clock.now_s()) + leases.lease_s
-        for lease in leases.leases:
-            if lease.rc == self.name:
-                self.holds.renew(lease.arc, lease.epoch, until_s, lease.rank)
-                self.ranked(lease.arc, lease.epoch)
-        if self.name in leases.missing or any(self._has_lost(lease) for lease in leases.leases):
+        mine = [lease for lease in leases.leases if lease.rc == self.name]
+        for lease in mine:
+            self.holds.renew(lease.arc, lease.epoch, until_s, lease.rank)
+            self.ranked(lease.arc, lease.epoch)
+        if self.name in leases.missing or any(self.holds.has_lost(lease.arc, lease.epoch) for lease in mine):
             self.changed()  # the published state corrects the RC manager
-
-    def _has_lost(self, lease: Lease) -> bool:
-        """Return whether this is a hold of this RC that has ended."""
-        return (
-            lease.rc == self.name
-            and lease.epoch <= self.holds.last_epoch
-            and not self.holds.has(lease.arc, lease.epoch)
-        )
-
-
-def _sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:
-    """Return the launch with all parameters that are not the RC's own moved into the driver's options."""
-    own = {field.encode_name for field in msgspec.structs.fields(parameters_type)}
-    given = launch.parameters
-    options = {name: value for name, value in given.items() if name not in own}
-    if not options:
-        return launch
-    rest = {name: value for name, value in given.items() if name in own}
-    rest["options"] = {**rest.get("options", {}), **options}
-    return msgspec.structs.replace(launch, parameters=rest)

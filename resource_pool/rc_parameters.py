@@ -1,0 +1,42 @@
+"""Parameters of every RC, and the options of its driver among them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+
+from backbone.component.launch import Launch
+
+
+class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Parameters of every RC; derive and add the parameters of the kind.
+
+    Attributes:
+        driver: Name of the driver, or ``package.module:Class``.
+        sharable: True if several ARCs may hold it.
+        capacity: Share of its time that it can give, 0 to 1.
+        links: Resources with which it can be combined: kind → names.
+        world: Simulated world that plays the hardware; only for simulated drivers.
+        options: Options of the driver: all parameters of the mission file that are not the RC's own. The driver's
+            ``options_type`` checks them.
+    """
+
+    driver: str = "simulated"
+    sharable: bool = False
+    capacity: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1.0
+    links: dict[str, list[str]] = {}
+    world: str = "world"
+    options: dict[str, Any] = {}
+
+
+def sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:
+    """Return the launch with all parameters that are not the RC's own moved into the driver's options."""
+    own = {field.encode_name for field in msgspec.structs.fields(parameters_type)}
+    given = launch.parameters
+    options = {name: value for name, value in given.items() if name not in own}
+    if not options:
+        return launch
+    rest = {name: value for name, value in given.items() if name in own}
+    rest["options"] = {**rest.get("options", {}), **options}
+    return msgspec.structs.replace(launch, parameters=rest)
