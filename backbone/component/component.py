@@ -109,6 +109,9 @@ class Component(Generic[P_co]):
     """True for the RC of a robot, which operators can stop."""
     shares_process: ClassVar[bool] = True
     """False for a class that computes for long; where the mission file names no process, it then has one of its own."""
+    alike_most: ClassVar[int] = 0
+    """Most components of this class that share a process with each other, where a host has more of them and the mission
+    says nothing of processes; 1: each has its own; 0: the placer's default, or 1 if ``shares_process`` is False."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
 
