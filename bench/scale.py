@@ -5,9 +5,9 @@ Prints one JSON line for each size:
 * how long it took until all was ready, and how long ``status`` takes and whether it lists every component;
 * processor time by kind of process, memory as far as it is a process's own or its part of what several share (PSS),
   threads;
-* context switches as the RC manager measured them, and take-overs by an operator, from asking to the first command
-  that the robot's RC applied;
-* pictures a second of each grabber while it is held, of those asked for.
+* context switches by the RC manager's trace, from revocation to grant, settling not counted: those while nobody starts;
+* take-overs by an operator, from asking to the first command that the robot's RC applied;
+* pictures a second of each grabber, and how many it allows at the end: where the processors are full, they fall first.
 
 The floor is one question to the RC manager through the same hub, asked meanwhile. Where the machine has other work,
 read counts and processor time only. A size that needs more memory than the machine has free is not begun.
@@ -28,12 +28,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import psutil
 from idle import name_of, processor_s
 from measuring import BIN, percentile, report
-from scale_mission import NAME, SHARING, components, mission_file
+from scale_mission import NAME, SETTLE_S, SHARING, components, mission_file
 
 from backbone import run_files
 from backbone.addresses import RC_MANAGER
@@ -103,13 +103,24 @@ def mission_up(file: Path, options: Sequence[str]) -> Iterator[Up]:
                 launcher.communicate()
 
 
-def status() -> tuple[float, dict[str, Any]]:
+class Took(NamedTuple):
+    """How long a command took, and its processor time."""
+
+    wall_s: float
+    processor_s: float
+
+
+def status() -> tuple[Took, dict[str, Any]]:
     """Run ``status``; return how long it took and what it printed."""
-    began_s = time.monotonic()
+    began_s, before = time.monotonic(), os.times()
     command = [str(BIN / "scout-backbone"), "status", "--json", "--mission", NAME]
     done = subprocess.run(command, capture_output=True, text=True, timeout=STATUS_WITHIN_S, check=False)
-    took_s = time.monotonic() - began_s
-    return took_s, json.loads(done.stdout) if done.stdout else {"problems": [done.stderr], "components": []}
+    after = os.times()
+    took = Took(
+        round(time.monotonic() - began_s, 2),
+        round(after.children_user - before.children_user + after.children_system - before.children_system, 2),
+    )
+    return took, json.loads(done.stdout) if done.stdout else {"problems": [done.stderr], "components": []}
 
 
 def kind_of(process: psutil.Process) -> str:
@@ -166,6 +177,11 @@ async def numbers_of(bus: Bus, address: str) -> dict[str, float]:
         return {}
 
 
+def total(numbers: Sequence[dict[str, float]], name: str) -> float:
+    """Return the sum of one statistic of several components; one that did not answer adds nothing."""
+    return sum(one.get(name, 0.0) for one in numbers)
+
+
 async def questions_s(bus: Bus, seconds: float) -> list[float]:
     """Return the times of bare questions over so many seconds."""
     found, ends_s = [], time.monotonic() + seconds
@@ -211,33 +227,49 @@ async def take_over(robot: str, number: int) -> float:
     return next(event.at_s for event in events if isinstance(event, CommandApplied)) - asked
 
 
-async def measure(up: Up, scouts: int, seconds: float, take_overs: int) -> dict[str, Any]:
+def switches_s(trace: Path, since_s: float, until_s: float) -> list[float]:
+    """Return the times of the switches at the end of a slice that began in this time of the mission."""
+    found, begun_s = [], dict[str, float]()
+    for line in trace.read_text().splitlines():
+        event = json.loads(line)
+        if event.get("ev") == "revoke" and event["why"] == "slice" and since_s <= event["t"] < until_s:
+            begun_s[event["by"]] = event["t"]
+        elif event.get("ev") == "grant" and event["arc"] in begun_s:
+            found.append(event["t"] - begun_s.pop(event["arc"]) - SETTLE_S)
+    return found
+
+
+async def measure(up: Up, scouts: int, seconds: float, take_overs: int, trace: Path) -> dict[str, Any]:
     """Measure switches, pictures, processor time and take-overs of a mission that is up."""
     grabbers = [f"resource_pool/grabber{number}" for number in range(1, (scouts - 1) // SHARING + 2)]
-    async with connected(NAME, None, "ui_console/bench") as (bus, _clock):
+    async with connected(NAME, None, "ui_console/bench") as (bus, clock):
 
-        async def pictures() -> float:
-            said = await asyncio.gather(*(numbers_of(bus, grabber) for grabber in grabbers))
-            return sum(one.get("frames_delivered", 0.0) for one in said)
+        async def pictures() -> list[dict[str, float]]:
+            return await asyncio.gather(*(numbers_of(bus, grabber) for grabber in grabbers))
 
-        began_s, before, taken = time.monotonic(), busy(up.processes()), await pictures()
+        since_s = clock.now_s()
+        began_s, before, first = time.monotonic(), busy(up.processes()), await pictures()
         questions = await questions_s(bus, seconds)
-        taken, after = await pictures() - taken, busy(up.processes())
+        then, after = await pictures(), busy(up.processes())
         took_s = time.monotonic() - began_s
-        switches = await numbers_of(bus, RC_MANAGER)
+        taken = total(then, "frames_delivered") - total(first, "frames_delivered")
+        until_s = clock.now_s()
+        await clock.sleep_s(2 * SETTLE_S + 1)  # the last switch is over
     took: list[float | str] = []
     for number in range(1, take_overs + 1):
         try:
             took.append(round(1000 * await take_over(f"scout{number % scouts + 1}", number)))
         except (BackboneError, TimeoutError, StopIteration) as error:
             took.append(f"{type(error).__name__}: {error}")
+    switches = switches_s(trace, since_s, until_s) or [0.0]
     return {
         **cores_by_kind(before, after, took_s),
-        "switches": int(switches.get("switches", 0)),
-        "switch_p50_ms": round(1000 * switches.get("switch_p50_s", 0.0), 1),
-        "switch_p99_ms": round(1000 * switches.get("switch_p99_s", 0.0), 1),
+        "switches": len(switches),
+        "switch_p50_ms": round(1000 * percentile(switches, 0.5), 1),
+        "switch_p99_ms": round(1000 * percentile(switches, 0.99), 1),
         "take_over_ms": took,
         "pictures_hz": round(taken / took_s / len(grabbers), 2),
+        "pictures_allowed_hz": round(total(then, "pictures_allowed_hz") / len(grabbers), 2),
         "floor": "one question to the RC manager through the hub, in the same mission",
         "floor_p50_ms": round(1000 * percentile(questions, 0.5), 2),
         "floor_p99_ms": round(1000 * percentile(questions, 0.99), 2),
@@ -247,16 +279,16 @@ async def measure(up: Up, scouts: int, seconds: float, take_overs: int) -> dict[
 def listed_in_time(scouts: int) -> dict[str, Any]:
     """Ask for the status until it lists all components; return the first and the last answer's figures."""
     expected, ends_s = components(scouts), time.monotonic() + WHOLE_WITHIN_S
-    first_s, found = status()
-    took_s, first = first_s, len(found["components"])
+    took, found = status()
+    first = len(found["components"])
     while len(found["components"]) < expected and time.monotonic() < ends_s:
-        took_s, found = status()
+        took, found = status()
     return {
         "components": expected,
         "listed_at_once": first,
         "listed": len(found["components"]),
-        "status_s": round(took_s, 2),
-        "health": found.get("health"),
+        "status": took._asdict(),
+        "absent": found.get("absent", [])[:3],
         "problems": found["problems"][:3],
     }
 
@@ -267,13 +299,14 @@ def one_size(scouts: int, given: argparse.Namespace) -> None:
         os.environ["XDG_RUNTIME_DIR"] = folder
         file = Path(folder) / "mission.xml"
         file.write_text(mission_file(scouts, given.pictures, given.slices))
-        with mission_up(file, given.up) as up:
+        trace = Path(folder) / "trace.jsonl"
+        with mission_up(file, ["--trace", str(trace), *given.up]) as up:
             if up.ready_s is None:
                 report("scale", scouts=scouts, ready_s=None, said=up.said[-5:])
                 return
             listed = listed_in_time(scouts)
-            measured = asyncio.run(measure(up, scouts, given.seconds, given.take_overs))
-            held = memory(up.processes())
+            measured = asyncio.run(measure(up, scouts, given.seconds, given.take_overs, trace))
+            held, later = memory(up.processes()), status()[0]
         report(
             "scale",
             scouts=scouts,
@@ -281,6 +314,7 @@ def one_size(scouts: int, given: argparse.Namespace) -> None:
             up=given.up,
             ready_s=round(up.ready_s, 2),
             **listed,
+            status_later=later._asdict(),
             **measured,
             **held,
             ended=up.said[-1],

@@ -7,6 +7,7 @@ from math import ceil, sqrt
 SHARING = 5  # Scouts that share a radio, a frequency and a grabber
 APART_M = 1.5  # chosen: they stand still
 NAME = "scale"
+SETTLE_S = 0.3  # of a video frequency; a switch does not count it
 CORE = 8  # the seven core services and the world
 
 
@@ -39,7 +40,8 @@ def components(scouts: int) -> int:
 def _team(number: int, frame_rate_hz: float) -> str:
     return (
         f'<resource type="command_radio" name="radio{number}" sharable="true" driver="simulated" process="hardware"/>'
-        f'<resource type="video_frequency" name="video{number}" connect-s="0.3" driver="simulated" process="hardware"/>'
+        f'<resource type="video_frequency" name="video{number}" connect-s="{SETTLE_S}" driver="simulated"'
+        ' process="hardware"/>'
         f'<resource type="framegrabber" name="grabber{number}" driver="simulated">'
         f'<uses type="video_frequency" name="video{number}"/>'
         f'<parameter name="frame_rate_hz" value="{frame_rate_hz}"/></resource>'
