@@ -304,6 +304,7 @@ def one_size(scouts: int, given: argparse.Namespace) -> None:
             if up.ready_s is None:
                 report("scale", scouts=scouts, ready_s=None, said=up.said[-5:])
                 return
+            began = cores_by_kind({}, busy(up.processes()), 1.0)
             listed = listed_in_time(scouts)
             measured = asyncio.run(measure(up, scouts, given.seconds, given.take_overs, trace))
             held, later = memory(up.processes()), status()[0]
@@ -313,6 +314,8 @@ def one_size(scouts: int, given: argparse.Namespace) -> None:
             asked_pictures_hz=given.pictures,
             up=given.up,
             ready_s=round(up.ready_s, 2),
+            ready_processor_s=began["core_percent"] / 100,
+            ready_processor_percent_s_by_kind=began["core_percent_by_kind"],
             **listed,
             status_later=later._asdict(),
             **measured,

@@ -39,7 +39,7 @@ def facts_of(class_path: str) -> ClassFacts:
         abilities=found.abilities(),
         given=tuple(sorted(found.given_elsewhere)),
         shares_process=found.shares_process,
-        alike_most=found.alike_most or (ALIKE_MOST if found.shares_process else 1),
+        alike_most=max(1, found.alike_most or (ALIKE_MOST if found.shares_process else 1)),
     )
 
 
