@@ -212,6 +212,13 @@ class Component(Generic[P_co]):
         """Return the name of the person at this component; empty: no person."""
         return ""
 
+    def calm_s(self) -> float:
+        """Return how long news wait for further news, seconds of the machine.
+
+        When: before each ``publish_news``. Override where news take long to make.
+        """
+        return CALM_S
+
     def publish_news(self) -> None:
         """Publish the component's news.
 
@@ -424,7 +431,7 @@ class Component(Generic[P_co]):
     async def _publish_when_calm(self) -> None:
         while True:
             await self._news.wait()
-            await self.clock.sleep_s(CALM_S * self.clock.rate)
+            await self.clock.sleep_s(self.calm_s() * self.clock.rate)
             self._news.clear()
             self.publish_news()
 
