@@ -126,6 +126,7 @@ class ResourceController(Component[R], Generic[R]):
         self.applied = self.refused_stale = self.refused_strangers = 0
         self._connects = self._lease_ends = self._faults = 0
         self._unsafe: dict[str, Hold] = {}
+        self._remark = ""
         self._in_force = self.parameters
         self._drivers: list[Any] = []
         self._exchanges = DriverExchanges(self)
@@ -212,6 +213,7 @@ class ResourceController(Component[R], Generic[R]):
             lambda what: self.publish_event(self.name, what),
             self.fail,
             folder,
+            self._driver_remarks,
         )
 
     def make_driver(self, name: str = "") -> Any:
@@ -429,8 +431,14 @@ class ResourceController(Component[R], Generic[R]):
     def _report_holders(self) -> None:
         holders = ", ".join(hold.arc for hold in self.holds.holds())
         unsafe = f", not safe after {', '.join(self._unsafe)}" if self._unsafe else ""
-        self.report(f"held by {holders}{unsafe}" if holders else f"free{unsafe}")
+        remark = f"; {self._remark}" if self._remark else ""
+        self.report(f"held by {holders}{unsafe}{remark}" if holders else f"free{unsafe}{remark}")
         self.changed()  # the holder may be the same with a new epoch
+
+    def _driver_remarks(self, line: str) -> None:
+        if line != self._remark:
+            self._remark = line
+            self._report_holders()
 
     def _heard_leases(self, envelope: Envelope[Leases]) -> None:
         leases = envelope.body

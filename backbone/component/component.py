@@ -109,6 +109,9 @@ class Component(Generic[P_co]):
     """True for the RC of a robot, which operators can stop."""
     shares_process: ClassVar[bool] = True
     """False for a class that computes for long; where the mission file names no process, it then has one of its own."""
+    alike_most: ClassVar[int] = 0
+    """Most components of this class that share a process with each other, where a host has more of them and the mission
+    says nothing of processes; 1: each has its own; 0: the placer's default, or 1 if ``shares_process`` is False."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
 
@@ -208,6 +211,13 @@ class Component(Generic[P_co]):
     def person(self) -> str:
         """Return the name of the person at this component; empty: no person."""
         return ""
+
+    def calm_s(self) -> float:
+        """Return how long news wait for further news, seconds of the machine.
+
+        When: before each ``publish_news``. Override where news take long to make.
+        """
+        return CALM_S
 
     def publish_news(self) -> None:
         """Publish the component's news.
@@ -421,7 +431,7 @@ class Component(Generic[P_co]):
     async def _publish_when_calm(self) -> None:
         while True:
             await self._news.wait()
-            await self.clock.sleep_s(CALM_S * self.clock.rate)
+            await self.clock.sleep_s(self.calm_s() * self.clock.rate)
             self._news.clear()
             self.publish_news()
 
