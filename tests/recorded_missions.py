@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.bus.local_bus import LocalBus, LocalNetwork, Overheard
+from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.bus.neighbor_declarations import Overheard
 from backbone.keys import Conversation
 from backbone.keys import key as key_of
 from backbone.mission.model import MissionDescription
