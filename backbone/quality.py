@@ -7,10 +7,12 @@ declare another quality for one key of its modules.
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Annotated
 
 import msgspec
 
 from backbone.keys import Conversation
+from backbone.ranges import Duration
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES
 
 FEW_BYTES = 64 * 1024  # chosen: sixteen times the longest payload of a packet
@@ -37,16 +39,16 @@ class Quality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         most_bytes: A longer message is refused.
         most_bytes_on_host: The same for a message to listeners of the sender's host, which goes by a blackboard; 0: no
             blackboard is used.
-        deadline_s: A listener that watches deadlines misses a message that does not come within so many seconds of the
-            mission; 0: no message is missed.
+        deadline_s: A unit that takes the key misses a message that does not come within so many seconds of the mission;
+            0: no message is missed.
     """
 
     reliable: bool = False
     urgency: Urgency = Urgency.NORMAL
     express: bool = False
-    most_bytes: int = MAX_MESSAGE_BYTES
-    most_bytes_on_host: int = 0
-    deadline_s: float = 0.0
+    most_bytes: Annotated[int, msgspec.Meta(ge=1, le=MAX_MESSAGE_BYTES)] = MAX_MESSAGE_BYTES
+    most_bytes_on_host: Annotated[int, msgspec.Meta(ge=0, le=MAX_LARGE_MESSAGE_BYTES)] = 0
+    deadline_s: Duration = 0.0
 
     def __str__(self) -> str:
         """Return it in two words.
@@ -95,3 +97,27 @@ NEVER_DROPPED = frozenset(one for one, quality in QUALITY.items() if quality.rel
 """Conversations whose publications must arrive: a subscriber that takes none of them blocks senders."""
 LARGE = frozenset(one for one, quality in QUALITY.items() if quality.most_bytes_on_host)
 """Conversations of large values: listeners on the sender's host read them on its blackboard."""
+
+
+class OutputQuality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What a mission file declares of the quality of one key of its modules; see ``Quality``.
+
+    Attributes:
+        most_bytes: A longer value is refused; one that is longer than the network admits stays on its host.
+    """
+
+    reliable: bool = False
+    urgency: Urgency = Urgency.NORMAL
+    most_bytes: Annotated[int, msgspec.Meta(ge=1, le=MAX_LARGE_MESSAGE_BYTES)] = MAX_LARGE_MESSAGE_BYTES
+    deadline_s: Duration = 0.0
+
+    @property
+    def quality(self) -> Quality:
+        """The quality of the key."""
+        return Quality(
+            reliable=self.reliable,
+            urgency=self.urgency,
+            most_bytes=min(self.most_bytes, MAX_MESSAGE_BYTES),
+            most_bytes_on_host=self.most_bytes,
+            deadline_s=self.deadline_s,
+        )

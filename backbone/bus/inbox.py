@@ -40,6 +40,10 @@ class Sample(Protocol):
     def payload(self) -> Payload:
         """Its bytes."""
 
+    @property
+    def attachment(self) -> Payload | None:
+        """Bytes that travel with it."""
+
 
 class InboxBus(BusBase):
     """Base of a bus whose arrivals come in other threads. Make it inside a running event loop."""

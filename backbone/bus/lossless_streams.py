@@ -16,7 +16,7 @@ from typing import Any, cast
 
 import zenoh
 
-from backbone.bus.inbox import EachSample, InboxBus
+from backbone.bus.inbox import EachSample, InboxBus, Sample
 from backbone.bus.interface import Listener
 from backbone.bus.lossless import LosslessHearing, LosslessSending
 from backbone.bus.neighbor_declarations import matches
@@ -185,7 +185,7 @@ class LosslessSample(EachSample):
         self._token.undeclare()  # type: ignore[no-untyped-call]
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
 
-    def hand_over(self, sample: Any) -> None:
+    def hand_over(self, sample: Sample) -> None:
         """Call the listener, unless the message came before, or an earlier one is missing."""
         attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
         inbox = attached[_HEAD.size :].decode(errors="replace")
