@@ -108,6 +108,7 @@ class OutputQuality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     reliable: bool = False
     urgency: Urgency = Urgency.NORMAL
+    express: bool = False
     most_bytes: Annotated[int, msgspec.Meta(ge=1, le=MAX_LARGE_MESSAGE_BYTES)] = MAX_LARGE_MESSAGE_BYTES
     deadline_s: Duration = 0.0
 
@@ -117,6 +118,7 @@ class OutputQuality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         return Quality(
             reliable=self.reliable,
             urgency=self.urgency,
+            express=self.express,
             most_bytes=min(self.most_bytes, MAX_MESSAGE_BYTES),
             most_bytes_on_host=self.most_bytes,
             deadline_s=self.deadline_s,

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import os
 import struct
 from typing import Any, cast
 
+import msgspec
 import zenoh
 
 from backbone.bus.inbox import EachSample, InboxBus, Sample
@@ -22,12 +24,14 @@ from backbone.bus.lossless import LosslessHearing, LosslessSending
 from backbone.bus.neighbor_declarations import matches
 from backbone.bus.zenoh_outlets import on_the_wire
 from backbone.bus.zenoh_questions import LONGEST_KEY, is_inbox, new_inbox_key
-from backbone.keys import Conversation, address_of, key_of_lossless, keys_of_lossless, listened_to
+from backbone.keys import Conversation, key_of_lossless, keys_of_lossless, listened_to
 from backbone.quality import QUALITY, Quality
 from backbone.wire import Message, Reader
 
 STILL_COME_S = 2.0  # chosen: the lease of a link; a restarted hub is back sooner
-MOST_LISTENERS = 64  # chosen: of one sender; any token may stand
+MOST_LISTENERS = 4096  # chosen: one for each component of the largest mission; any token may stand
+MOST_KEYS_FOUND = 256  # chosen: four times the publishers of a bus
+LEAST_SLASHES = 5  # of scout/<mission>/<subsystem>/<conversation>/all/<listener>
 _HEAD = struct.Struct("<8sQQ")  # stream, number, lost; the sender's inbox for acknowledgements follows
 _ACKNOWLEDGED = struct.Struct("<8sQ")
 _KIND = "acknowledged"
@@ -41,15 +45,15 @@ class LosslessStream:
 
     Args:
         at: Key of the listener's token.
-        quality: Of the conversation; what is dropped is sent again, so nobody is waited for.
+        inbox: Key at which the listener acknowledges.
     """
 
-    def __init__(self, session: zenoh.Session, at: str, inbox: str, quality: Quality) -> None:
-        self.at, self.pattern, self.id = at, listened_to(at), os.urandom(8)
-        self.conversation = self.pattern.rpartition("/")[2]
-        self.sending, self.is_wanted = LosslessSending(), True
+    def __init__(self, session: zenoh.Session, at: str, inbox: str) -> None:
+        self.at, self.id, self.sending = at, os.urandom(8), LosslessSending()
+        conversation = Conversation(listened_to(at).rpartition("/")[2])
         self._session, self._inbox, self._loop = session, inbox.encode(), asyncio.get_running_loop()
-        self._wire = on_the_wire(quality) | {"congestion_control": zenoh.CongestionControl.DROP}
+        quality = msgspec.structs.replace(QUALITY[conversation], reliable=False)  # what is dropped is sent again
+        self._wire = on_the_wire(quality)
         self._timer: asyncio.TimerHandle | None = None
 
     def send(self, raw: bytes) -> None:
@@ -73,7 +77,7 @@ class LosslessStream:
         self.close()
         for number, lost, raw in self.sending.due(self._loop.time()):
             self._session.put(self.at, raw, attachment=_HEAD.pack(self.id, number, lost) + self._inbox, **self._wire)
-        if self.sending.again_s < float("inf"):
+        if self.sending.again_s < math.inf:
             self._timer = self._loop.call_at(self.sending.again_s, self._send_due)
 
 
@@ -89,7 +93,9 @@ class LosslessStreams:
         self.inbox = new_inbox_key(mission, own, _KIND)
         """Key at which it is told what listeners have."""
         self._own_id = session_id(session) if only_elsewhere else ""
+        self._fell_s: dict[str, float] = {}  # key of a listener's token → when it fell; infinite: it stands
         self._streams: dict[str, LosslessStream] = {}
+        self._found: dict[tuple[str, Conversation], list[LosslessStream]] = {}
         self._by_id: dict[bytes, LosslessStream] = {}
         self._acknowledgements: zenoh.Subscriber[None] | None = None
         at_once: Any = zenoh.handlers.Callback(lambda sample: bus.push(self._changed, sample), indirect=False)
@@ -99,19 +105,23 @@ class LosslessStreams:
 
     def to(self, address: str, conversation: Conversation) -> list[LosslessStream]:
         """Return the streams of a key."""
-        if not self._streams:
+        if not self._fell_s:
             return []
-        return [
-            one
-            for one in self._streams.values()
-            if one.conversation == conversation and matches(address_of(one.pattern), address)
-        ]
+        found = self._found.get((address, conversation))
+        if found is None:
+            meant = f"{address}/{conversation}"
+            found = [self._stream(at) for at in self._fell_s if matches(listened_to(at).split("/", 2)[2], meant)]
+            if len(self._found) >= MOST_KEYS_FOUND:
+                self._found.clear()
+            self._found[address, conversation] = found
+        return found
 
     def close(self) -> None:
         """Send no more."""
         for stream in self._streams.values():
             stream.close()
         self._streams.clear()
+        self._fell_s.clear()
         self._tokens.undeclare()
         if self._acknowledgements is not None:
             self._acknowledgements.undeclare()  # type: ignore[no-untyped-call]
@@ -120,30 +130,35 @@ class LosslessStreams:
         at, stands = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
         if self._own_id and at.rpartition("/")[2].startswith(self._own_id):
             return
-        stream = self._streams.get(at)
-        if stream is None and stands:
-            self._begin(at)
-        elif stream is not None:
-            stream.is_wanted = stands
+        loop = asyncio.get_running_loop()
+        if at in self._fell_s:
+            self._fell_s[at] = fell_s = math.inf if stands else loop.time()
             if not stands:
-                asyncio.get_running_loop().call_later(STILL_COME_S, self._end_unwanted, stream)
+                loop.call_later(STILL_COME_S, self._forget_fallen, at, fell_s)
+        elif stands and at.count("/") >= LEAST_SLASHES and len(self._fell_s) < MOST_LISTENERS:
+            self._fell_s[at] = math.inf
+            self._found.clear()
 
-    def _begin(self, at: str) -> None:
-        conversation = listened_to(at).rpartition("/")[2]
-        if conversation not in set(Conversation) or len(self._streams) >= MOST_LISTENERS:
-            log.warning("nothing is sent to %s", at)
-            return
+    def _forget_fallen(self, at: str, fell_s: float) -> None:
+        if self._fell_s.get(at) != fell_s:
+            return  # it stands again, or fell again
+        del self._fell_s[at]
+        self._found.clear()
+        if (stream := self._streams.pop(at, None)) is not None:
+            stream.close()
+            del self._by_id[stream.id]
+
+    def _stream(self, at: str) -> LosslessStream:
+        """Return the stream to a listener, which begins with the first message for it."""
         if self._acknowledgements is None:
             self._acknowledgements = self._session.declare_subscriber(
                 self.inbox, lambda sample: self._bus.push(self._acknowledged, sample)
             )
-        stream = LosslessStream(self._session, at, self.inbox, QUALITY[Conversation(conversation)])
-        self._streams[at] = self._by_id[stream.id] = stream
-
-    def _end_unwanted(self, stream: LosslessStream) -> None:
-        if not stream.is_wanted and self._streams.get(stream.at) is stream:
-            stream.close()
-            del self._streams[stream.at], self._by_id[stream.id]
+        stream = self._streams.get(at)
+        if stream is None:
+            stream = self._streams[at] = LosslessStream(self._session, at, self.inbox)
+            self._by_id[stream.id] = stream
+        return stream
 
     def _acknowledged(self, sample: zenoh.Sample) -> None:
         if len(sample.payload) != _ACKNOWLEDGED.size:

@@ -99,6 +99,7 @@ def _quality(element: Element) -> dict[str, object]:
     return {
         "reliable": bool(element.flag("reliable")),
         "urgency": element.text("urgency"),
+        "express": bool(element.flag("express")),
         "most_bytes": int(element.text("most-bytes")),
         "deadline_s": element.number("deadline-s") or 0.0,
     }

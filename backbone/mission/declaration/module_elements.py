@@ -132,6 +132,10 @@ class QualityElement(Declared):
     urgency: Urgency = Field(
         default=UrgencyWord.NORMAL, description="The queue in which values wait: urgent, normal, low or lowest."
     )
+    express: Flag = Field(
+        default=False,
+        description="Whether each value leaves at once, for single small ones; of a burst more are dropped then.",
+    )
     most_bytes: MessageBytes = Field(
         default=MAX_LARGE_MESSAGE_BYTES,
         description="A longer value is refused; beyond 8388608 bytes values stay on their host.",

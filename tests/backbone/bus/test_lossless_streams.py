@@ -63,6 +63,22 @@ async def test_a_listener_that_leaves_is_forgotten_with_all_that_waits_for_it(pa
     await until_streams(sender, 0)
 
 
+async def test_each_of_many_listeners_gets_what_it_listens_to(pair: Pair) -> None:
+    sender, listener, _stranger = pair
+    heard = {pattern: [Heard() for _ in range(40)] for pattern in (SERVER, "*/*", "backbone/*", ASKER, "*/*/*")}
+    for pattern, listeners in heard.items():
+        for one in listeners:
+            listener.subscribe(pattern, SAID, News, one, lossless=True)
+    await until_streams(sender, 120)
+    sender.publish(SERVER, SAID, News(1))
+    sender.publish(f"{SERVER}/part", SAID, News(2))
+    for pattern, numbers in {SERVER: [1], "*/*": [1], "backbone/*": [1], "*/*/*": [2]}.items():
+        for one in heard[pattern]:
+            await one.until_count(1)
+            assert one.numbers() == numbers
+    assert not any(one.all for one in heard[ASKER])
+
+
 async def test_a_strangers_tokens_messages_and_acknowledgements_change_nothing(pair: Pair) -> None:
     sender, listener, stranger = pair
     heard = Heard()

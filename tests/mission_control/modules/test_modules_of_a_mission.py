@@ -83,13 +83,13 @@ def test_a_choice_is_described_as_a_module(tmp_path: Path) -> None:
 
 
 def test_a_quality_is_described_at_the_unit_that_publishes_the_key_and_at_those_that_take_it(tmp_path: Path) -> None:
-    declared = '<quality key="twice" deadline-s="0.5" reliable="true" urgency="low" most-bytes="1000"/>'
+    declared = '<quality key="twice" deadline-s="0.5" reliable="true" urgency="low" express="true" most-bytes="1000"/>'
     late = '<quality key="number" deadline-s="2"/>'
     early, then = read(tmp_path, mission(declared, late, unit("early", DOUBLER), unit("late", SUMMING))).units
     twice = {
         "reliable": True,
         "urgency": "low",
-        "express": False,
+        "express": True,
         "most_bytes": 1000,
         "most_bytes_on_host": 1000,
         "deadline_s": 0.5,
@@ -99,6 +99,7 @@ def test_a_quality_is_described_at_the_unit_that_publishes_the_key_and_at_those_
         **twice,
         "reliable": False,
         "urgency": "normal",
+        "express": False,
         "most_bytes": 8 * 1024**2,
         "most_bytes_on_host": 64 * 1024**2,
         "deadline_s": 2.0,
