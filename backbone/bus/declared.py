@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from backbone.bus.inbox import EachSample, InboxBus
+from backbone.bus.inbox import InboxBus, Receiving
 from backbone.waiting import settle
 
 
@@ -16,7 +16,7 @@ class Declaration:
         receiver: What receives the samples of a subscription to one conversation; None: it is something else.
     """
 
-    def __init__(self, entity: Any, register: set[Declaration], receiver: EachSample | None = None) -> None:
+    def __init__(self, entity: Any, register: set[Declaration], receiver: Receiving | None = None) -> None:
         self._entity, self._register, self.receiver = entity, register, receiver
 
     @property

@@ -90,6 +90,18 @@ class InboxBus(BusBase):
         self._inbox.clear()
 
 
+class Receiving(Protocol):
+    """What receives the messages of a subscription."""
+
+    @property
+    def of(self) -> str:
+        """Key, or pattern of keys."""
+
+    @property
+    def dropped(self) -> int:
+        """Messages that came for it and were not handed over."""
+
+
 class EachSample:
     """Receives every sample of a subscriber, in order, as long as no more than ``MOST_WAITING_BYTES`` wait.
 
@@ -126,14 +138,14 @@ class EachSample:
 
     def _hand_over_one(self, sample: Sample) -> None:
         self._went += len(sample.payload)
-        self.hand_over(sample)
+        self.hand_over(str(sample.key_expr), sample.payload)
 
-    def hand_over(self, sample: Sample) -> None:
-        """Read the sample and call the listener."""
+    def hand_over(self, key: str, payload: Payload) -> None:
+        """Read a message and call the listener."""
         try:
-            envelope = self._reader.read(bytes_of(sample.payload, self._most), self._most)
+            envelope = self._reader.read(bytes_of(payload, self._most), self._most)
         except Refusal as unreadable:
-            self.count_unreadable(sample.key_expr, unreadable)
+            self.count_unreadable(key, unreadable)
             return
         self.deliver(envelope)
 
@@ -141,7 +153,7 @@ class EachSample:
         """Call the listener."""
         self._bus.hear(self._listener, envelope)
 
-    def count_unreadable(self, key: object, refusal: Refusal) -> None:
+    def count_unreadable(self, key: str, refusal: Refusal) -> None:
         """Count and log a publication that cannot be read."""
         self._bus.unreadable += 1
         log.warning("unreadable publication on %s: %s", key, refusal.detail)
@@ -168,13 +180,16 @@ class OverheardSamples:
             self._dropped += 1
             return
         self._came += length
-        self._bus.gather(self._hand_over, sample)
+        self._bus.gather(self._hand_over_one, sample)
 
-    def _hand_over(self, sample: Sample) -> None:
-        raw = sample.payload.to_bytes()
-        self._went += len(raw)
+    def _hand_over_one(self, sample: Sample) -> None:
+        self._went += len(sample.payload)
+        self.hand_over(str(sample.key_expr), sample.payload)
+
+    def hand_over(self, key: str, payload: Payload) -> None:
+        """Call the listener with the bytes of a message."""
         self._bus.heard += 1
-        self._bus.call("", self._listener, str(sample.key_expr), raw)
+        self._bus.call("", self._listener, key, payload.to_bytes())
 
     def close(self) -> None:
         """Withdraw the subscription."""
@@ -214,7 +229,7 @@ class LatestSample(EachSample):
         self._pushed = False
         taken = [self._newest.popitem()[1] for _ in range(len(self._newest))]
         for sample in reversed(taken):
-            self.hand_over(sample)
+            self.hand_over(str(sample.key_expr), sample.payload)
 
 
 def bytes_of(payload: Payload | None, most_bytes: int = MAX_MESSAGE_BYTES) -> bytes:

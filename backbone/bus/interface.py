@@ -167,7 +167,13 @@ class Bus(Protocol):
         """
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overhearing:
         """Call ``listener(key, bytes)``, in the event loop, with each publication of a conversation, whoever sends it.
 
@@ -178,6 +184,7 @@ class Bus(Protocol):
         Args:
             most_waiting_bytes: Messages that arrive while so many bytes wait for the listener are dropped and counted.
             of: Address under which they are published; empty: any. Others then make no copies.
+            lossless: Get each message, see ``subscribe``; what waits then waits at its senders.
         """
 
     def declare_alive(self, address: str) -> Subscription:

@@ -14,6 +14,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable
 
 from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Overhearer, Reply
+from backbone.bus.lossless import MOST_KEPT_BYTES
 from backbone.bus.neighbor_declarations import Declaration, Declaring, Listening, Overheard, Serving, Watching, matches
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
@@ -141,9 +142,10 @@ class Neighbor(Declaring):
         return dict(counts)
 
     def overhear_neighbors(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str, *, lossless: bool
     ) -> Overheard:
         """Subscribe to a conversation of components of this process."""
+        most_waiting_bytes = MOST_KEPT_BYTES if lossless else most_waiting_bytes
         overhearers = self.network.overhearers
         overheard = Overheard(
             self, lambda: overhearers.remove(overheard), conversation, listener, most_waiting_bytes, of
@@ -245,11 +247,17 @@ class LocalBus(Neighbor):
         return self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest and not lossless)
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overheard:
         """Subscribe to a conversation of one component or of all; see ``Bus.overhear``."""
         self.require_open()
-        return self.overhear_neighbors(conversation, listener, most_waiting_bytes, of)
+        return self.overhear_neighbors(conversation, listener, most_waiting_bytes, of, lossless=lossless)
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether a component hears this conversation of its own address."""

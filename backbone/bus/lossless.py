@@ -26,11 +26,13 @@ class Parcel(NamedTuple):
     Attributes:
         number: Of the message in its stream, from 1.
         lost: Messages of the stream that were not sent at all, because too many bytes waited.
+        key: Of the message.
         raw: The message.
     """
 
     number: int
     lost: int
+    key: str
     raw: bytes
 
 
@@ -43,7 +45,7 @@ class LosslessSending:
 
     def __init__(self, most_bytes: int = MOST_KEPT_BYTES) -> None:
         self._most_bytes = most_bytes
-        self._kept: deque[bytes] = deque()
+        self._kept: deque[tuple[str, bytes]] = deque()
         self._kept_bytes = self._under_way_bytes = self._under_way = 0
         self._acknowledged = self.lost = 0
         self._pause_s, self._back_s = AGAIN_S, -math.inf
@@ -55,12 +57,12 @@ class LosslessSending:
         """Messages that are not acknowledged."""
         return len(self._kept)
 
-    def add(self, raw: bytes) -> bool:
+    def add(self, key: str, raw: bytes) -> bool:
         """Take a message; return False if it is lost, because too many bytes wait."""
         if self._kept and self._kept_bytes + len(raw) > self._most_bytes:
             self.lost += 1
             return False
-        self._kept.append(raw)
+        self._kept.append((key, raw))
         self._kept_bytes += len(raw)
         return True
 
@@ -74,7 +76,7 @@ class LosslessSending:
                 self._go_back(now_s)
             return
         for _ in range(news):
-            length = len(self._kept.popleft())
+            length = len(self._kept.popleft()[1])
             self._kept_bytes -= length
             self._under_way_bytes -= length
         self._acknowledged, self._under_way = number, self._under_way - news
@@ -87,12 +89,12 @@ class LosslessSending:
             self._go_back(now_s)
             self._pause_s = min(2 * self._pause_s, AGAIN_MOST_S)
         while self._under_way < len(self._kept):
-            raw = self._kept[self._under_way]
+            key, raw = self._kept[self._under_way]
             if self._under_way and self._under_way_bytes + len(raw) > MOST_UNDER_WAY_BYTES:
                 break
             self._under_way += 1
             self._under_way_bytes += len(raw)
-            yield Parcel(self._acknowledged + self._under_way, self.lost, raw)
+            yield Parcel(self._acknowledged + self._under_way, self.lost, key, raw)
         if self._under_way and self.again_s == math.inf:
             self.again_s = now_s + self._pause_s
 

@@ -13,26 +13,26 @@ import logging
 import math
 import os
 import struct
+from collections.abc import Callable
 from typing import Any, cast
 
 import msgspec
 import zenoh
 
-from backbone.bus.inbox import EachSample, InboxBus, Sample
-from backbone.bus.interface import Listener
+from backbone.bus.inbox import InboxBus, Payload, Sample
+from backbone.bus.interface import Subscription
 from backbone.bus.lossless import LosslessHearing, LosslessSending
 from backbone.bus.neighbor_declarations import matches
 from backbone.bus.zenoh_outlets import on_the_wire
 from backbone.bus.zenoh_questions import LONGEST_KEY, is_inbox, new_inbox_key
 from backbone.keys import Conversation, key_of_lossless, keys_of_lossless, listened_to
 from backbone.quality import QUALITY, Quality
-from backbone.wire import Message, Reader
 
 STILL_COME_S = 2.0  # chosen: the lease of a link; a restarted hub is back sooner
 MOST_LISTENERS = 4096  # chosen: one for each component of the largest mission; any token may stand
 MOST_KEYS_FOUND = 256  # chosen: four times the publishers of a bus
 LEAST_SLASHES = 5  # of scout/<mission>/<subsystem>/<conversation>/all/<listener>
-_HEAD = struct.Struct("<8sQQ")  # stream, number, lost; the sender's inbox for acknowledgements follows
+_HEAD = struct.Struct("<8sQQH")  # stream, number, lost, length of the sender's inbox, which follows, and then the key
 _ACKNOWLEDGED = struct.Struct("<8sQ")
 _KIND = "acknowledged"
 _BEST_EFFORT = on_the_wire(Quality(express=True))
@@ -56,9 +56,9 @@ class LosslessStream:
         self._wire = on_the_wire(quality)
         self._timer: asyncio.TimerHandle | None = None
 
-    def send(self, raw: bytes) -> None:
+    def send(self, key: str, raw: bytes) -> None:
         """Send a message as soon as few of the earlier ones are under way."""
-        if not self.sending.add(raw) and self.sending.lost == 1:
+        if not self.sending.add(key, raw) and self.sending.lost == 1:
             log.warning("%s takes too little: messages for it are lost", self.at)
         self._send_due()
 
@@ -75,8 +75,9 @@ class LosslessStream:
 
     def _send_due(self) -> None:
         self.close()
-        for number, lost, raw in self.sending.due(self._loop.time()):
-            self._session.put(self.at, raw, attachment=_HEAD.pack(self.id, number, lost) + self._inbox, **self._wire)
+        for number, lost, key, raw in self.sending.due(self._loop.time()):
+            head = _HEAD.pack(self.id, number, lost, len(self._inbox))
+            self._session.put(self.at, raw, attachment=head + self._inbox + key.encode(), **self._wire)
         if self.sending.again_s < math.inf:
             self._timer = self._loop.call_at(self.sending.again_s, self._send_due)
 
@@ -168,50 +169,68 @@ class LosslessStreams:
             known.acknowledged(number)
 
 
-class LosslessSample(EachSample):
+class LosslessSamples:
     """Receives each message for one listener once, in order, and acknowledges those that were handed over.
 
     Args:
         of: Key, or pattern of keys, that it listens to.
+        hand_over: Called in the event loop with the key of each message and its bytes.
     """
 
     def __init__(
-        self,
-        bus: InboxBus,
-        session: zenoh.Session,
-        of: str,
-        reader: Reader[Message],
-        listener: Listener,
-        most_bytes: int,
+        self, bus: InboxBus, session: zenoh.Session, of: str, hand_over: Callable[[str, Payload], None]
     ) -> None:
-        super().__init__(bus, of, reader, listener, most_bytes)
+        self.of, self._bus, self._session, self._hand_over = of, bus, session, hand_over
+        self._mission, self._hearing = of.split("/")[1], LosslessHearing()
         at = key_of_lossless(of, session_id(session) + os.urandom(6).hex())
-        self._session, self._mission, self._hearing = session, of.split("/")[1], LosslessHearing()
-        self._subscriber = session.declare_subscriber(at, self)
+        self._subscriber = session.declare_subscriber(at, lambda sample: bus.push(self._arrived, sample))
         self._token = session.liveliness().declare_token(at)
 
     @property
     def dropped(self) -> int:
-        """Messages that it did not get, because too many waited for it."""
-        return self._dropped + self._hearing.lost
+        """Messages that it did not get, because too many waited for it at a sender."""
+        return self._hearing.lost
 
     def undeclare(self) -> None:
         """Withdraw it."""
         self._token.undeclare()  # type: ignore[no-untyped-call]
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
 
-    def hand_over(self, sample: Sample) -> None:
-        """Call the listener, unless the message came before, or an earlier one is missing."""
+    def _arrived(self, sample: Sample) -> None:
+        """Hand over the message, unless it came before, or an earlier one is missing."""
         attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
-        inbox = attached[_HEAD.size :].decode(errors="replace")
-        if len(attached) > LONGEST_KEY or not is_inbox(inbox, self._mission, _KIND):
+        if not _HEAD.size <= len(attached) <= 2 * LONGEST_KEY:
             self._bus.unreadable += 1
             return
-        stream, number, lost = _HEAD.unpack_from(attached)
+        stream, number, lost, length = _HEAD.unpack_from(attached)
+        inbox, key = (part.decode(errors="replace") for part in _split(attached[_HEAD.size :], length))
+        if not (is_inbox(inbox, self._mission, _KIND) and matches(self.of, key)):
+            self._bus.unreadable += 1
+            return
         is_new, newest = self._hearing.take(stream, number, lost)
         if is_new:
-            super().hand_over(sample)
+            self._hand_over(key, sample.payload)
         self._session.put(inbox, _ACKNOWLEDGED.pack(stream, newest), **_BEST_EFFORT)
+
+
+class LosslessOverhearing:
+    """A lossless subscription to whole conversations."""
+
+    def __init__(self, declared: Subscription, samples: LosslessSamples) -> None:
+        self._declared, self._samples = declared, samples
+
+    @property
+    def dropped(self) -> int:
+        """Messages that it did not get, because too many waited for it at a sender."""
+        return self._samples.dropped
+
+    def close(self) -> None:
+        """Withdraw it."""
+        self._declared.close()
+
+
+def _split(raw: bytes, length: int) -> tuple[bytes, bytes]:
+    return raw[:length], raw[length:]
 
 
 def session_id(session: zenoh.Session) -> str:

@@ -157,7 +157,16 @@ class Watching(Declaration):
 
 @functools.lru_cache(maxsize=4096)
 def matches(pattern: str, address: str) -> bool:
-    """Return whether an address is meant by a pattern with ``*`` for any one segment."""
+    """Return whether an address or key is meant by a pattern: ``*`` is any one segment, and one ``**`` any number."""
+    before, is_any_number, after = pattern.partition("**/")
+    if is_any_number:
+        begin, end = before.count("/"), after.count("/") + 1
+        parts = address.split("/")
+        return len(parts) >= begin + end and all(
+            matches(one, "/".join(of))
+            for one, of in ((before[:-1], parts[:begin]), (after, parts[len(parts) - end :]))
+            if one
+        )
     if pattern == address:
         return True
     wanted, given = pattern.split("/"), address.split("/")

@@ -129,11 +129,18 @@ class SharedBus(Neighbor, ZenohBus):
         return self.is_overheard_by_neighbors(conversation) or super().is_overheard(conversation)
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overhearing:
         """Subscribe to a conversation of all components, neighbors too; see ``Bus.overhear``."""
-        elsewhere = super().overhear(conversation, listener, most_waiting_bytes, of)
-        return _BothHeard(elsewhere, self.overhear_neighbors(conversation, listener, most_waiting_bytes, of))
+        elsewhere = super().overhear(conversation, listener, most_waiting_bytes, of, lossless=lossless)
+        here = self.overhear_neighbors(conversation, listener, most_waiting_bytes, of, lossless=lossless)
+        return _BothHeard(elsewhere, here)
 
     def declare_alive(self, address: str) -> Subscription:
         """Raise a liveliness token; see ``Bus.declare_alive``."""

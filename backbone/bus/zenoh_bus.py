@@ -28,6 +28,7 @@ from backbone.bus.inbox import (
     InboxBus,
     LatestSample,
     OverheardSamples,
+    Receiving,
     bytes_of,
     reader_of,
 )
@@ -42,7 +43,7 @@ from backbone.bus.interface import (
     Reply,
     Subscription,
 )
-from backbone.bus.lossless_streams import LosslessSample, LosslessStreams
+from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, LosslessStreams
 from backbone.bus.near_listening import NearListening
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
 from backbone.bus.zenoh_questions import DirectQuestion, Query, Ways, new_inbox, query
@@ -222,7 +223,7 @@ class ZenohBus(InboxBus):
         is_copied = self.copies is not None and self.copies.wants(conversation)
         copies = self.copies if is_copied and conversation is not Conversation.TOLD else None
         apart: list[Receiver] = [partial(copies.send, outlet.key)] if copies is not None else []
-        apart += [stream.send for stream in self.lossless.to(address, conversation)]
+        apart += [partial(stream.send, outlet.key) for stream in self.lossless.to(address, conversation)]
         outlet.send(envelope, apart, self._loop.time())
         return envelope
 
@@ -240,10 +241,12 @@ class ZenohBus(InboxBus):
             raw = write(envelope, outlet.quality.most_bytes)
             outlet.publisher.put(raw)
             for stream in self.lossless.to(address, conversation):
-                stream.send(raw)
+                stream.send(outlet.key, raw)
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether another process hears this conversation of its own address; 0.5 µs."""
+        if self.lossless.to(self.source, conversation):
+            return True
         return self._outlet(self.source, conversation).has_subscriber
 
     def tell_later(self, act: Callable[[], None]) -> None:
@@ -268,7 +271,8 @@ class ZenohBus(InboxBus):
         pattern, reader = key(self._mission, address, conversation), reader_of(accepts)
         most_bytes = QUALITY[conversation].most_bytes
         if lossless:
-            hearing = LosslessSample(self, self._session, pattern, reader, listener, most_bytes)
+            each = EachSample(self, pattern, reader, listener, most_bytes)
+            hearing = LosslessSamples(self, self._session, pattern, each.hand_over)
             return self._declare(hearing, hearing)
         if latest and self.boards is not None and conversation in LARGE and "*" not in address:
             near = self._listen_near(self.boards, pattern, reader, listener)
@@ -303,12 +307,21 @@ class ZenohBus(InboxBus):
         return near
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overhearing:
         """Subscribe to whole conversations, unread; see ``Bus.overhear``."""
         self.require_open()
         heard = OverheardSamples(self, listener, most_waiting_bytes)
         expression = key(self._mission, of, conversation) if of else key_of_all(self._mission, conversation)
+        if lossless:
+            every = LosslessSamples(self, self._session, expression, heard.hand_over)
+            return LosslessOverhearing(self._declare(every, every), every)
         heard.declared = self._declare(self._session.declare_subscriber(expression, heard))
         return heard
 
@@ -394,7 +407,7 @@ class ZenohBus(InboxBus):
             return
         self._outlets.close()
 
-    def _declare(self, entity: Any, receiver: EachSample | None = None) -> Declaration:
+    def _declare(self, entity: Any, receiver: Receiving | None = None) -> Declaration:
         declared = Declaration(entity, self._declared, receiver)
         self._declared.add(declared)
         return declared

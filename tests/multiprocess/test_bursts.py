@@ -106,12 +106,13 @@ def send(sender: ZenohBus, number: int) -> float:
 async def test_of_a_thousand_pictures_sent_at_once_a_lossless_listener_gets_all(
     processes: Processes, sender: ZenohBus
 ) -> None:
-    every, newest = processes.begin("lossless"), processes.begin("newest")
-    await known(sender, "lossless", "newest")
+    every, newest, recorder = (processes.begin(role) for role in ("lossless", "newest", "recorder"))
+    await known(sender, "lossless", "newest", "recorder")
     for number in range(MANY):
         send(sender, number)
-    await until(lambda: len(heard_by(every)["numbers"]) == MANY, "a thousand pictures")
-    assert heard_by(every) == {"numbers": list(range(MANY)), "dropped": 0}
+    for one in (every, recorder):
+        await until(lambda one=one: len(heard_by(one)["numbers"]) == MANY, "a thousand pictures")  # type: ignore[misc]
+        assert heard_by(one) == {"numbers": list(range(MANY)), "dropped": 0}
     numbers = heard_by(newest)["numbers"]
     assert 0 < len(numbers) < MANY
     assert numbers == sorted(set(numbers))

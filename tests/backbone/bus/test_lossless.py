@@ -16,7 +16,7 @@ from backbone.bus.lossless import (
     Parcel,
 )
 
-STREAM = b"stream-1"
+STREAM, KEY = b"stream-1", "scout/m/x/y/frames"
 STEP_S = 0.005
 
 
@@ -45,7 +45,7 @@ class LossyLink:
         self._on_the_way = [one for one in self._on_the_way if one[0] > self.now_s]
         for what in arrived:
             match what:
-                case Parcel(number, lost, raw):
+                case Parcel(number, lost, _key, raw):
                     is_new, acknowledged = self.hearing.take(STREAM, number, lost)
                     if is_new:
                         self.heard.append(raw)
@@ -63,7 +63,7 @@ def test_every_message_arrives_once_and_in_order_however_lossy_the_network_is(
 ) -> None:
     link = LossyLink(loss, seed)
     for message in given_messages:
-        assert link.sending.add(message)
+        assert link.sending.add(KEY, message)
         for _ in range(data.draw(st.integers(0, 3))):
             link.step()
     for _ in range(100_000):
@@ -79,14 +79,14 @@ def test_every_message_arrives_once_and_in_order_however_lossy_the_network_is(
 @given(messages, st.integers(0, 1_000_000))
 def test_what_waits_has_a_bound_and_what_is_lost_is_counted_at_the_listener(lost_from: list[bytes], most: int) -> None:
     link = LossyLink(0.0, 0, most)
-    taken = [message for message in lost_from if link.sending.add(message)]
+    taken = [message for message in lost_from if link.sending.add(KEY, message)]
     assert sum(map(len, taken)) <= max(most, len(taken[0]) if taken else 0)
-    link.sending.add(b"last") or taken  # one more, so that the count travels with the messages after it
+    link.sending.add(KEY, b"last") or taken  # one more, so that the count travels with the messages after it
     while link.sending.waiting:
         link.step()
     assert link.heard[: len(taken)] == taken
     assert link.hearing.lost <= link.sending.lost
-    assert link.sending.add(b"after")
+    assert link.sending.add(KEY, b"after")
     while link.sending.waiting:
         link.step()
     assert link.hearing.lost == link.sending.lost
@@ -95,7 +95,7 @@ def test_what_waits_has_a_bound_and_what_is_lost_is_counted_at_the_listener(lost
 def test_a_listener_that_hangs_costs_the_network_a_window_again_and_again_but_ever_more_rarely() -> None:
     link = LossyLink(1.0, 0)
     for _ in range(100):
-        link.sending.add(bytes(MOST_UNDER_WAY_BYTES // 4))
+        link.sending.add(KEY, bytes(MOST_UNDER_WAY_BYTES // 4))
     while link.now_s < 100.0:
         link.step()
     assert link.sent_bytes <= (100.0 / AGAIN_MOST_S + 4) * MOST_UNDER_WAY_BYTES
@@ -103,7 +103,7 @@ def test_a_listener_that_hangs_costs_the_network_a_window_again_and_again_but_ev
 
 def test_numbers_that_were_never_sent_are_not_acknowledged() -> None:
     sending = LosslessSending()
-    sending.add(b"one")
+    sending.add(KEY, b"one")
     assert [parcel.number for parcel in sending.due(0.0)] == [1]
     for nonsense in (2, 2**64 - 1, -1):
         sending.acknowledge(nonsense, 0.1)
@@ -116,7 +116,7 @@ def test_numbers_that_were_never_sent_are_not_acknowledged() -> None:
 def test_a_gap_is_answered_at_once_but_only_once() -> None:
     sending = LosslessSending()
     for text in (b"one", b"two", b"three"):
-        sending.add(text)
+        sending.add(KEY, text)
     assert len(list(sending.due(0.0))) == 3
     sending.acknowledge(0, 0.001)  # the second came before the first
     assert [parcel.raw for parcel in sending.due(0.001)] == [b"one", b"two", b"three"]
