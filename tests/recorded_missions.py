@@ -71,7 +71,7 @@ def record_seed(seed: int, *, chaos: bool, is_supervised: bool = False) -> tuple
 
         def arrived(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
             if self.hears(address, conversation):
-                writer.write(key_of(self.owner.network.mission, address, conversation), write(envelope), 0.0)
+                writer.write(key_of(self.owner.mission, address, conversation), write(envelope), 0.0)
 
     simulated = supervised_mission if is_supervised else mission_run
     name = "LinkedNetwork" if is_supervised else "UnreliableNetwork"
@@ -83,7 +83,7 @@ def record_seed(seed: int, *, chaos: bool, is_supervised: bool = False) -> tuple
             super().__init__(*args)
             bus = LocalBus(self, "backbone/recorder", VirtualClock())
             for conversation in to_overhear(()):
-                self.overhearers.append(Witness(bus, conversation, lambda _key, _raw: None, 0, ""))
+                self.overhearers.append(Witness(bus, lambda: None, conversation, lambda _key, _raw: None, 0, ""))
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(simulated, name, WitnessedNetwork)
