@@ -13,6 +13,7 @@ from functools import lru_cache
 from backbone.naming import IllegalName
 
 ROOT = "scout"
+_ANY = "+"  # stands for * in the key of a token, which has none
 _SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # a legal segment of a key expression, or * for any one
 
 
@@ -41,21 +42,6 @@ class Conversation(StrEnum):
     BEAT = "beat"  # heartbeats of ARCs: their event loop and their owner's run
     HEALTH = "health"  # the launcher's verdict on the whole mission
     LOG = "log"
-
-
-NEVER_DROPPED = frozenset(
-    {
-        Conversation.COMMAND,
-        Conversation.LEASES,
-        Conversation.STATUS,
-        Conversation.EVENTS,
-        Conversation.OPERATORS,
-        Conversation.SCHEDULE,
-    }
-)
-"""Conversations whose messages are sent once and must arrive: a subscriber that takes none of them blocks senders."""
-LARGE = frozenset({Conversation.FRAMES, Conversation.OUTPUTS, Conversation.VIEWS})
-"""Conversations of large values: listeners on the sender's host read them on its blackboard."""
 
 
 @lru_cache(maxsize=4096)
@@ -113,6 +99,31 @@ def sender_of(of: str, token: str) -> str:
         'backbone/by'
     """
     return token.removeprefix(f"{of}/by/")
+
+
+def key_of_lossless(of: str, listener: str) -> str:
+    """Return the key of a listener that must get every message of these keys: of its token, and of what it is sent.
+
+    Example:
+        >>> key_of_lossless("scout/iros2001/resource_pool/*/frames", "1f")
+        'scout/iros2001/resource_pool/+/frames/all/1f'
+    """
+    return f"{of.replace('*', _ANY)}/all/{listener}"
+
+
+def keys_of_lossless(mission: str) -> str:
+    """Return the key expression of the tokens of all such listeners."""
+    return f"{ROOT}/{mission}/**/all/*"
+
+
+def listened_to(token: str) -> str:
+    """Return the keys that such a listener gets all messages of.
+
+    Example:
+        >>> listened_to("scout/iros2001/resource_pool/+/frames/all/1f")
+        'scout/iros2001/resource_pool/*/frames'
+    """
+    return token.rsplit("/", 2)[0].replace(_ANY, "*")
 
 
 def address_of(key_expression: str) -> str:

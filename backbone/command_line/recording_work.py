@@ -68,17 +68,19 @@ class Splitting:
 
 @dataclass(frozen=True)
 class OfLauncher:
-    """Settings that a launcher or an offer passes to the recorder that it starts.
+    """Settings that a launcher, an offer or a person passes to the recorder that it starts.
 
     Attributes:
         is_described: True: the mission is described on standard input, because it cannot be asked yet.
         host_folder: Folder of the mission's files on this host, where its processes leave copies; None: they do not.
         host_only: True: record those alone, until standard input ends; False: their pictures, and the rest of all.
+        is_lossless: A person wants every message, see ``Bus.overhear``.
     """
 
     is_described: bool = False
     host_folder: Path | None = None
     host_only: bool = False
+    is_lossless: bool = False
 
 
 async def record_to(
@@ -107,6 +109,7 @@ async def record_to(
                 user=login_name(),
                 ear=HostEar(told.host_folder, pictures_only=not told.host_only) if told.host_folder else None,
                 host_only=told.host_only,
+                is_lossless=told.is_lossless,
             )
             with suppress(OSError):
                 go_behind_others()  # who decides goes before who records

@@ -29,6 +29,7 @@ from backbone.component.abilities import NO_ABILITIES, Abilities
 from backbone.component.asking import ask_until_answered
 from backbone.component.launch import Launch
 from backbone.component.messages import (
+    MESSAGES_DROPPED,
     PROCESSOR_S,
     Absence,
     AskParameters,
@@ -450,7 +451,8 @@ class Component(Generic[P_co]):
                 }
                 is_virtual = isinstance(self.clock, VirtualClock)  # a mission on virtual time is the same each time
                 process = {} if is_virtual else {PROCESSOR_S: time.process_time()}
-                return Statistics({**bus, **process, **self.statistics()})
+                dropped = {f"{MESSAGES_DROPPED}{key}": float(count) for key, count in self.bus.dropped().items()}
+                return Statistics({**bus, **process, **dropped, **self.statistics()})
             case AskParameters():
                 return Parameters(msgspec.to_builtins(self.parameters))
             case SetParameter(name=name, value=value, user=user):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import Conversation
+from backbone.quality import NEVER_DROPPED
 from backbone.recording.translation import Translated, Translator, copies_in
 from backbone.wire import Message
 

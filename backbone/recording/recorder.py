@@ -67,6 +67,7 @@ class Recorder:
         mission_xml: The mission's file; empty: not known.
         user: The person who records; empty: nobody.
         ear: Receives the copies that processes of this host send. None: the recorder overhears the bus alone.
+        is_lossless: True: all that is overheard is kept by its senders until it came, however much comes at once.
         host_only: True: the recorder writes these copies alone, and asks no component. False: it also overhears the
             bus, but for pictures.
     """
@@ -86,7 +87,9 @@ class Recorder:
         user: str = "",
         ear: HostEar | None = None,
         host_only: bool = False,
+        is_lossless: bool = False,
     ) -> None:
+        self._is_lossless = is_lossless
         self._bus, self._clock, self._user = bus, clock, user
         self._files, self._keys = files, keys
         self._ear, self._host_only = ear, host_only and ear is not None
@@ -154,7 +157,9 @@ class Recorder:
         elsewhere = PICTURES if self._ear is not None else frozenset()
         for conversation in to_overhear(self._keys):
             if conversation not in elsewhere:
-                self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
+                self._subscribed.append(
+                    self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES, lossless=self._is_lossless)
+                )
         self._bus.watch_alive("*/*", self._alive_changed)
 
     async def _flush_until_end(self) -> None:

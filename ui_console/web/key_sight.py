@@ -6,8 +6,9 @@ from collections.abc import Set
 from typing import NamedTuple
 
 from backbone.errors import Refusal
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import Conversation
 from backbone.naming import did_you_mean
+from backbone.quality import NEVER_DROPPED
 from ui_console.model.key_shown import KeyOrder
 from ui_console.web.protocol import ListKeys, ViewKey
 

@@ -207,7 +207,7 @@ async def test_without_a_listener_a_picture_is_not_even_written(
         sender = near.join(SERVER)
         sent: list[int] = []
         await until_near(network, sending(sender, sent))
-        monkeypatch.setattr("backbone.bus.zenoh_bus.write", lambda *_: pytest.fail("written for nobody"))
+        monkeypatch.setattr("backbone.bus.zenoh_outlets.write", lambda *_: pytest.fail("written for nobody"))
         sending(sender, sent)()
         assert sender.statistics().published == len(sent)
 

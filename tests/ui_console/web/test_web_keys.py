@@ -9,7 +9,8 @@ import pytest
 from bus_speaker import LOGGED, PICTURES, SPEAKER, event, speaker
 from web_stage import LOW, Browser, Stage
 
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import Conversation
+from backbone.quality import NEVER_DROPPED
 from backbone.recording.hearing import to_overhear
 from ui_console.web.key_sight import KeySight, NoSuchKey, where_heard
 from ui_console.web.protocol import ListKeys, ViewKey
