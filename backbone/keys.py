@@ -24,7 +24,8 @@ class Conversation(StrEnum):
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
-    TELEMETRY = "telemetry"  # states of RCs, hosts and the world
+    TELEMETRY = "telemetry"  # states of RCs and hosts
+    BODIES = "bodies"  # states of all bodies of a simulated world, once a frame
     MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without one
     REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
     READINGS = "readings"  # what the hardware measures, by name
@@ -54,8 +55,10 @@ NEVER_DROPPED = frozenset(
     }
 )
 """Conversations whose messages are sent once and must arrive: a subscriber that takes none of them blocks senders."""
-LARGE = frozenset({Conversation.FRAMES, Conversation.OUTPUTS, Conversation.VIEWS})
+LARGE = frozenset({Conversation.FRAMES, Conversation.OUTPUTS, Conversation.VIEWS, Conversation.BODIES})
 """Conversations of large values: listeners on the sender's host read them on its blackboard."""
+OF_ANY_SIZE = frozenset({Conversation.BODIES})
+"""Those of them whose small values lie on the blackboard too: few senders repeat them many times a second."""
 
 
 @lru_cache(maxsize=4096)

@@ -7,8 +7,8 @@ from typing import Any, cast
 
 import zenoh
 
-from backbone.bus.host_boards import HostBoards, SentBoard
-from backbone.keys import LARGE, Conversation, key, key_of_sender
+from backbone.bus.host_boards import LARGE_BYTES, HostBoards, SentBoard
+from backbone.keys import LARGE, OF_ANY_SIZE, Conversation, key, key_of_sender
 
 MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
 KNOWN_AFTER_S = 1.0  # chosen: the hub has told a new publisher of its subscribers by then; it takes milliseconds
@@ -127,7 +127,9 @@ class Outlets:
             congestion_control=congestion_control,
             allowed_destination=self._destination,
         )
-        board = boards.board(name, self._source) if boards is not None and conversation in LARGE else None
+        board = None
+        if boards is not None and conversation in LARGE:
+            board = boards.board(name, self._source, 0 if conversation in OF_ANY_SIZE else LARGE_BYTES)
         outlet = Outlet(name, publisher, now_s + KNOWN_AFTER_S, board)
         if conversation in LARGE:
             outlet.raise_token(self._session, self._source)

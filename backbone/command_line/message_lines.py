@@ -105,9 +105,9 @@ def traffic_lines(rows: Sequence[dict[str, Any]]) -> list[str]:
 
     Example:
         >>> table = TrafficTable()
-        >>> table.add("scout/night/resource_pool/world/telemetry", "resource_pool/world", "WorldState/1", 40)
+        >>> table.add("scout/night/resource_pool/world/bodies", "resource_pool/world", "WorldState/1", 40)
         >>> traffic_lines(table.busiest(2.0))
-        ['    0.50/s        20 B/s      40 B  resource_pool/world/telemetry  WorldState/1']
+        ['    0.50/s        20 B/s      40 B  resource_pool/world/bodies  WorldState/1']
     """
     return [
         f"{one['messages_per_s']:8.2f}/s {one['bytes_per_s']:9.0f} B/s {one['mean_bytes']:7.0f} B  "
