@@ -19,7 +19,7 @@ from backbone.printable import printable_all
 from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope
 
-REST_S = 2.0  # chosen: heartbeats, tokens and published states tell of every fault but one: a service without answers
+REST_S = 5.0  # chosen: heartbeats, tokens and published states tell of every fault but one: a service without answers
 
 
 class HealthWatch:
