@@ -25,7 +25,8 @@ class Conversation(StrEnum):
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
-    TELEMETRY = "telemetry"  # states of RCs, hosts and the world
+    TELEMETRY = "telemetry"  # states of RCs and hosts
+    BODIES = "bodies"  # states of all bodies of a simulated world, once a frame
     MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without one
     REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
     READINGS = "readings"  # what the hardware measures, by name

@@ -83,6 +83,7 @@ QUALITY: dict[Conversation, Quality] = {
     Conversation.SIGHTINGS: _SMALL,
     Conversation.BEAT: _SMALL,
     Conversation.HEALTH: Quality(),
+    Conversation.BODIES: _LARGE,
     Conversation.OUTPUTS: _LARGE,
     Conversation.VIEWS: _LARGE,
     Conversation.FRAMES: Quality(urgency=Urgency.LOW, most_bytes_on_host=MAX_LARGE_MESSAGE_BYTES),
@@ -97,6 +98,8 @@ NEVER_DROPPED = frozenset(one for one, quality in QUALITY.items() if quality.rel
 """Conversations whose publications must arrive: a subscriber that takes none of them blocks senders."""
 LARGE = frozenset(one for one, quality in QUALITY.items() if quality.most_bytes_on_host)
 """Conversations of large values: listeners on the sender's host read them on its blackboard."""
+OF_ANY_SIZE = frozenset({Conversation.BODIES})
+"""Those of them whose small values lie on the blackboard too: few senders repeat them many times a second."""
 
 
 class OutputQuality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -107,9 +107,9 @@ def traffic_lines(rows: Sequence[TrafficRow]) -> list[str]:
     Example:
         >>> from backbone.command_line.key_facts import KeyFacts, with_facts
         >>> table = TrafficTable()
-        >>> table.add("scout/night/resource_pool/world/telemetry", "resource_pool/world", "WorldState/1", 40)
+        >>> table.add("scout/night/resource_pool/world/bodies", "resource_pool/world", "WorldState/1", 40)
         >>> traffic_lines(with_facts(table.busiest(2.0), KeyFacts(), "night"))
-        ['    0.50/s        20 B/s      40 B  resource_pool/world/telemetry  WorldState/1  best effort, normal']
+        ['    0.50/s        20 B/s      40 B  resource_pool/world/bodies  WorldState/1  best effort, normal']
     """
     return [
         f"{one['messages_per_s']:8.2f}/s {one['bytes_per_s']:9.0f} B/s {one['mean_bytes']:7.0f} B  "

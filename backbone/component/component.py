@@ -157,6 +157,7 @@ class Component(Generic[P_co]):
         self._tasks: dict[asyncio.Task[None], None] = {}  # in the order of their starts
         self._token: Subscription | None = None
         self._news = asyncio.Event()
+        self._state_published: ComponentState | None = None
 
     # ------------------------------------------------------------------ hooks
     async def connect(self) -> None:
@@ -221,11 +222,12 @@ class Component(Generic[P_co]):
         return CALM_S
 
     def publish_news(self) -> None:
-        """Publish the component's news.
+        """Publish the component's news: its state, if it is another than the one that was published last.
 
         When: ``CALM_S`` after ``report`` or ``changed``, once for all news in between.
         """
-        self._publish_state()
+        if self.component_state() != self._state_published:
+            self._publish_state()
 
     # ------------------------------------------------------------------ for derived classes
     @property
@@ -437,7 +439,8 @@ class Component(Generic[P_co]):
             self.publish_news()
 
     def _publish_state(self) -> None:
-        self.bus.publish(self.address, Conversation.STATUS, self.component_state())
+        self._state_published = self.component_state()
+        self.bus.publish(self.address, Conversation.STATUS, self._state_published)
 
     async def _answer(self, asked: Envelope[Message]) -> Message:
         match asked.body:

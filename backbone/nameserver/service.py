@@ -20,7 +20,7 @@ import msgspec
 from backbone.authentication import NoSecret, dictionary_of
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
-from backbone.bus.zenoh_threads import all_threads
+from backbone.bus.zenoh_threads import threads_of_a_hub
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import AskState, ComponentState, NameTaken, Register, Registered
@@ -81,7 +81,7 @@ class Nameserver(Component[NameserverParameters]):
         if listen and not dictionary_file:
             raise NoSecret(f"the hub would listen at {', '.join(listen)} without a secret")
         config = hub_config([launch.endpoint, *listen], dictionary_file=dictionary_file)
-        all_threads()
+        threads_of_a_hub()
         return ZenohBus.open(launch.mission, launch.address, clock, config)
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

@@ -88,7 +88,7 @@ class SimulatedFramegrabber:
         if support is not None and support.missing_packages:
             self._site.tell(support.summary)
         self._world = self._site.bus.subscribe(
-            world_of(self._site), Conversation.TELEMETRY, WorldState, self._world_moved, latest=True
+            world_of(self._site), Conversation.BODIES, WorldState, self._world_moved, latest=True
         )
 
     def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:

@@ -323,13 +323,13 @@ def test_the_busiest_keys_are_told_with_rates_and_sizes(mission: RunningMission)
     rows = printed(mission, "top", "--for", "3")
     sizes = [one["bytes_per_s"] for one in rows]
     assert sizes == sorted(sizes, reverse=True)
-    [world] = [one for one in rows if one["key"].endswith("/world/telemetry")]
+    [world] = [one for one in rows if one["key"].endswith("/world/bodies")]
     assert 15 < world["messages_per_s"] < 40
     assert world["bytes_per_s"] == pytest.approx(world["messages_per_s"] * world["mean_bytes"])
     lines = mission.command(
-        "scout-backbone", "watch", "*/world/telemetry", "--rate", "--for", "2.5", "--mission", mission.name
+        "scout-backbone", "watch", "*/world/bodies", "--rate", "--for", "2.5", "--mission", mission.name
     )
-    assert lines.stdout.count("world/telemetry") >= 2, lines.stdout
+    assert lines.stdout.count("world/bodies") >= 2, lines.stdout
 
 
 def injected(mission: RunningMission, key: str, said: str) -> subprocess.CompletedProcess[str]:

@@ -60,9 +60,7 @@ class Studio:
 
     def show(self, frame: int, transmitting: dict[str, str], state: bytes | None = None) -> None:
         drawn = self.world.state().tobytes() if state is None else state
-        self.bus.publish(
-            "resource_pool/world", Conversation.TELEMETRY, WorldState(frame, frame / 30, drawn, transmitting)
-        )
+        self.bus.publish("resource_pool/world", Conversation.BODIES, WorldState(frame, frame / 30, drawn, transmitting))
 
     async def close(self) -> None:
         await self.driver.close()

@@ -26,7 +26,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.placer.messages import Start
 from backbone.rc_manager.messages import (
-    BEAT_EVERY_S,
+    BEAT_WITHIN_S,
     AskRc,
     AskRequest,
     AskSchedule,
@@ -133,7 +133,7 @@ class PlainArc(Component[Any]):
         while True:
             if self.beats:
                 self.bus.publish(self.address, Conversation.BEAT, Beat(self.name))
-            await self.clock.sleep_s(BEAT_EVERY_S)
+            await self.clock.sleep_s(BEAT_WITHIN_S)
 
     async def ask_for(self, request: SchedulingRequest) -> Scheduled:
         self.request = request
