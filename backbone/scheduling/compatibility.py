@@ -53,7 +53,9 @@ class Compatibility:
                 if common & (arc.excludes | other.excludes):
                     return False
                 beside.append(other)
-        return all(self.can_share(rc, [arc, *(other for other in beside if rc in other.uses)]) for rc in arc.shares)
+        return not arc.shares or all(
+            self.can_share(rc, [arc, *(other for other in beside if rc in other.uses)]) for rc in arc.shares
+        )
 
     def usable(self, arc: ArcEntry) -> bool:
         """Return whether the ARC could run alone: its RCs are up and can serve it."""

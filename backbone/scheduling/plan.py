@@ -115,7 +115,8 @@ class Plan:
         self._slack_s = slack_s
         self._handed_over = handed_over
         self._among_equals = among_equals
-        self._holders = [arc for arc in group if arc.state in CONNECTED or (arc.holds and not handed_over)]
+        self._group = group
+        self._holders: list[ArcEntry] = []
         self._starts_s: dict[ArcEntry, float] = {}
         self._reserved: list[_Reservation] = []
 
@@ -135,6 +136,9 @@ class Plan:
 
     def _find_next(self) -> None:
         place = len(self._starts_s)
+        if not place:
+            handed_over = self._handed_over
+            self._holders = [arc for arc in self._group if arc.state in CONNECTED or (arc.holds and not handed_over)]
         arc = self._order[place]
         start_s = self._starts_s[arc] = self._earliest_s(arc, place)
         if start_s < math.inf:
