@@ -21,6 +21,7 @@ class Conversation(StrEnum):
 
     ASK = "ask"  # questions: request/response
     TOLD = "told"  # copies for recorders of what they cannot overhear themselves, while there is a recorder
+    FAR = "far"  # copies of all but pictures, from processes without a socket of the mission's recorder
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
@@ -54,6 +55,8 @@ NEVER_DROPPED = frozenset(
     }
 )
 """Conversations whose messages are sent once and must arrive: a subscriber that takes none of them blocks senders."""
+COPIED = frozenset({Conversation.TOLD, Conversation.FAR})
+"""Conversations of copies of messages that were sent at other keys."""
 LARGE = frozenset({Conversation.FRAMES, Conversation.OUTPUTS, Conversation.VIEWS})
 """Conversations of large values: listeners on the sender's host read them on its blackboard."""
 

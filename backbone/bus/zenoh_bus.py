@@ -11,7 +11,7 @@ messages (docs/decisions/0003-zenoh-settings.md).
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import zenoh
@@ -41,6 +41,7 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.bus.near_listening import NearListening
+from backbone.bus.zenoh_far_copies import Copier, FarCopies, copiers, send_copies
 from backbone.bus.zenoh_outlets import Outlet, Outlets
 from backbone.bus.zenoh_questions import DirectQuestion, Query, Ways, new_inbox, query
 from backbone.bus.zenoh_sessions import (
@@ -100,6 +101,8 @@ class ZenohBus(InboxBus):
         super().__init__(mission, source, clock)
         self.copies: HostCopies | None = None
         """For the recorder of this host; settable. A bus with a session of its own closes them."""
+        self.far = None if shared else FarCopies(session, mission, source)
+        """For the recorder of the mission where it has no socket; settable. Same."""
         self.boards: HostBoards | None = None
         """For large values to and from this host; settable before they are used."""
         self._session, self._is_hub, self._shared = session, is_hub, shared
@@ -216,25 +219,23 @@ class ZenohBus(InboxBus):
         outlet = self._outlet(address, conversation)
         self.published += 1
         envelope = self.envelope(message)
-        is_copied = self.copies is not None and self.copies.wants(conversation)
-        copies = self.copies if is_copied and conversation is not Conversation.TOLD else None
+        copies = copiers(self.copies, self.far, conversation)
         if outlet.board is not None:
             self._send_large(outlet, outlet.board, envelope, copies)
             return envelope
-        if copies is None and conversation is Conversation.OUTPUTS and outlet.is_unheard(self._loop.time()):
+        if not copies and conversation is Conversation.OUTPUTS and outlet.is_unheard(self._loop.time()):
             return envelope  # the next output follows soon; other messages may be the last for long
         raw = write(envelope)
         outlet.publisher.put(raw)
-        if copies is not None:
-            copies.send(outlet.key, raw)
+        send_copies(copies, outlet.key, raw)
         return envelope
 
     def _send_large(
-        self, outlet: Outlet, board: SentBoard, envelope: Envelope[Message], copies: HostCopies | None
+        self, outlet: Outlet, board: SentBoard, envelope: Envelope[Message], copies: Sequence[Copier]
     ) -> None:
         """Leave the message on the board, and send it by the network if a subscriber is there."""
         is_heard = outlet.is_heard(self._loop.time())
-        if not (is_heard or copies is not None or board.is_read):
+        if not (is_heard or copies or board.is_read):
             return
         raw = write(envelope, MAX_LARGE_MESSAGE_BYTES)
         if board.put(raw):
@@ -245,20 +246,22 @@ class ZenohBus(InboxBus):
             return
         if is_heard:
             outlet.publisher.put(raw)
-        if copies is not None:
-            copies.send(outlet.key, raw)
+        send_copies(copies, outlet.key, raw)
 
     def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
-        """Publish copies if a component overhears; questions with answers go to the recorder of this host, too."""
+        """Publish copies if a component overhears; copies of questions with answers go to recorders, too."""
         super().tell(address, conversation, *messages)
-        if conversation is Conversation.ASK and self.copies is not None and self.copies.wants(conversation):
-            for raw in quoted(messages):
-                self.copies.send(key(self._mission, address, conversation), raw)
+        if conversation is Conversation.ASK:
+            copies = copiers(self.copies, self.far, conversation)
+            for raw in quoted(messages) if copies else ():
+                send_copies(copies, key(self._mission, address, conversation), raw)
 
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender; see ``Bus.pass_on``."""
         if not self.closed:
-            self._outlet(address, conversation).publisher.put(write(envelope))
+            outlet, raw = self._outlet(address, conversation), write(envelope)
+            outlet.publisher.put(raw)
+            send_copies(copiers(self.copies, self.far, conversation), outlet.key, raw)
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether another process hears this conversation of its own address; 0.5 µs."""
@@ -384,8 +387,9 @@ class ZenohBus(InboxBus):
         self.ways.close()
         if not self._shared:
             self._outlets.close_boards()
-            if self.copies is not None:
-                self.copies.close()
+            for copies in (self.far, self.copies):
+                if copies is not None:
+                    copies.close()
             await close_session(self._session)
             return
         self._outlets.close()

@@ -30,6 +30,7 @@ _QUALITY = {
     Conversation.FRAMES: _BULK,
     Conversation.LOG: _BULK,
     Conversation.TOLD: _FOR_RECORDERS,
+    Conversation.FAR: _FOR_RECORDERS,
     Conversation.DECISIONS: _FOR_RECORDERS,
 }
 

@@ -59,15 +59,14 @@ def first_free(path: Path) -> Path:
 def recorder_of_mission(
     description: MissionDescription, text: bytes, path: Path, clock: Clock, run_directory: str
 ) -> MissionRecorder:
-    """Return the recorder beside the launcher; on several hosts each host records its own pictures.
+    """Return the recorder beside the launcher; it records the pictures of this host alone.
 
     Args:
         text: The mission file.
     """
     modules = sorted({kind.class_path.partition(":")[0] for kind in description.types})
     facts = json.dumps({"mission_xml": text.decode(), "modules": modules}).encode()
-    own_pictures = ["--host-folder", run_directory] if description.other_hosts else []
-    return MissionRecorder(description.name, path, clock, ["--described", *own_pictures], facts)
+    return MissionRecorder(description.name, path, clock, ["--described", "--host-folder", run_directory], facts)
 
 
 class MissionRecorder:

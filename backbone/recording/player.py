@@ -12,7 +12,7 @@ from operator import or_
 
 from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.keys import Conversation, address_of
+from backbone.keys import COPIED, Conversation, address_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.hearing import is_meant
@@ -22,7 +22,7 @@ from backbone.recording.recorded_mission import RecordedMission
 from backbone.recording.revival import message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message
 
-_PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, Conversation.TOLD}
+_PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, *COPIED}
 
 
 class Player:
