@@ -47,6 +47,7 @@ from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recording, missing_numbers, recover_file
 from backbone.recording.recorder import Recorder
 from backbone.recording.revival import revived
+from backbone.recording.signs_of_life import SignsOfLife
 from backbone.spoken import counted
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
@@ -115,6 +116,8 @@ async def record_to(
             )
             with suppress(OSError):
                 go_behind_others()  # who decides goes before who records
+            if told.host_folder is not None:
+                recorder.on_flushed = SignsOfLife().give
             gc.collect()
             gc.freeze()  # else the collector looks through all that was imported again and again
             await _run(recorder, path, for_s, ends_with_input=told.host_only)

@@ -105,6 +105,8 @@ class Recorder:
         self._one_at_a_time, self._needs_snapshot = asyncio.Lock(), asyncio.Event()
         self._ended = asyncio.Event()
         self._has_link = True
+        self.on_flushed: Callable[[], None] = lambda: None
+        """Called after each flush; settable."""
         self.full = ""
         """Why the file can grow no more; empty: it can."""
 
@@ -177,6 +179,7 @@ class Recorder:
         while not self._ended.is_set() and not self.full:
             await self._clock.sleep_s(FLUSH_EACH_S * self._clock.rate)
             self._flush()
+            self.on_flushed()
             news = self.dropped - dropped
             if news:
                 self._say(f"{counted(news, 'message')} came too fast to be recorded", LogLevel.WARNING)

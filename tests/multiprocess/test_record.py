@@ -204,6 +204,27 @@ def test_a_recorder_that_is_killed_is_absent_until_the_recording_goes_on(tmp_pat
 
 
 @pytest.mark.thorough
+def test_a_recorder_that_hangs_is_absent_with_a_remedy_until_it_responds(tmp_path: Path) -> None:
+    path = tmp_path / "it.mcap"
+    with mission_up("--record", str(path)) as mission:
+        [recorder] = [one for one in psutil.Process(mission.launcher.pid).children() if "record" in one.cmdline()]
+        recorder.suspend()
+        wait_for(lambda: "recorder" in {one["name"] for one in mission.status()["absent"]}, mission)
+        [absent] = [one for one in mission.status()["absent"] if one["name"] == "recorder"]
+        assert "respond" in absent["cause"]
+        assert f"kill -CONT {recorder.pid}" in absent["remedy"]
+        hangs_s = absent["since_s"]
+        recorder.resume()
+        wait_for(lambda: mission.status()["health"] == "ok", mission)
+        recorder.suspend()
+        assert mission.down() == 0, mission.story()
+    assert not path.with_stem("it-2").exists()
+    found = messages(path)
+    assert any(hangs_s - 1.0 < one.at_s < hangs_s for one in found), "what was said meanwhile waited at its senders"
+    assert "resource_pool/scout1" not in missing_numbers(found)
+
+
+@pytest.mark.thorough
 async def test_the_recorder_of_a_host_writes_its_copies_alone_and_ends_with_the_process_that_started_it(
     mission: RunningMission, tmp_path: Path
 ) -> None:
