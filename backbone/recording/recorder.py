@@ -26,7 +26,7 @@ from backbone.component.messages import (
 )
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
-from backbone.keys import Conversation
+from backbone.keys import ROOT, Conversation
 from backbone.keys import key as key_of
 from backbone.naming import component_of
 from backbone.rc_manager.messages import AskSchedule, AskSnapshot, ScheduleSnapshot
@@ -257,11 +257,12 @@ class Recorder:
         self._bus.publish(self._bus.source, Conversation.LOG, event)
 
     def _heard_far(self, at: str, raw: bytes) -> None:
-        end = 0
+        end, own = 0, f"{ROOT}/{self._bus.mission}/"
         try:
             while (copy := copy_at(raw, end)) is not None:
                 end = copy.end
-                self._heard(copy.key, copy.raw)
+                if copy.key.startswith(own):  # anybody may publish there
+                    self._heard(copy.key, copy.raw)
         except (ConnectionError, UnicodeDecodeError) as error:
             log.warning("no copies at %s: %s", at, error)
 
