@@ -22,6 +22,7 @@ class Conversation(StrEnum):
 
     ASK = "ask"  # questions: request/response
     TOLD = "told"  # copies for recorders of what they cannot overhear themselves, while there is a recorder
+    FAR = "far"  # copies of all but pictures, from processes without a socket of the mission's recorder
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
@@ -43,6 +44,10 @@ class Conversation(StrEnum):
     BEAT = "beat"  # heartbeats of ARCs: their event loop and their owner's run
     HEALTH = "health"  # the launcher's verdict on the whole mission
     LOG = "log"
+
+
+COPIED = frozenset({Conversation.TOLD, Conversation.FAR})
+"""Conversations of copies of messages that were sent at other keys."""
 
 
 @lru_cache(maxsize=4096)

@@ -90,6 +90,7 @@ QUALITY: dict[Conversation, Quality] = {
     Conversation.LOG: Quality(urgency=Urgency.LOW, most_bytes=SOME_BYTES),
     # For recorders, in a queue that they share with nothing else.
     Conversation.TOLD: Quality(urgency=Urgency.LOWEST),
+    Conversation.FAR: Quality(urgency=Urgency.LOWEST),
     Conversation.DECISIONS: Quality(urgency=Urgency.LOWEST),
 }
 """Conversation → quality of its keys, unless a mission file declares another one."""

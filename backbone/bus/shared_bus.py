@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from typing import Any
+from typing import Any, cast
 
 from backbone.bus.host_boards import boards_for
 from backbone.bus.host_copies import copies_for
@@ -30,6 +30,7 @@ from backbone.bus.interface import (
 )
 from backbone.bus.local_bus import LocalNetwork, Neighbor
 from backbone.bus.zenoh_bus import ZenohBus
+from backbone.bus.zenoh_far_copies import FarCopies
 from backbone.bus.zenoh_sessions import client_config, close_session, open_session, watch_links
 from backbone.keys import Conversation
 from backbone.quality import NEVER_DROPPED
@@ -53,21 +54,23 @@ class SharedSession:
         self._session = open_session(client_config(endpoint, secret))
         self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
-        self._copies = copies_for(directory)
+        self._copies, self._far = copies_for(directory), cast("FarCopies | None", None)
         self._directory, self._members = directory, set[str]()
 
     def join(self, source: str, clock: Clock) -> SharedBus:
         """Return a new member's bus. Close it before the session."""
         bus = SharedBus(self._neighbors, source, clock, self._session)
-        bus.copies, bus.members = self._copies, self._members
+        self._far = self._far or FarCopies(self._session, bus.mission, source)
+        bus.copies, bus.far, bus.members = self._copies, self._far, self._members
         self._members.add(source)
         bus.boards = boards_for(self._directory, self._members)
         return bus
 
     async def close(self) -> None:
         """Close the session; return when its threads have ended."""
-        if self._copies is not None:
-            self._copies.close()
+        for copies in (self._copies, self._far):
+            if copies is not None:
+                copies.close()
         await close_session(self._session)
 
 

@@ -45,6 +45,7 @@ from backbone.bus.interface import (
 )
 from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, LosslessStreams
 from backbone.bus.near_listening import NearListening
+from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
 from backbone.bus.zenoh_questions import DirectQuestion, Query, Ways, new_inbox, query
 from backbone.bus.zenoh_sessions import (
@@ -102,6 +103,8 @@ class ZenohBus(InboxBus):
         super().__init__(mission, source, clock)
         self.copies: HostCopies | None = None
         """For the recorder of this host; settable. A bus with a session of its own closes them."""
+        self.far = None if shared else FarCopies(session, mission, source)
+        """For the recorder of the mission where it has no socket; settable. Same."""
         self.boards: HostBoards | None = None
         """For large values to and from this host; settable before they are used."""
         self._session, self._is_hub, self._shared = session, is_hub, shared
@@ -220,19 +223,19 @@ class ZenohBus(InboxBus):
         outlet = self._outlet(address, conversation)
         self.published += 1
         envelope = self.envelope(message)
-        is_copied = self.copies is not None and self.copies.wants(conversation)
-        copies = self.copies if is_copied and conversation is not Conversation.TOLD else None
-        apart: list[Receiver] = [partial(copies.send, outlet.key)] if copies is not None else []
+        copies = copiers(self.copies, self.far, conversation)
+        apart: list[Receiver] = [partial(copier.send, outlet.key) for copier in copies]
         apart += [partial(stream.send, outlet.key) for stream in self.lossless.to(address, conversation)]
         outlet.send(envelope, apart, self._loop.time())
         return envelope
 
     def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
-        """Publish copies if a component overhears; questions with answers go to the recorder of this host, too."""
+        """Publish copies if a component overhears; copies of questions with answers go to recorders, too."""
         super().tell(address, conversation, *messages)
-        if conversation is Conversation.ASK and self.copies is not None and self.copies.wants(conversation):
-            for raw in quoted(messages):
-                self.copies.send(key(self._mission, address, conversation), raw)
+        if conversation is Conversation.ASK:
+            copies = copiers(self.copies, self.far, conversation)
+            for raw in quoted(messages) if copies else ():
+                send_copies(copies, key(self._mission, address, conversation), raw)
 
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender; see ``Bus.pass_on``."""
@@ -242,6 +245,7 @@ class ZenohBus(InboxBus):
             outlet.publisher.put(raw)
             for stream in self.lossless.to(address, conversation):
                 stream.send(outlet.key, raw)
+            send_copies(copiers(self.copies, self.far, conversation), outlet.key, raw)
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether another process hears this conversation of its own address; 0.5 µs."""
@@ -401,8 +405,9 @@ class ZenohBus(InboxBus):
         self.lossless.close()
         if not self._shared:
             self._outlets.close_boards()
-            if self.copies is not None:
-                self.copies.close()
+            for copies in (self.far, self.copies):
+                if copies is not None:
+                    copies.close()
             await close_session(self._session)
             return
         self._outlets.close()
