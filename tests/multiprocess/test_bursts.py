@@ -19,7 +19,6 @@ from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.bus.zenoh_threads import all_threads
 from backbone.keys import Conversation
 from resource_pool.messages import Frame
 
@@ -36,7 +35,6 @@ class Processes:
         self.endpoint, self._all = free_endpoint(), list[Process]()
 
     def begin(self, role: str) -> Process:
-        all_threads()
         command = [sys.executable, burst_roles.__file__, role, self.endpoint]
         made = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self._all.append(made)
