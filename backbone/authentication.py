@@ -14,6 +14,8 @@ from pathlib import Path
 from backbone.errors import Refusal
 
 SOCKET_NAME, SECRET_NAME = "hub.sock", "secret"
+SOCKET = "unixsock-stream/"
+"""Begin of an endpoint that is a unix socket, so its links cannot leave the host."""
 LONGEST_SOCKET_PATH = 107  # linux/un.h: sun_path has 108 bytes, of which the last one is 0
 USER = "scout"  # the one user of today's hubs; certificates will name hosts and people
 SECRET_BYTES = 32  # chosen: 256 bits cannot be guessed
@@ -44,7 +46,7 @@ def socket_endpoint(directory: Path) -> str:
     length = len(os.fsencode(path))
     if length > LONGEST_SOCKET_PATH:
         raise SocketPathTooLong(f"{path} has {length} bytes, and {LONGEST_SOCKET_PATH} are possible", length=length)
-    return f"unixsock-stream/{path}"
+    return f"{SOCKET}{path}"
 
 
 def tcp_endpoint(address: str, port: int) -> str:

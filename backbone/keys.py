@@ -13,6 +13,7 @@ from functools import lru_cache
 from backbone.naming import IllegalName
 
 ROOT = "scout"
+_ANY = "+"  # stands for * in the key of a token, which has none
 _SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # a legal segment of a key expression, or * for any one
 
 
@@ -21,10 +22,12 @@ class Conversation(StrEnum):
 
     ASK = "ask"  # questions: request/response
     TOLD = "told"  # copies for recorders of what they cannot overhear themselves, while there is a recorder
+    FAR = "far"  # copies of all but pictures, from processes without a socket of the mission's recorder
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
-    TELEMETRY = "telemetry"  # states of RCs, hosts and the world
+    TELEMETRY = "telemetry"  # states of RCs and hosts
+    BODIES = "bodies"  # states of all bodies of a simulated world, once a frame
     MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without one
     REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
     READINGS = "readings"  # what the hardware measures, by name
@@ -43,19 +46,8 @@ class Conversation(StrEnum):
     LOG = "log"
 
 
-NEVER_DROPPED = frozenset(
-    {
-        Conversation.COMMAND,
-        Conversation.LEASES,
-        Conversation.STATUS,
-        Conversation.EVENTS,
-        Conversation.OPERATORS,
-        Conversation.SCHEDULE,
-    }
-)
-"""Conversations whose messages are sent once and must arrive: a subscriber that takes none of them blocks senders."""
-LARGE = frozenset({Conversation.FRAMES, Conversation.OUTPUTS, Conversation.VIEWS})
-"""Conversations of large values: listeners on the sender's host read them on its blackboard."""
+COPIED = frozenset({Conversation.TOLD, Conversation.FAR})
+"""Conversations of copies of messages that were sent at other keys."""
 
 
 @lru_cache(maxsize=4096)
@@ -113,6 +105,31 @@ def sender_of(of: str, token: str) -> str:
         'backbone/by'
     """
     return token.removeprefix(f"{of}/by/")
+
+
+def key_of_lossless(of: str, listener: str) -> str:
+    """Return the key of a listener that must get every message of these keys: of its token, and of what it is sent.
+
+    Example:
+        >>> key_of_lossless("scout/iros2001/resource_pool/*/frames", "1f")
+        'scout/iros2001/resource_pool/+/frames/all/1f'
+    """
+    return f"{of.replace('*', _ANY)}/all/{listener}"
+
+
+def keys_of_lossless(mission: str) -> str:
+    """Return the key expression of the tokens of all such listeners."""
+    return f"{ROOT}/{mission}/**/all/*"
+
+
+def listened_to(token: str) -> str:
+    """Return the keys that such a listener gets all messages of.
+
+    Example:
+        >>> listened_to("scout/iros2001/resource_pool/+/frames/all/1f")
+        'scout/iros2001/resource_pool/*/frames'
+    """
+    return token.rsplit("/", 2)[0].replace(_ANY, "*")
 
 
 def address_of(key_expression: str) -> str:

@@ -106,10 +106,7 @@ class OversizedMessage(Refusal):
     """The message is longer than its conversation admits."""
 
     code = "wire.oversized"
-    remedy = (
-        f"Keep messages under {MAX_MESSAGE_BYTES} bytes; outputs, frames and views under {MAX_LARGE_MESSAGE_BYTES},"
-        " which reach listeners of the same host only."
-    )
+    remedy = "Send less in one message, or use another conversation; docs/reference/messages.md has the limit of each."
 
 
 class UnwritableMessage(Refusal):
@@ -156,7 +153,7 @@ def write(envelope: Envelope[Message], most_bytes: int = MAX_MESSAGE_BYTES) -> b
     except OverflowError as error:
         raise UnwritableMessage(f"{type(envelope.body).__name__} has a whole number of more than 64 bits") from error
     if len(raw) > most_bytes:
-        raise OversizedMessage(f"{type(envelope.body).__name__} of {len(raw)} bytes", bytes=len(raw))
+        refuse_oversized(len(raw), most_bytes, type(envelope.body).__name__)
     return raw
 
 
@@ -170,14 +167,16 @@ def kinds_of(accepts: Accepts) -> tuple[type[Message], ...]:
     return typing.get_args(accepts) or (accepts,)
 
 
-def refuse_oversized(length: int, most_bytes: int = MAX_MESSAGE_BYTES) -> None:
-    """Return if a message of this length may be read; called before its bytes are copied out of the bus.
+def refuse_oversized(length: int, most_bytes: int = MAX_MESSAGE_BYTES, what: str = "message") -> None:
+    """Return if a message may have this length; called before its bytes are copied out of the bus.
 
     Raises:
         OversizedMessage: The message is longer than ``most_bytes``.
     """
     if length > most_bytes:
-        raise OversizedMessage(f"message of {length} bytes", bytes=length)
+        raise OversizedMessage(
+            f"{what} of {length} bytes, and {most_bytes} are the most here", bytes=length, most_bytes=most_bytes
+        )
 
 
 def plain(value: object) -> Any:

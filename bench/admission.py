@@ -16,7 +16,8 @@ from collections.abc import Callable, Sequence
 
 from measuring import report, summary
 
-from backbone.scheduling.response_time import Stream, admissible, utilization
+from backbone.scheduling.response_time import admissible
+from backbone.scheduling.streams import Stream, utilization
 
 PERIODS_S = (0.02, 0.2)  # a stick's commands to a dead man's sign of life
 SIZES = (5, 20, 100)

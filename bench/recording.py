@@ -1,8 +1,8 @@
 """What a recorder costs: its processor time, and context switches with and without it.
 
 Runs the mission of IROS 2001 with short slices several times: alone, with a recorder of everything, and with a process
-that overhears everything and keeps nothing, which is the floor. Asks the RC manager a question twenty times a second
-meanwhile. Prints one JSON line; ``core_share`` and ``floor_share`` are parts of one core, ``switch_ratio`` and
+that takes all copies of its host and keeps nothing, which is the floor. Asks the RC manager a question twenty times a
+second meanwhile. Prints one JSON line; ``core_share`` and ``floor_share`` are parts of one core, ``switch_ratio`` and
 ``question_ratio`` are medians with a recorder over those without.
 """
 
@@ -23,10 +23,9 @@ import psutil
 from measuring import BIN, report
 from switch_time import fast_mission, measure
 
-from backbone.launcher.mission_connection import connected
-from backbone.recording.hearing import to_overhear
+from backbone import run_files
+from backbone.recording.host_ear import HostEar
 from backbone.recording.reader import Recording, missing_numbers
-from backbone.recording.recorder import MOST_WAITING_BYTES
 
 SETTLE_S = 3.0  # chosen: the recorder's imports and its first questions are over
 
@@ -74,13 +73,13 @@ def busy_s(recorder: subprocess.Popen[bytes] | None) -> float:
 
 
 async def overhear() -> None:
-    """Overhear everything and keep nothing, until SIGINT."""
+    """Take all copies of this host and keep nothing, until SIGINT."""
     ended = asyncio.Event()
     asyncio.get_running_loop().add_signal_handler(signal.SIGINT, ended.set)
-    async with connected("switching", None, "ui_console/bench-ear") as (bus, _clock):
-        for conversation in to_overhear(()):
-            bus.overhear(conversation, lambda _key, _raw: None, MOST_WAITING_BYTES)
-        await ended.wait()
+    ear = HostEar(run_files.run_directory("switching"), is_of_mission=True)
+    await ear.open(lambda _key, _raw: None, lambda bug: print(bug, file=sys.stderr))
+    await ended.wait()
+    await ear.close()
 
 
 def main() -> None:
@@ -88,7 +87,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--rounds", type=int, default=2)
-    parser.add_argument("--overhear", action="store_true", help="be the process that only overhears")
+    parser.add_argument("--overhear", action="store_true", help="be the process that keeps nothing")
     given = parser.parse_args()
     if given.overhear:
         asyncio.run(overhear())

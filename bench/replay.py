@@ -23,7 +23,7 @@ from measuring import BIN, MISSION_XML, percentile, report
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import client_config, open_session
-from backbone.keys import ROOT, Conversation
+from backbone.keys import COPIED, ROOT, Conversation
 from backbone.recording.hearing import Hearing
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recording
@@ -31,7 +31,7 @@ from backbone.recording.reader import Recording
 BEFORE_S = 3.0  # chosen: the listener is there before the first message; seconds of the machine
 KNOWN_S = 0.1  # measured: a publisher knows of its first subscriber after 7 ms; seconds of the machine
 AFTER_S = 2.0  # chosen: the last message is long over; seconds of the machine
-HEARD = tuple(one for one in Conversation if one not in {Conversation.ASK, Conversation.TOLD, Conversation.ALIVE})
+HEARD = tuple(one for one in Conversation if one not in {Conversation.ASK, Conversation.ALIVE, *COPIED})
 MISSION = "replay-bench"
 Sent = tuple[str, str, int]
 """Key without the mission, source, number."""

@@ -30,6 +30,7 @@ from backbone.bus.interface import (
 from backbone.component.messages import Register, Registered
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
+from backbone.quality import Quality
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from resource_pool.arc_client import SwappedOut
 
@@ -116,6 +117,10 @@ class GatedBus:
         if self.is_open:
             self.bus.publish(address, conversation, message)
 
+    def declare_quality(self, address: str, conversation: Conversation, quality: Quality) -> None:
+        """Send the messages of a key in another quality; see ``Bus.declare_quality``."""
+        self.bus.declare_quality(address, conversation, quality)
+
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Pass on through the open gate; see ``Bus.pass_on``."""
         if self.is_open:
@@ -134,16 +139,31 @@ class GatedBus:
         return self.bus.declare_alive(address) if self.is_first else NoDeclaration()
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
+        self,
+        address: str,
+        conversation: Conversation,
+        accepts: Accepts,
+        listener: Listener,
+        *,
+        latest: bool = False,
+        lossless: bool = False,
     ) -> Subscription:
         """Hear publications; see ``Bus.subscribe``."""
-        return self._keep(self.bus.subscribe(address, conversation, accepts, self._mine(listener), latest=latest))
+        heard = self._mine(listener)
+        return self._keep(self.bus.subscribe(address, conversation, accepts, heard, latest=latest, lossless=lossless))
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overhearing:
         """Overhear; see ``Bus.overhear``."""
-        return self._keep(self.bus.overhear(conversation, self._mine(listener), most_waiting_bytes, of))
+        heard = self._mine(listener)
+        return self._keep(self.bus.overhear(conversation, heard, most_waiting_bytes, of, lossless=lossless))
 
     def watch_alive(self, address: str, listener: LifeListener) -> Subscription:
         """Watch tokens; see ``Bus.watch_alive``."""
@@ -167,6 +187,10 @@ class GatedBus:
     def statistics(self) -> BusStatistics:
         """Return the counts of the component."""
         return self.bus.statistics()
+
+    def dropped(self) -> dict[str, int]:
+        """Return what the component did not get; see ``Bus.dropped``."""
+        return self.bus.dropped()
 
     async def close(self) -> None:
         """Hear nothing more; the component's bus stays open."""

@@ -16,6 +16,7 @@ import logging
 import operator
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, TypeVar
+from zlib import crc32
 
 import msgspec
 
@@ -32,7 +33,7 @@ from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import (
-    BEAT_EVERY_S,
+    BEAT_WITHIN_S,
     AskRequest,
     Beat,
     ChangeRuntime,
@@ -47,6 +48,7 @@ from backbone.rc_manager.messages import (
     Withdraw,
 )
 from backbone.scheduling.requests import Usage
+from backbone.waiting import set_within
 from backbone.wire import Accepts, Envelope, Message, kinds_of
 from resource_pool.arc_request import ROBOT, ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
@@ -84,7 +86,8 @@ log = logging.getLogger(__name__)
 W = TypeVar("W")
 
 OWNER_GONE_S = 0.5  # chosen: a robot is free within a second of its console's death; a new hub is found sooner
-OWNER_BEAT_S = 0.9  # chosen: less than the RC manager's limit of 1 s for a beat, with one beat to spare
+OWNER_BEAT_S = 0.9  # chosen: an owner that answers later has missed a beat; less than the RC manager's limit
+BEAT_SPREAD_S = 0.2  # chosen: all ARCs get a renewal at once; their owners and the hub answer a few at a time
 PREPARE_S = 0.9  # chosen: less than the RC manager's limit for the opening, so the gate opens in time or never
 RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # parameters that may change while it runs
 ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; after this it has missed one
@@ -121,7 +124,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._asked = asyncio.Event()
         self._notices = OwnerNotices(bus, clock, self._owner, self.story.note)
         self._lease = SetLease(self.name, clock.rate)
-        self._leased = asyncio.Event()
+        self._leased, self._renewed = asyncio.Event(), asyncio.Event()
         self._slice = ArcSlice(bus, clock, self._gate, self._owner, longest_s=self._longest_s, note=self.story.note)
         self._offering: asyncio.Task[None] | None = None
         self._manager: PeerMonitor | None = None
@@ -418,6 +421,7 @@ class AggregateResourceController(Component[ArcParameters]):
     # ------------------------------------------------------------------ watching
 
     def _heard_leases(self, envelope: Envelope[Leases]) -> None:
+        self._renewed.set()
         if self._lease.heard(envelope.body, envelope.stamp_s, self._gate.epochs):
             self.publish_event(self.name, "is counted as running and holds nothing: sends its request again")
             self.start_task(self._ask_anew(), "ask anew")
@@ -450,8 +454,10 @@ class AggregateResourceController(Component[ArcParameters]):
         self.end(f"its owner {self._owner} is gone")
 
     async def _beat(self) -> None:
-        """Publish a heartbeat while this ARC and its owner live."""
+        """Publish a heartbeat after each renewal of leases, while this ARC and its owner live."""
+        place_s = crc32(self.name.encode()) % 1000 / 1000 * BEAT_SPREAD_S
         while True:
+            self._renewed.clear()
             try:
                 await self.bus.ask(self._owner, AskBeat(self._arc_state()), Noted, within_s=OWNER_BEAT_S)
             except Refusal as refusal:
@@ -460,7 +466,8 @@ class AggregateResourceController(Component[ArcParameters]):
                 self.story.note(self._owner, f"does not answer: {error}")
             else:
                 self.bus.publish(self.address, Conversation.BEAT, Beat(self.name))
-            await self.clock.sleep_s(BEAT_EVERY_S * self.clock.rate)
+            if await set_within(self._renewed, BEAT_WITHIN_S):
+                await self.clock.sleep_s(place_s * self.clock.rate)
 
     async def _watch_rc_manager(self) -> None:
         """Send the request again if a restarted RC manager has not asked for it."""

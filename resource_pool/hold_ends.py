@@ -54,6 +54,7 @@ class HoldEnds:
         self.faults = 0
         self._rc = rc
         self._unsafe: dict[str, Hold] = {}
+        self._remark = ""
 
     def unsafe(self, arc: str) -> Hold | None:
         """Return the ended hold of this ARC, if the resource is not safe after it."""
@@ -97,9 +98,16 @@ class HoldEnds:
         for hold in list(self._unsafe.values()):
             await self.end(hold, "made up for")
 
+    def remark(self, line: str) -> None:
+        """Report this line of the driver behind the holders from now on."""
+        if line != self._remark:
+            self._remark = line
+            self.report_holders()
+
     def report_holders(self) -> None:
         """Report who holds the RC, and after whom it is not safe."""
         holders = ", ".join(hold.arc for hold in self._rc.holds.holds())
         unsafe = f", not safe after {', '.join(self._unsafe)}" if self._unsafe else ""
-        self._rc.report(f"held by {holders}{unsafe}" if holders else f"free{unsafe}")
+        remark = f"; {self._remark}" if self._remark else ""
+        self._rc.report(f"held by {holders}{unsafe}{remark}" if holders else f"free{unsafe}{remark}")
         self._rc.changed()  # the holder may be the same with a new epoch

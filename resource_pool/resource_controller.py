@@ -191,6 +191,7 @@ class ResourceController(Component[R], Generic[R]):
             lambda what: self.publish_event(self.name, what),
             self.fail,
             folder,
+            self._ends.remark,
         )
 
     def make_driver(self, name: str = "") -> Any:

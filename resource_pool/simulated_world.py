@@ -190,4 +190,4 @@ class SimulatedWorld(Component[WorldParameters]):
         on_since = {robot: since for robot, (_, since) in self._on_since.items()}
         motors = {robot: motors for robot in transmitting if (motors := round(self._world.motors(robot), 2))}
         state = WorldState(frame, at_s, self._world.state().tobytes(), transmitting, on_since, motors)
-        self.bus.publish(self.address, Conversation.TELEMETRY, state)
+        self.bus.publish(self.address, Conversation.BODIES, state)

@@ -20,6 +20,8 @@ from hypothesis import settings
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Clock
 from backbone.bus.local_bus import LocalNetwork
+from backbone.command_line import mission_console
+from backbone.component import process
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.nameserver.service import Nameserver
@@ -44,6 +46,19 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 MissionNetwork = Callable[..., AbstractAsyncContextManager[LocalNetwork]]
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _own_threads_of_zenoh() -> Iterator[None]:
+    """Keep zenoh's own threads in this process, in which many tests have their hub.
+
+    A command that a test calls here would leave a client's two threads for all tests after it: then a question of the
+    hub's process waits for itself.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (mission_console, process):
+            patch.setattr(module, "few_threads", lambda: None)
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.bus.local_bus import LocalBus, LocalNetwork, Overheard
+from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.bus.neighbor_declarations import Overheard
 from backbone.keys import Conversation
 from backbone.keys import key as key_of
 from backbone.mission.model import MissionDescription
@@ -70,7 +71,7 @@ def record_seed(seed: int, *, chaos: bool, is_supervised: bool = False) -> tuple
 
         def arrived(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
             if self.hears(address, conversation):
-                writer.write(key_of(self.owner.network.mission, address, conversation), write(envelope), 0.0)
+                writer.write(key_of(self.owner.mission, address, conversation), write(envelope), 0.0)
 
     simulated = supervised_mission if is_supervised else mission_run
     name = "LinkedNetwork" if is_supervised else "UnreliableNetwork"
@@ -82,7 +83,7 @@ def record_seed(seed: int, *, chaos: bool, is_supervised: bool = False) -> tuple
             super().__init__(*args)
             bus = LocalBus(self, "backbone/recorder", VirtualClock())
             for conversation in to_overhear(()):
-                self.overhearers.append(Witness(bus, conversation, lambda _key, _raw: None, 0, ""))
+                self.overhearers.append(Witness(bus, lambda: None, conversation, lambda _key, _raw: None, 0, ""))
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(simulated, name, WitnessedNetwork)

@@ -4,34 +4,19 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from backbone.command_line.options import (
-    CommandTable,
-    SecretFile,
-    Version,
-    chosen,
-    complete_behavior,
-    complete_mission,
-    finite,
-    hub_endpoint,
-    names_for,
-    run,
-    run_table,
-)
+from backbone.command_line.options import CommandTable, SecretFile, Version, chosen, run, run_table
 from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode, say
+from ui_console import options as words
 from ui_console.model.profile import Profile, Sight
 
 SIGHTS = {Profile.TERMINAL: Sight.PICTURES, Profile.PENDANT: Sight.BROADCAST, Profile.HEADLESS: Sight.BROADCAST}
 """With a screen, pictures come to this machine; a person without one looks at a video monitor, or at the robot."""
 
 WEB_PORT = 8420  # chosen: free on most machines
-LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
-LONGEST_WAIT_S = 86_400.0  # chosen: a day, as in a mission file
-SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
@@ -45,24 +30,6 @@ app = typer.Typer(
 )
 
 
-def complete_robot(ctx: typer.Context) -> list[str]:
-    """Return the robots of the mission that is up, for a shell."""
-    names = names_for(ctx)
-    return names.robots if names is not None else []
-
-
-Mission = Annotated[
-    str | None,
-    typer.Option("--mission", autocompletion=complete_mission, help="Name of a mission that is up on this machine."),
-]
-Connect = Annotated[
-    str | None, typer.Option("--connect", callback=hub_endpoint, help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")
-]
-
-
-User = Annotated[str, typer.Option("--user", help="Who you are, for the record; default: who is logged in.")]
-
-
 @app.callback()
 def _before_each_command(version: Version = False) -> None:
     """Read the options that go before a command."""
@@ -70,49 +37,20 @@ def _before_each_command(version: Version = False) -> None:
 
 @app.command()
 def attach(
-    robot: Annotated[
-        str,
-        typer.Argument(autocompletion=complete_robot, help="Robot to take over; none: any free one with a camera."),
-    ] = "",
-    priority: Annotated[
-        int, typer.Option(min=LEAST_PRIORITY, max=MOST_PRIORITY, help="Beside the mission's own; larger is higher.")
-    ] = 100,
-    profile: Annotated[Profile, typer.Option(help="How the console looks.")] = Profile.TERMINAL,
-    script: Annotated[str, typer.Option(help="Drive by the JSON lines of this file, '-' for standard input.")] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="JSON lines, no screen; implies --script -.")] = False,
-    within: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            max=LONGEST_WAIT_S,
-            callback=finite,
-            help="Mission seconds a script waits for the grant; 0: for ever.",
-        ),
-    ] = 0.0,
-    minimum_runtime: Annotated[
-        float,
-        typer.Option(
-            min=SHORTEST_RUNTIME_S,
-            max=LONGEST_WAIT_S,
-            callback=finite,
-            help="Shortest useful time beside equals, seconds.",
-        ),
-    ] = 5.0,
-    kind: Annotated[str, typer.Option(help="Kind of ARC; default: the robot's, for what the console shows.")] = "",
-    away_after: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            max=LONGEST_WAIT_S,
-            callback=finite,
-            help="Give the robot back when no key was pressed for so many seconds; 0: never.",
-        ),
-    ] = AWAY_AFTER_S,
-    video_only: Annotated[bool, typer.Option("--video-only", help="Begin with the picture alone.")] = False,
-    gamepad: Annotated[bool, typer.Option("--gamepad", help="Drive by the gamepad of this machine, too.")] = False,
-    user: User = "",
-    mission: Mission = None,
-    connect: Connect = None,
+    robot: words.Robot = "",
+    priority: words.Priority = 100,
+    profile: words.ProfileName = Profile.TERMINAL,
+    script: words.Script = "",
+    as_json: words.ScriptAsJson = False,
+    within: words.Within = 0.0,
+    minimum_runtime: words.MinimumRuntime = 5.0,
+    kind: words.Kind = "",
+    away_after: words.AwayAfter = AWAY_AFTER_S,
+    video_only: words.VideoOnly = False,
+    gamepad: words.Gamepad = False,
+    user: words.User = "",
+    mission: words.Mission = None,
+    connect: words.Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
     """Take over a robot, drive it, give it back."""
@@ -145,15 +83,12 @@ def attach(
 
 @app.command()
 def monitor(
-    as_json: Annotated[bool, typer.Option("--json", help="JSON lines instead of a screen.")] = False,
-    once: Annotated[bool, typer.Option("--once", help="All that screens show now, as one JSON object.")] = False,
-    recording: Annotated[
-        Path | None,
-        typer.Option(help="Watch this recording instead: play it, go to any time, ask why; nothing needs to be up."),
-    ] = None,
-    user: User = "",
-    mission: Mission = None,
-    connect: Connect = None,
+    as_json: words.WatchAsJson = False,
+    once: words.Once = False,
+    recording: words.WatchedRecording = None,
+    user: words.User = "",
+    mission: words.Mission = None,
+    connect: words.Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
     """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
@@ -170,20 +105,13 @@ def monitor(
 
 @app.command()
 def look(
-    behavior: Annotated[str, typer.Argument(autocompletion=complete_behavior, help="A behavior of the mission.")],
-    view: Annotated[str, typer.Argument(help="One of its debug views; none: list them with their newest values.")] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="The list as one JSON object; a view as JSON lines.")] = False,
-    save: Annotated[
-        Path | None, typer.Option(help="Save one picture of the view and end.", metavar="FILE.png", dir_okay=False)
-    ] = None,
-    for_s: Annotated[
-        float,
-        typer.Option(
-            "--for", min=0.0, max=LONGEST_WAIT_S, callback=finite, help="End after so many seconds; 0: at Ctrl-C."
-        ),
-    ] = 0.0,
-    mission: Mission = None,
-    connect: Connect = None,
+    behavior: words.Behavior,
+    view: words.View = "",
+    as_json: words.LookAsJson = False,
+    save: words.Save = None,
+    for_s: words.LooksFor = 0.0,
+    mission: words.Mission = None,
+    connect: words.Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
     """Look into a behavior: the pictures and values that it goes by, live; it makes them only while you look."""
@@ -197,57 +125,19 @@ def look(
 
 @app.command()
 def serve(
-    host: Annotated[
-        str, typer.Option(help="Address to listen at; beyond this machine only if you say so, 0.0.0.0 is all.")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any that is free.")] = WEB_PORT,
-    priority: Annotated[
-        int,
-        typer.Option(
-            min=LEAST_PRIORITY,
-            max=MOST_PRIORITY,
-            help="The most an operator may ask for, beside the mission's own.",
-        ),
-    ] = 100,
-    operator: Annotated[
-        list[str] | None,
-        typer.Option(help="NAME=PRIORITY: a token for this operator alone; again for each. Default: one for all."),
-    ] = None,
-    certificate: Annotated[
-        str, typer.Option(help="PEM file with a certificate: the page is served over HTTPS.", metavar="FILE")
-    ] = "",
-    key: Annotated[
-        str, typer.Option(help="PEM file with its key; default: it is in the certificate's file.", metavar="FILE")
-    ] = "",
-    design: Annotated[
-        str, typer.Option(help="Serve the designer of this mission file instead; nothing needs to be up.")
-    ] = "",
-    recording: Annotated[
-        Path | None,
-        typer.Option(help="Serve this recording instead: play it, go to any time, ask why; nothing needs to be up."),
-    ] = None,
-    kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim; default: the robot's.")] = "",
-    new_tokens: Annotated[
-        bool,
-        typer.Option("--new-tokens", help="Forget the tokens of the server before; its open pages do not come back."),
-    ] = False,
-    away_after: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            max=LONGEST_WAIT_S,
-            callback=finite,
-            help="Give a robot back when its operator touched nothing for so many seconds; 0: never.",
-        ),
-    ] = AWAY_AFTER_S,
-    mission: Annotated[
-        list[str] | None,
-        typer.Option(
-            autocompletion=complete_mission,
-            help="Name of a mission that is up on this machine; again for each of several, each with its own page.",
-        ),
-    ] = None,
-    connect: Connect = None,
+    host: words.Host = "127.0.0.1",
+    port: words.Port = WEB_PORT,
+    priority: words.HighestPriority = 100,
+    operator: words.OperatorPriorities = None,
+    certificate: words.Certificate = "",
+    key: words.Key = "",
+    design: words.DesignedFile = "",
+    recording: words.ServedRecording = None,
+    kind: words.ServedKind = "",
+    new_tokens: words.NewTokens = False,
+    away_after: words.PageAwayAfter = AWAY_AFTER_S,
+    mission: words.Missions = None,
+    connect: words.Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
     """Serve the console, the mission designer (--design) or a recording as a web page, for any browser."""
@@ -259,11 +149,7 @@ def serve(
         raise _usage(f"--operator {wrong}") from wrong
     if key and not certificate:
         raise _usage("--key belongs to a --certificate")
-    if (design or recording) and (mission or connect is not None):
-        raise _usage("--design and --recording serve a file; --mission and --connect are for missions that are up")
-    names: list[str | None] = list(mission) if mission else [None]
-    if (connect is not None and len(names) > 1) or len(set(names)) < len(names):
-        raise _usage("several --mission have different names, and are up on this machine, without --connect")
+    names = _missions_to_serve(mission, is_elsewhere=connect is not None, is_file=bool(design or recording))
     if design and recording:
         raise _usage("--design and --recording cannot be served by one server")
     try:
@@ -294,6 +180,16 @@ def design(ctx: typer.Context) -> None:
 def main() -> None:
     """Run the command line."""
     run_table(app)
+
+
+def _missions_to_serve(mission: list[str] | None, *, is_elsewhere: bool, is_file: bool) -> list[str | None]:
+    """Return the names of the missions; None: the only one that is up."""
+    if is_file and (mission or is_elsewhere):
+        raise _usage("--design and --recording serve a file; --mission and --connect are for missions that are up")
+    names: list[str | None] = list(mission) if mission else [None]
+    if (is_elsewhere and len(names) > 1) or len(set(names)) < len(names):
+        raise _usage("several --mission have different names, and are up on this machine, without --connect")
+    return names
 
 
 def _watch(where: Where, user: str, *, as_json: bool) -> None:

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from backbone.bus.interface import Answer, BusStatistics, Clock, Copies, Listener, Told, current_cause
 from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
 from backbone.keys import Conversation
+from backbone.quality import QUALITY, Quality
 from backbone.ranges import MOST_FEW, MOST_QUOTED_BYTES
 from backbone.waiting import settle
 from backbone.wire import WIRE_VERSION, Envelope, Message, OversizedMessage, Refused, UnwritableMessage, write
@@ -36,6 +37,7 @@ class BusBase(ABC):
         self._open_questions: dict[asyncio.Future[Any], None] = {}
         self._untold: list[tuple[str, Conversation, Sequence[Envelope[Message]]]] = []
         self._closing: asyncio.Task[None] | None = None
+        self._qualities: dict[tuple[str, Conversation], Quality] = {}
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
         """Callback for an exception that is no refusal."""
         self.closed = False
@@ -52,6 +54,14 @@ class BusBase(ABC):
         return BusStatistics(
             self.asked, self.answered, self.published, self.heard, self.refused, self.unreadable, self.told
         )
+
+    def declare_quality(self, address: str, conversation: Conversation, quality: Quality) -> None:
+        """Send the messages of this key in another quality; see ``Bus.declare_quality``."""
+        self._qualities[address, conversation] = quality
+
+    def quality(self, address: str, conversation: Conversation) -> Quality:
+        """Return the quality in which this bus sends the messages of a key."""
+        return self._qualities.get((address, conversation)) or QUALITY[conversation]
 
     def envelope(self, body: Message) -> Envelope[Message]:
         """Return the body in an envelope with the next sequence number, now, and the current cause."""
@@ -183,6 +193,10 @@ class BusBase(ABC):
     @abstractmethod
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether a component hears what this bus publishes in this conversation at its own address."""
+
+    @abstractmethod
+    def dropped(self) -> dict[str, int]:
+        """Return the messages that listeners did not get, by key; see ``Bus.dropped``."""
 
     @abstractmethod
     def take_back(self) -> None:

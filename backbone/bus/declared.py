@@ -5,15 +5,19 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from backbone.bus.inbox import InboxBus
+from backbone.bus.inbox import InboxBus, Receiving
 from backbone.waiting import settle
 
 
 class Declaration:
-    """A zenoh entity that can be withdrawn once; None if no entity was needed."""
+    """A zenoh entity that can be withdrawn once; None if no entity was needed.
 
-    def __init__(self, entity: Any, register: set[Declaration]) -> None:
-        self._entity, self._register = entity, register
+    Attributes:
+        receiver: What receives the samples of a subscription to one conversation; None: it is something else.
+    """
+
+    def __init__(self, entity: Any, register: set[Declaration], receiver: Receiving | None = None) -> None:
+        self._entity, self._register, self.receiver = entity, register, receiver
 
     @property
     def stands(self) -> bool:

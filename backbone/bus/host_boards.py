@@ -37,9 +37,9 @@ class HostBoards:
         self._directory, self._loop = directory / FOLDER, asyncio.get_running_loop()
         self.neighbors = neighbors
 
-    def board(self, key: str, source: str) -> SentBoard:
+    def board(self, key: str, source: str, least_bytes: int = LARGE_BYTES) -> SentBoard:
         """Return where a sender leaves the large values of a key; the board is opened with the first one."""
-        return SentBoard(self._directory, _name(key, source), self._loop)
+        return SentBoard(self._directory, _name(key, source), self._loop, least_bytes)
 
     def look(self, key: str, source: str) -> BlackboardReader | None:
         """Return a new reader of a sender's board; None: it has none on this host."""
@@ -53,8 +53,8 @@ class HostBoards:
 class SentBoard:
     """The board of one sender for one key, if its values are large."""
 
-    def __init__(self, directory: Path, name: str, loop: asyncio.AbstractEventLoop) -> None:
-        self._directory, self._name, self._loop = directory, name, loop
+    def __init__(self, directory: Path, name: str, loop: asyncio.AbstractEventLoop, least_bytes: int) -> None:
+        self._directory, self._name, self._loop, self._least_bytes = directory, name, loop, least_bytes
         self._writer: BlackboardWriter | None = None
         self._try_again_s = 0.0
 
@@ -70,7 +70,7 @@ class SentBoard:
 
     def put(self, raw: bytes) -> bool:
         """Give the readers this value; return whether the board was opened for it."""
-        is_new = self._writer is None and len(raw) >= LARGE_BYTES and self._open()
+        is_new = self._writer is None and len(raw) >= self._least_bytes and self._open()
         if self._writer is not None:
             self._writer.keeps = len(raw) > MAX_MESSAGE_BYTES  # a listener may learn of the board by this value
             try:

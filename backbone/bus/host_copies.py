@@ -2,6 +2,9 @@
 
 The recorder listens in the mission's folder on its host, which only the mission's user can enter. A copy is dropped and
 counted rather than waited for. Each copy is a header, its key and the bytes of its envelope.
+
+The recorder of the mission has another socket than the recorder of one of its other hosts: a process whose copies go to
+the first needs to tell nobody else, see ``zenoh_far_copies``.
 """
 
 from __future__ import annotations
@@ -15,17 +18,61 @@ import struct
 from collections import deque
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from backbone.keys import Conversation
+from backbone.wire import MAX_MESSAGE_BYTES
 
-ALL_SOCKET, PICTURES_SOCKET = "all.sock", "pic.sock"  # as long as the hub's name, whose path is checked to be possible
+MISSION_SOCKET, HOST_SOCKET = "all.sock", "own.sock"  # no longer than the hub's name, whose path is checked
 PICTURES = frozenset({Conversation.FRAMES, Conversation.VIEWS})
 HEADER = struct.Struct("<IIH")
 """Length of the envelope, copies dropped so far (modulo 2³²), length of the key."""
 MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: a quarter of a second of four cameras in color, and no burden for an RC
+SMALL_BYTES = 4096  # chosen: to copy a page takes less than a second call of the system
 LOOK_EACH_S = 1.0  # chosen: a recorder that begins late misses so much of a process that speaks; a look takes 20 µs
 
 log = logging.getLogger(__name__)
+
+
+class Copy(NamedTuple):
+    """A copy as it arrives.
+
+    Attributes:
+        key: Of the message.
+        raw: Its envelope.
+        dropped: Copies that its sender dropped before it.
+        end: Where the next copy begins.
+    """
+
+    key: str
+    raw: bytes
+    dropped: int
+    end: int
+
+
+def header_of(key: str, raw: bytes, dropped: int = 0) -> bytes:
+    """Return what stands before the bytes of an envelope in a copy."""
+    name = key.encode()
+    return HEADER.pack(len(raw), dropped % 2**32, len(name)) + name
+
+
+def copy_at(came: bytes | bytearray, at: int) -> Copy | None:
+    """Return the copy that begins at this place; None: it is not whole yet.
+
+    Raises:
+        ConnectionError: No copy begins there.
+        UnicodeDecodeError: Same.
+    """
+    if len(came) - at < HEADER.size:
+        return None
+    length, dropped, key_length = HEADER.unpack_from(came, at)
+    if length > MAX_MESSAGE_BYTES:
+        raise ConnectionError(f"a copy of {length} bytes")
+    middle = at + HEADER.size + key_length
+    end = middle + length
+    if end > len(came):
+        return None
+    return Copy(came[at + HEADER.size : middle].decode(), bytes(came[middle:end]), dropped, end)
 
 
 class HostCopies:
@@ -38,33 +85,34 @@ class HostCopies:
     def __init__(self, directory: Path) -> None:
         self._directory, self._loop = directory, asyncio.get_running_loop()
         self._socket: socket.socket | None = None
-        self._only: frozenset[Conversation] | None = None
         self._waiting: deque[memoryview] = deque()
         self._waiting_bytes = 0
         self._is_full = False
         self._look_again_s = -math.inf
         self.dropped = 0
         """Copies for which the recorder had no time."""
+        self.reach_mission = False
+        """Whether the copies go to the recorder of the mission, not to that of one of its other hosts."""
         self._connect()
 
-    def wants(self, conversation: Conversation) -> bool:
-        """Return whether a recorder of this host listens to this conversation; looks for one from time to time.
+    def find_recorder(self) -> bool:
+        """Return whether a recorder of this host listens; looks for one from time to time.
 
         So a process that says nothing is not woken for it.
         """
         if self._socket is None and self._loop.time() >= self._look_again_s:
             self._connect()
-        return self._socket is not None and (self._only is None or conversation in self._only)
+        return self._socket is not None
 
     def send(self, key: str, raw: bytes) -> None:
         """Send a copy, or drop it if too much waits. Never waits."""
         if self._socket is None:
             return
-        name = key.encode()
         if self._waiting and self._waiting_bytes + len(raw) > MOST_WAITING_BYTES:
             self.dropped += 1
             return
-        for part in (HEADER.pack(len(raw), self.dropped % 2**32, len(name)) + name, raw):
+        header = header_of(key, raw, self.dropped)
+        for part in (header, raw) if len(raw) > SMALL_BYTES else (header + raw,):
             self._waiting.append(memoryview(part))
             self._waiting_bytes += len(part)
         if not self._is_full:
@@ -77,7 +125,7 @@ class HostCopies:
 
     def _connect(self) -> None:
         self._look_again_s = self._loop.time() + LOOK_EACH_S
-        for name, only in ((ALL_SOCKET, None), (PICTURES_SOCKET, PICTURES)):
+        for name in (MISSION_SOCKET, HOST_SOCKET):
             made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             made.setblocking(False)
             try:
@@ -85,7 +133,7 @@ class HostCopies:
             except OSError:
                 made.close()
             else:
-                self._socket, self._only = made, only
+                self._socket, self.reach_mission = made, name == MISSION_SOCKET
                 return
 
     def _disconnect(self) -> None:

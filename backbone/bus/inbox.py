@@ -11,11 +11,12 @@ from typing import Any, Protocol, TypeVar
 from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Clock, Listener, Overhearer, Subscription
 from backbone.errors import Refusal
-from backbone.wire import Accepts, Envelope, Message, Reader, Refused, refuse_oversized
+from backbone.wire import MAX_MESSAGE_BYTES, Accepts, Envelope, Message, Reader, Refused, refuse_oversized
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 
+MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: of one listener; seconds of what a component gets at its busiest
 GATHER_S = 0.05  # chosen: who overhears a mission is woken twenty times a second, however much is said
 
 
@@ -38,6 +39,10 @@ class Sample(Protocol):
     @property
     def payload(self) -> Payload:
         """Its bytes."""
+
+    @property
+    def attachment(self) -> Payload | None:
+        """Bytes that travel with it."""
 
 
 class InboxBus(BusBase):
@@ -85,22 +90,62 @@ class InboxBus(BusBase):
         self._inbox.clear()
 
 
-class EachSample:
-    """Receives every sample of a subscriber, in order."""
+class Receiving(Protocol):
+    """What receives the messages of a subscription."""
 
-    def __init__(self, bus: InboxBus, reader: Reader[Message], listener: Listener) -> None:
-        self._bus, self._reader, self._listener = bus, reader, listener
+    @property
+    def of(self) -> str:
+        """Key, or pattern of keys."""
+
+    @property
+    def dropped(self) -> int:
+        """Messages that came for it and were not handed over."""
+
+
+class EachSample:
+    """Receives every sample of a subscriber, in order, as long as no more than ``MOST_WAITING_BYTES`` wait.
+
+    Args:
+        of: Key, or pattern of keys, that it is subscribed to.
+        most_bytes: A longer message is not read.
+    """
+
+    def __init__(
+        self,
+        bus: InboxBus,
+        of: str,
+        reader: Reader[Message],
+        listener: Listener,
+        most_bytes: int = MAX_MESSAGE_BYTES,
+    ) -> None:
+        self._bus, self.of, self._reader, self._listener, self._most = bus, of, reader, listener, most_bytes
+        self._came = self._went = 0  # bytes; each is written by one thread only
+        self._dropped = 0
+
+    @property
+    def dropped(self) -> int:
+        """Samples that came and were not handed over, because others waited or newer ones came."""
+        return self._dropped
 
     def __call__(self, sample: Sample) -> None:
         """Take a sample in; called from another thread."""
-        self._bus.push(self.hand_over, sample)
+        length = len(sample.payload)
+        if self._came - self._went + length > MOST_WAITING_BYTES:
+            self._dropped += 1
+            return
+        self._came += length
+        self._bus.push(self._hand_over_one, sample)
 
-    def hand_over(self, sample: Sample) -> None:
-        """Read the sample and call the listener."""
+    def _hand_over_one(self, sample: Sample) -> None:
+        self._went += len(sample.payload)
+        self.hand_over(str(sample.key_expr), sample.payload)
+
+    def hand_over(self, key: str, payload: Payload) -> None:
+        """Read a message and call the listener."""
         try:
-            envelope = self._reader.read(bytes_of(sample.payload))
+            envelope = self._reader.read(bytes_of(payload, self._most), self._most)
         except Refusal as unreadable:
-            self.count_unreadable(sample.key_expr, unreadable)
+            self.count_unreadable(key, unreadable)
             return
         self.deliver(envelope)
 
@@ -108,7 +153,7 @@ class EachSample:
         """Call the listener."""
         self._bus.hear(self._listener, envelope)
 
-    def count_unreadable(self, key: object, refusal: Refusal) -> None:
+    def count_unreadable(self, key: str, refusal: Refusal) -> None:
         """Count and log a publication that cannot be read."""
         self._bus.unreadable += 1
         log.warning("unreadable publication on %s: %s", key, refusal.detail)
@@ -135,13 +180,16 @@ class OverheardSamples:
             self._dropped += 1
             return
         self._came += length
-        self._bus.gather(self._hand_over, sample)
+        self._bus.gather(self._hand_over_one, sample)
 
-    def _hand_over(self, sample: Sample) -> None:
-        raw = sample.payload.to_bytes()
-        self._went += len(raw)
+    def _hand_over_one(self, sample: Sample) -> None:
+        self._went += len(sample.payload)
+        self.hand_over(str(sample.key_expr), sample.payload)
+
+    def hand_over(self, key: str, payload: Payload) -> None:
+        """Call the listener with the bytes of a message."""
         self._bus.heard += 1
-        self._bus.call("", self._listener, str(sample.key_expr), raw)
+        self._bus.call("", self._listener, key, payload.to_bytes())
 
     def close(self) -> None:
         """Withdraw the subscription."""
@@ -156,14 +204,23 @@ class LatestSample(EachSample):
     before it reads the flag, and the loop clears the flag before it takes samples out.
     """
 
-    def __init__(self, bus: InboxBus, reader: Reader[Message], listener: Listener) -> None:
-        super().__init__(bus, reader, listener)
+    def __init__(
+        self,
+        bus: InboxBus,
+        of: str,
+        reader: Reader[Message],
+        listener: Listener,
+        most_bytes: int = MAX_MESSAGE_BYTES,
+    ) -> None:
+        super().__init__(bus, of, reader, listener, most_bytes)
         self._newest: dict[str, Sample] = {}
         self._pushed = False
 
     def __call__(self, sample: Sample) -> None:
         """Take a sample in; called from another thread."""
-        self._newest[str(sample.key_expr)] = sample
+        name = str(sample.key_expr)
+        self._dropped += name in self._newest
+        self._newest[name] = sample
         if not self._pushed:
             self._pushed = True
             self._bus.push(self._hand_over_newest, None)
@@ -172,10 +229,10 @@ class LatestSample(EachSample):
         self._pushed = False
         taken = [self._newest.popitem()[1] for _ in range(len(self._newest))]
         for sample in reversed(taken):
-            self.hand_over(sample)
+            self.hand_over(str(sample.key_expr), sample.payload)
 
 
-def bytes_of(payload: Payload | None) -> bytes:
+def bytes_of(payload: Payload | None, most_bytes: int = MAX_MESSAGE_BYTES) -> bytes:
     """Return the payload; a payload that is too long is not copied.
 
     Raises:
@@ -183,7 +240,7 @@ def bytes_of(payload: Payload | None) -> bytes:
     """
     if payload is None:
         return b""
-    refuse_oversized(len(payload))
+    refuse_oversized(len(payload), most_bytes)
     return payload.to_bytes()
 
 

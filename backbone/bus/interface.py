@@ -16,6 +16,7 @@ from contextvars import ContextVar
 from typing import Annotated, Any, Protocol, TypeVar, overload
 
 from backbone.keys import Conversation
+from backbone.quality import Quality
 from backbone.ranges import FEW, Count, Mention, Quoted
 from backbone.wire import Accepts, Envelope, Message
 
@@ -112,6 +113,15 @@ class Bus(Protocol):
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender to all present subscribers, as it was: for replays."""
 
+    def declare_quality(self, address: str, conversation: Conversation, quality: Quality) -> None:
+        """Send the messages of this key in another quality than its conversation's; before the first of them."""
+
+    def dropped(self) -> dict[str, int]:
+        """Return the number of messages that came for listeners of this bus and were not handed to them.
+
+        Keys are those subscribed to, without ``scout/<mission>/``; those without a loss are left out.
+        """
+
     @overload
     def subscribe(
         self,
@@ -121,6 +131,7 @@ class Bus(Protocol):
         listener: Callable[[Envelope[Kind]], None],
         *,
         latest: bool = False,
+        lossless: bool = False,
     ) -> Subscription: ...
 
     @overload
@@ -132,20 +143,37 @@ class Bus(Protocol):
         listener: Callable[[Envelope[Message]], None],
         *,
         latest: bool = False,
+        lossless: bool = False,
     ) -> Subscription: ...
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
+        self,
+        address: str,
+        conversation: Conversation,
+        accepts: Accepts,
+        listener: Listener,
+        *,
+        latest: bool = False,
+        lossless: bool = False,
     ) -> Subscription:
         """Call the listener, in the event loop, with each publication under this address (``*`` matches a segment).
 
         Args:
             latest: Keep only the newest undelivered publication of each address (pictures, states); else all, in
-                the order of each source.
+                the order of each source, as long as no more than ``MOST_WAITING_BYTES`` wait.
+            lossless: Get each message that is sent while its sender knows this subscription, also one that a full queue
+                would drop; ``latest`` has no effect then. Senders keep what this listener did not acknowledge, and
+                never wait for it. Beyond ``MOST_KEPT_BYTES`` messages are lost, and ``dropped`` counts them.
         """
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overhearing:
         """Call ``listener(key, bytes)``, in the event loop, with each publication of a conversation, whoever sends it.
 
@@ -156,6 +184,7 @@ class Bus(Protocol):
         Args:
             most_waiting_bytes: Messages that arrive while so many bytes wait for the listener are dropped and counted.
             of: Address under which they are published; empty: any. Others then make no copies.
+            lossless: Get each message, see ``subscribe``; what waits then waits at its senders.
         """
 
     def declare_alive(self, address: str) -> Subscription:

@@ -10,14 +10,15 @@ uses the same delivery between neighbors.
 from __future__ import annotations
 
 import asyncio
-import functools
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable
 
-from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Overhearer, Reply
+from backbone.bus.lossless import MOST_KEPT_BYTES
+from backbone.bus.neighbor_declarations import Declaration, Declaring, Listening, Overheard, Serving, Watching, matches
 from backbone.errors import NoResponder, ReplyTimeout
-from backbone.keys import NEVER_DROPPED, Conversation, key
+from backbone.keys import Conversation, key
+from backbone.quality import NEVER_DROPPED
 from backbone.waiting import settle
 from backbone.wire import (
     Accepts,
@@ -26,9 +27,7 @@ from backbone.wire import (
     Message,
     Refused,
     UnknownMessage,
-    kinds_of,
     schema_of,
-    write,
 )
 
 Answered = Callable[[Envelope[Message] | None], None]
@@ -72,16 +71,14 @@ class LocalNetwork:
         watching.notify(address, alive)
 
 
-class Neighbor(BusBase):
+class Neighbor(Declaring):
     """A bus that exchanges messages with its neighbors in this process directly.
 
     Attributes:
         network: The network of its neighbors.
-        declared: Its declarations in that network.
     """
 
     network: LocalNetwork
-    declared: list[Declaration]
 
     async def ask_neighbor(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask the neighbor that serves the address; see ``Bus.ask``."""
@@ -109,30 +106,51 @@ class Neighbor(BusBase):
     def publish_to_neighbors(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Deliver a publication to every listener in this process."""
         for listening in self.network.listeners[conversation]:
-            if _matches(listening.pattern, address):
+            if matches(listening.pattern, address):
                 self.network.carry_publication(listening, address, envelope)
         for overheard in self.network.overhearers:
             overheard.arrived(address, conversation, envelope)
 
     def serve_neighbors(self, address: str, accepts: Accepts, answer: Answer) -> Serving:
         """Answer questions from this process; if several neighbors serve an address, the newest one answers."""
-        serving = self.network.servers[address] = Serving(self, address, accepts, answer)
+        servers = self.network.servers
+
+        def leave() -> None:
+            if servers.get(address) is serving:
+                del servers[address]
+
+        serving = servers[address] = Serving(self, leave, accepts, answer)
         return serving
 
     def subscribe_to_neighbors(
         self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool
     ) -> Listening:
         """Subscribe to publications of this process."""
-        listening = Listening(self, address, conversation, accepts, listener, latest)
-        self.network.listeners[conversation].append(listening)
+        listeners = self.network.listeners[conversation]
+        listening = Listening(
+            self, lambda: listeners.remove(listening), address, conversation, accepts, listener, latest
+        )
+        listeners.append(listening)
         return listening
 
+    def dropped(self) -> dict[str, int]:
+        """Return the messages that listeners did not get, by key; see ``Bus.dropped``."""
+        counts = Counter[str]()
+        for one in self.declared:
+            if isinstance(one, Listening) and one.overwritten:
+                counts[f"{one.pattern}/{one.conversation}"] += one.overwritten
+        return dict(counts)
+
     def overhear_neighbors(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str
+        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str, *, lossless: bool
     ) -> Overheard:
         """Subscribe to a conversation of components of this process."""
-        overheard = Overheard(self, conversation, listener, most_waiting_bytes, of)
-        self.network.overhearers.append(overheard)
+        most_waiting_bytes = MOST_KEPT_BYTES if lossless else most_waiting_bytes
+        overhearers = self.network.overhearers
+        overheard = Overheard(
+            self, lambda: overhearers.remove(overheard), conversation, listener, most_waiting_bytes, of
+        )
+        overhearers.append(overheard)
         return overheard
 
     def declare_to_neighbors(self, address: str) -> Declaration:
@@ -152,8 +170,9 @@ class Neighbor(BusBase):
 
     def watch_neighbors(self, address: str, listener: LifeListener) -> Watching:
         """Watch the tokens of this process."""
-        watching = Watching(self, address, listener)
-        self.network.watchers.append(watching)
+        watchers = self.network.watchers
+        watching = Watching(self, lambda: watchers.remove(watching), address, listener)
+        watchers.append(watching)
         for standing, tokens in self.network.tokens.items():
             if tokens:
                 self.network.carry_life(watching, standing, alive=True)
@@ -163,7 +182,7 @@ class Neighbor(BusBase):
         """Return whether a component in this process hears this conversation of its own address."""
         network = self.network
         return any(overheard.hears(self.source, conversation) for overheard in network.overhearers) or any(
-            _matches(listening.pattern, self.source) for listening in network.listeners[conversation]
+            matches(listening.pattern, self.source) for listening in network.listeners[conversation]
         )
 
     def take_back_from_neighbors(self) -> None:
@@ -174,126 +193,6 @@ class Neighbor(BusBase):
     def _tell_watchers(self, address: str, *, alive: bool) -> None:
         for watching in list(self.network.watchers):
             self.network.carry_life(watching, address, alive)
-
-
-class Declaration:
-    """A declaration of one bus; ``close`` removes it from the network."""
-
-    def __init__(self, owner: Neighbor, take_back: Callable[[], None]) -> None:
-        self.owner, self._take_back, self.closed = owner, take_back, False
-        owner.declared.append(self)
-
-    def close(self) -> None:
-        """Withdraw the declaration."""
-        if not self.closed:
-            self.closed = True
-            self.owner.declared.remove(self)
-            self._take_back()
-
-
-class Serving(Declaration):
-    """A declaration that answers at an address."""
-
-    def __init__(self, owner: Neighbor, address: str, accepts: Accepts, answer: Answer) -> None:
-        super().__init__(owner, lambda: self._leave(owner.network, address))
-        self.kinds, self.answer = kinds_of(accepts), answer
-
-    def _leave(self, network: LocalNetwork, address: str) -> None:
-        if network.servers.get(address) is self:
-            del network.servers[address]
-
-
-class Listening(Declaration):
-    """A declaration that subscribes to a conversation."""
-
-    def __init__(
-        self,
-        owner: Neighbor,
-        pattern: str,
-        conversation: Conversation,
-        accepts: Accepts,
-        listener: Listener,
-        latest: bool,
-    ) -> None:
-        super().__init__(owner, lambda: owner.network.listeners[conversation].remove(self))
-        self.pattern, self.conversation, self.kinds, self.listener = pattern, conversation, kinds_of(accepts), listener
-        self.latest = latest
-        self.newest: dict[str, Envelope[Message]] = {}
-
-    def deliver(self, address: str, envelope: Envelope[Message]) -> None:
-        """Deliver the publication in a step of its own."""
-        loop = asyncio.get_running_loop()
-        if not self.latest:
-            loop.call_soon(self._hand_over, envelope)
-            return
-        if not self.newest:
-            loop.call_soon(self._hand_over_newest)
-        self.newest[address] = envelope
-
-    def _hand_over_newest(self) -> None:
-        newest, self.newest = self.newest, {}
-        for envelope in newest.values():
-            self._hand_over(envelope)
-
-    def _hand_over(self, envelope: Envelope[Message]) -> None:
-        if self.closed:
-            return
-        if isinstance(envelope.body, self.kinds):
-            self.owner.hear(self.listener, envelope)
-        else:
-            self.owner.unreadable += 1
-
-
-class Overheard(Declaration):
-    """A declaration that subscribes to a conversation of one component or of all, as bytes."""
-
-    def __init__(self, owner: Neighbor, conversation: Conversation, listener: Overhearer, most: int, of: str) -> None:
-        super().__init__(owner, lambda: owner.network.overhearers.remove(self))
-        self._conversation, self._listener, self._most, self._of = conversation, listener, most, of
-        self._waiting = self.dropped = 0
-
-    def hears(self, address: str, conversation: Conversation) -> bool:
-        """Return whether it is subscribed to this conversation of this address."""
-        return conversation is self._conversation and self._of in ("", address)
-
-    def arrived(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
-        """Deliver a publication in a step of its own, unless too many wait."""
-        if not self.hears(address, conversation):
-            return
-        raw = write(envelope)
-        if self._waiting + len(raw) > self._most:
-            self.dropped += 1
-            return
-        self._waiting += len(raw)
-        name = key(self.owner.network.mission, address, conversation)
-        asyncio.get_running_loop().call_soon(self._hand_over, name, raw)
-
-    def _hand_over(self, name: str, raw: bytes) -> None:
-        self._waiting -= len(raw)
-        if not self.closed:
-            self.owner.heard += 1
-            self.owner.call("", self._listener, name, raw)
-
-
-class Watching(Declaration):
-    """A declaration that watches tokens."""
-
-    def __init__(self, owner: Neighbor, pattern: str, listener: LifeListener) -> None:
-        super().__init__(owner, lambda: owner.network.watchers.remove(self))
-        self.pattern, self.listener = pattern, listener
-
-    def concerns(self, address: str) -> bool:
-        """Return whether the listener watches this address."""
-        return _matches(self.pattern, address)
-
-    def notify(self, address: str, alive: bool) -> None:
-        """Call the listener in a step of its own, if it watches this address."""
-        if self.concerns(address):
-            asyncio.get_running_loop().call_soon(self._hand_over, address, alive)
-
-    def _hand_over(self, address: str, alive: bool) -> None:
-        if not self.closed:
-            self.owner.call("", self.listener, address, alive)
 
 
 class LocalBus(Neighbor):
@@ -333,19 +232,32 @@ class LocalBus(Neighbor):
             self.publish_to_neighbors(address, conversation, envelope)
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
+        self,
+        address: str,
+        conversation: Conversation,
+        accepts: Accepts,
+        listener: Listener,
+        *,
+        latest: bool = False,
+        lossless: bool = False,
     ) -> Listening:
-        """Subscribe to publications; see ``Bus.subscribe``."""
+        """Subscribe to publications; see ``Bus.subscribe``. Inside one process no message is dropped."""
         self.require_open()
         _check(self.mission, address)
-        return self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest)
+        return self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest and not lossless)
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overheard:
         """Subscribe to a conversation of one component or of all; see ``Bus.overhear``."""
         self.require_open()
-        return self.overhear_neighbors(conversation, listener, most_waiting_bytes, of)
+        return self.overhear_neighbors(conversation, listener, most_waiting_bytes, of, lossless=lossless)
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether a component hears this conversation of its own address."""
@@ -403,11 +315,3 @@ def _outcome(answering: asyncio.Task[Envelope[Message] | None]) -> Envelope[Mess
 def _check(mission: str, address: str) -> None:
     """Refuse the names that the bus between processes refuses in keys."""
     key(mission, address, Conversation.ASK)
-
-
-@functools.lru_cache(maxsize=4096)
-def _matches(pattern: str, address: str) -> bool:
-    if pattern == address:
-        return True
-    wanted, given = pattern.split("/"), address.split("/")
-    return len(wanted) == len(given) and all(w in ("*", g) for w, g in zip(wanted, given, strict=True))

@@ -108,7 +108,7 @@ class NearListening(LatestSample):
         key: str,
         declare: Callable[[Callable[[Sample], None]], Entity],
     ) -> None:
-        super().__init__(bus, reader, listener)
+        super().__init__(bus, key, reader, listener)
         self._boards, self._key, self._declare = boards, key, declare
         self._loop = asyncio.get_running_loop()
         self._senders, self._order = SendersHeard(), NewestOnly()

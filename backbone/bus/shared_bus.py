@@ -13,7 +13,8 @@ an address that is or was a neighbor's. A session also drops an answer about a t
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from collections import Counter
+from typing import Any, cast
 
 from backbone.bus.host_boards import boards_for
 from backbone.bus.host_copies import copies_for
@@ -29,8 +30,10 @@ from backbone.bus.interface import (
 )
 from backbone.bus.local_bus import LocalNetwork, Neighbor
 from backbone.bus.zenoh_bus import ZenohBus
+from backbone.bus.zenoh_far_copies import FarCopies
 from backbone.bus.zenoh_sessions import client_config, close_session, open_session, watch_links
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import Conversation
+from backbone.quality import NEVER_DROPPED
 from backbone.wire import Accepts, Envelope, Message
 
 AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
@@ -51,21 +54,23 @@ class SharedSession:
         self._session = open_session(client_config(endpoint, secret))
         self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
-        self._copies = copies_for(directory)
+        self._copies, self._far = copies_for(directory), cast("FarCopies | None", None)
         self._directory, self._members = directory, set[str]()
 
     def join(self, source: str, clock: Clock) -> SharedBus:
         """Return a new member's bus. Close it before the session."""
         bus = SharedBus(self._neighbors, source, clock, self._session)
-        bus.copies, bus.members = self._copies, self._members
+        self._far = self._far or FarCopies(self._session, bus.mission, source)
+        bus.copies, bus.far, bus.members = self._copies, self._far, self._members
         self._members.add(source)
         bus.boards = boards_for(self._directory, self._members)
         return bus
 
     async def close(self) -> None:
         """Close the session; return when its threads have ended."""
-        if self._copies is not None:
-            self._copies.close()
+        for copies in (self._copies, self._far):
+            if copies is not None:
+                copies.close()
         await close_session(self._session)
 
 
@@ -104,22 +109,41 @@ class SharedBus(Neighbor, ZenohBus):
         self.publish_to_neighbors(address, conversation, envelope)
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
+        self,
+        address: str,
+        conversation: Conversation,
+        accepts: Accepts,
+        listener: Listener,
+        *,
+        latest: bool = False,
+        lossless: bool = False,
     ) -> Subscription:
         """Subscribe to publications; see ``Bus.subscribe``."""
-        elsewhere = super().subscribe(address, conversation, accepts, listener, latest=latest)
+        elsewhere = super().subscribe(address, conversation, accepts, listener, latest=latest, lossless=lossless)
+        latest = latest and not lossless
         return _Both(self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest), elsewhere)
+
+    def dropped(self) -> dict[str, int]:
+        """Return the messages that listeners did not get, by key; see ``Bus.dropped``."""
+        return dict(Counter(Neighbor.dropped(self)) + Counter(ZenohBus.dropped(self)))
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether a component hears this conversation of its own address, here or in another process."""
         return self.is_overheard_by_neighbors(conversation) or super().is_overheard(conversation)
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overhearing:
         """Subscribe to a conversation of all components, neighbors too; see ``Bus.overhear``."""
-        elsewhere = super().overhear(conversation, listener, most_waiting_bytes, of)
-        return _BothHeard(elsewhere, self.overhear_neighbors(conversation, listener, most_waiting_bytes, of))
+        elsewhere = super().overhear(conversation, listener, most_waiting_bytes, of, lossless=lossless)
+        here = self.overhear_neighbors(conversation, listener, most_waiting_bytes, of, lossless=lossless)
+        return _BothHeard(elsewhere, here)
 
     def declare_alive(self, address: str) -> Subscription:
         """Raise a liveliness token; see ``Bus.declare_alive``."""

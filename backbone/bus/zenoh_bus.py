@@ -11,7 +11,9 @@ messages (docs/decisions/0003-zenoh-settings.md).
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any, cast
 
 import zenoh
@@ -19,13 +21,14 @@ import zenoh
 from backbone.bus.answers import Came, TooLate, read_answer
 from backbone.bus.bus_base import quoted
 from backbone.bus.declared import Both, Declaration, FirstReply
-from backbone.bus.host_boards import HostBoards, SentBoard
+from backbone.bus.host_boards import HostBoards
 from backbone.bus.host_copies import HostCopies
 from backbone.bus.inbox import (
     EachSample,
     InboxBus,
     LatestSample,
     OverheardSamples,
+    Receiving,
     bytes_of,
     reader_of,
 )
@@ -40,8 +43,10 @@ from backbone.bus.interface import (
     Reply,
     Subscription,
 )
+from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, LosslessStreams
 from backbone.bus.near_listening import NearListening
-from backbone.bus.zenoh_outlets import Outlet, Outlets
+from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
+from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
 from backbone.bus.zenoh_questions import DirectQuestion, Query, Ways, new_inbox, query
 from backbone.bus.zenoh_sessions import (
     client_config,
@@ -54,10 +59,9 @@ from backbone.bus.zenoh_sessions import (
 )
 from backbone.bus.zenoh_settings import LINK_LEASE_MS
 from backbone.errors import Refusal
-from backbone.keys import LARGE, NEVER_DROPPED, Conversation, address_of, key, key_of_all, key_of_senders, sender_of
+from backbone.keys import Conversation, address_of, key, key_of_all, key_of_senders, sender_of
+from backbone.quality import LARGE, NEVER_DROPPED, QUALITY
 from backbone.wire import (
-    MAX_LARGE_MESSAGE_BYTES,
-    MAX_MESSAGE_BYTES,
     Accepts,
     Envelope,
     MalformedMessage,
@@ -66,7 +70,6 @@ from backbone.wire import (
     Reader,
     Refused,
     UnwritableMessage,
-    refuse_oversized,
     write,
 )
 
@@ -100,12 +103,16 @@ class ZenohBus(InboxBus):
         super().__init__(mission, source, clock)
         self.copies: HostCopies | None = None
         """For the recorder of this host; settable. A bus with a session of its own closes them."""
+        self.far = None if shared else FarCopies(session, mission, source)
+        """For the recorder of the mission where it has no socket; settable. Same."""
         self.boards: HostBoards | None = None
         """For large values to and from this host; settable before they are used."""
         self._session, self._is_hub, self._shared = session, is_hub, shared
         self._links = None if shared else watch_links(session)
         self._declared: set[Declaration] = set()
-        self._outlets = Outlets(session, mission, source, only_elsewhere=shared)
+        self._outlets = Outlets(session, mission, source, self.quality, only_elsewhere=shared)
+        self.lossless = LosslessStreams(self, session, mission, source, only_elsewhere=shared)
+        """What it sends to listeners that must get every message."""
         self.ways = Ways(self, session, mission, source, only_elsewhere=shared)
         """To whom it asks again and again."""
         self._outlet(source, Conversation.TOLD)  # knows who overhears before the first question is answered
@@ -216,52 +223,34 @@ class ZenohBus(InboxBus):
         outlet = self._outlet(address, conversation)
         self.published += 1
         envelope = self.envelope(message)
-        is_copied = self.copies is not None and self.copies.wants(conversation)
-        copies = self.copies if is_copied and conversation is not Conversation.TOLD else None
-        if outlet.board is not None:
-            self._send_large(outlet, outlet.board, envelope, copies)
-            return envelope
-        if copies is None and conversation is Conversation.OUTPUTS and outlet.is_unheard(self._loop.time()):
-            return envelope  # the next output follows soon; other messages may be the last for long
-        raw = write(envelope)
-        outlet.publisher.put(raw)
-        if copies is not None:
-            copies.send(outlet.key, raw)
+        copies = copiers(self.copies, self.far, conversation)
+        apart: list[Receiver] = [partial(copier.send, outlet.key) for copier in copies]
+        apart += [partial(stream.send, outlet.key) for stream in self.lossless.to(address, conversation)]
+        outlet.send(envelope, apart, self._loop.time())
         return envelope
 
-    def _send_large(
-        self, outlet: Outlet, board: SentBoard, envelope: Envelope[Message], copies: HostCopies | None
-    ) -> None:
-        """Leave the message on the board, and send it by the network if a subscriber is there."""
-        is_heard = outlet.is_heard(self._loop.time())
-        if not (is_heard or copies is not None or board.is_read):
-            return
-        raw = write(envelope, MAX_LARGE_MESSAGE_BYTES)
-        if board.put(raw):
-            outlet.raise_token(self._session, self.source)
-        if len(raw) > MAX_MESSAGE_BYTES:
-            if not board.is_open:
-                refuse_oversized(len(raw))
-            return
-        if is_heard:
-            outlet.publisher.put(raw)
-        if copies is not None:
-            copies.send(outlet.key, raw)
-
     def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
-        """Publish copies if a component overhears; questions with answers go to the recorder of this host, too."""
+        """Publish copies if a component overhears; copies of questions with answers go to recorders, too."""
         super().tell(address, conversation, *messages)
-        if conversation is Conversation.ASK and self.copies is not None and self.copies.wants(conversation):
-            for raw in quoted(messages):
-                self.copies.send(key(self._mission, address, conversation), raw)
+        if conversation is Conversation.ASK:
+            copies = copiers(self.copies, self.far, conversation)
+            for raw in quoted(messages) if copies else ():
+                send_copies(copies, key(self._mission, address, conversation), raw)
 
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender; see ``Bus.pass_on``."""
         if not self.closed:
-            self._outlet(address, conversation).publisher.put(write(envelope))
+            outlet = self._outlet(address, conversation)
+            raw = write(envelope, outlet.quality.most_bytes)
+            outlet.publisher.put(raw)
+            for stream in self.lossless.to(address, conversation):
+                stream.send(outlet.key, raw)
+            send_copies(copiers(self.copies, self.far, conversation), outlet.key, raw)
 
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether another process hears this conversation of its own address; 0.5 µs."""
+        if self.lossless.to(self.source, conversation):
+            return True
         return self._outlet(self.source, conversation).has_subscriber
 
     def tell_later(self, act: Callable[[], None]) -> None:
@@ -272,15 +261,37 @@ class ZenohBus(InboxBus):
         return self._outlets.outlet(address, conversation, self._loop.time(), self.boards)
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
+        self,
+        address: str,
+        conversation: Conversation,
+        accepts: Accepts,
+        listener: Listener,
+        *,
+        latest: bool = False,
+        lossless: bool = False,
     ) -> Subscription:
         """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
         pattern, reader = key(self._mission, address, conversation), reader_of(accepts)
+        most_bytes = QUALITY[conversation].most_bytes
+        if lossless:
+            each = EachSample(self, pattern, reader, listener, most_bytes)
+            hearing = LosslessSamples(self, self._session, pattern, each.hand_over)
+            return self._declare(hearing, hearing)
         if latest and self.boards is not None and conversation in LARGE and "*" not in address:
-            return self._declare(self._listen_near(self.boards, pattern, reader, listener))
-        receive = LatestSample(self, reader, listener) if latest else EachSample(self, reader, listener)
-        return self._declare(self._session.declare_subscriber(pattern, receive))
+            near = self._listen_near(self.boards, pattern, reader, listener)
+            return self._declare(near, near)
+        kind = LatestSample if latest else EachSample
+        receive = kind(self, pattern, reader, listener, most_bytes)
+        return self._declare(self._session.declare_subscriber(pattern, receive), receive)
+
+    def dropped(self) -> dict[str, int]:
+        """Return the messages that listeners did not get, by key; see ``Bus.dropped``."""
+        counts = Counter[str]()
+        for one in self._declared:
+            if one.receiver is not None and one.receiver.dropped:
+                counts[one.receiver.of.split("/", 2)[2]] += one.receiver.dropped
+        return dict(counts)
 
     def _listen_near(self, boards: HostBoards, own: str, reader: Reader[Message], listener: Listener) -> NearListening:
         """Listen to one key, by the boards of this host where its senders have some."""
@@ -300,12 +311,21 @@ class ZenohBus(InboxBus):
         return near
 
     def overhear(
-        self, conversation: Conversation, listener: Overhearer, most_waiting_bytes: int, of: str = ""
+        self,
+        conversation: Conversation,
+        listener: Overhearer,
+        most_waiting_bytes: int,
+        of: str = "",
+        *,
+        lossless: bool = False,
     ) -> Overhearing:
         """Subscribe to whole conversations, unread; see ``Bus.overhear``."""
         self.require_open()
         heard = OverheardSamples(self, listener, most_waiting_bytes)
         expression = key(self._mission, of, conversation) if of else key_of_all(self._mission, conversation)
+        if lossless:
+            every = LosslessSamples(self, self._session, expression, heard.hand_over)
+            return LosslessOverhearing(self._declare(every, every), every)
         heard.declared = self._declare(self._session.declare_subscriber(expression, heard))
         return heard
 
@@ -382,15 +402,17 @@ class ZenohBus(InboxBus):
         """Close the session unless other buses use it; return when its threads have ended."""
         self.empty_inbox()  # pending questions: their requesters get ``NoResponder``
         self.ways.close()
+        self.lossless.close()
         if not self._shared:
             self._outlets.close_boards()
-            if self.copies is not None:
-                self.copies.close()
+            for copies in (self.far, self.copies):
+                if copies is not None:
+                    copies.close()
             await close_session(self._session)
             return
         self._outlets.close()
 
-    def _declare(self, entity: Any) -> Declaration:
-        declared = Declaration(entity, self._declared)
+    def _declare(self, entity: Any, receiver: Receiving | None = None) -> Declaration:
+        declared = Declaration(entity, self._declared, receiver)
         self._declared.add(declared)
         return declared

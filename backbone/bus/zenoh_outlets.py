@@ -3,43 +3,61 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import zenoh
 
-from backbone.bus.host_boards import HostBoards, SentBoard
-from backbone.keys import LARGE, Conversation, key, key_of_sender
+from backbone.bus.host_boards import LARGE_BYTES, HostBoards, SentBoard
+from backbone.keys import Conversation, key, key_of_sender
+from backbone.quality import OF_ANY_SIZE, Quality, Urgency
+from backbone.wire import Envelope, Message, refuse_oversized, write
 
 MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
 KNOWN_AFTER_S = 1.0  # chosen: the hub has told a new publisher of its subscribers by then; it takes milliseconds
 
-# Priority, and congestion control for a full queue. Never express: without batching a queue holds two messages and
-# dropped up to 360 of a burst of 1000; with batching it dropped none, at a thirtieth of the sender's cost.
-_URGENT = (zenoh.Priority.REAL_TIME, zenoh.CongestionControl.BLOCK)
-_SURE = (zenoh.Priority.DATA, zenoh.CongestionControl.BLOCK)
-_REPEATED = (zenoh.Priority.DATA, zenoh.CongestionControl.DROP)
-_BULK = (zenoh.Priority.DATA_LOW, zenoh.CongestionControl.DROP)
-_FOR_RECORDERS = (zenoh.Priority.BACKGROUND, zenoh.CongestionControl.DROP)
-_QUALITY = {
-    Conversation.COMMAND: _URGENT,
-    Conversation.LEASES: _URGENT,
-    Conversation.STATUS: _SURE,
-    Conversation.EVENTS: _SURE,
-    Conversation.OPERATORS: _SURE,
-    Conversation.SCHEDULE: _SURE,
-    Conversation.FRAMES: _BULK,
-    Conversation.LOG: _BULK,
-    Conversation.TOLD: _FOR_RECORDERS,
-    Conversation.DECISIONS: _FOR_RECORDERS,
+Receiver = Callable[[bytes], None]
+
+_URGENCY = {
+    Urgency.URGENT: zenoh.Priority.REAL_TIME,
+    Urgency.NORMAL: zenoh.Priority.DATA,
+    Urgency.LOW: zenoh.Priority.DATA_LOW,
+    Urgency.LOWEST: zenoh.Priority.BACKGROUND,
 }
 
 
-class Outlet:
-    """The publisher of one key."""
+def on_the_wire(quality: Quality) -> dict[str, Any]:
+    """Return a quality in zenoh's words, for a publisher or a single publication."""
+    control = zenoh.CongestionControl
+    return {
+        "priority": _URGENCY[quality.urgency],
+        "congestion_control": control.BLOCK if quality.reliable else control.DROP,
+        "express": quality.express,
+    }
 
-    def __init__(self, key: str, publisher: zenoh.Publisher, known_s: float, board: SentBoard | None) -> None:
-        self.key, self.publisher, self.board, self._known_s = key, publisher, board, known_s
-        self._token: zenoh.LivelinessToken | None = None
+
+class Outlet:
+    """The publisher of one key.
+
+    Args:
+        known_s: When the hub has told it of the subscribers that it has from the beginning.
+        board: For listeners of its host.
+        declare_token: Lets listeners know this sender of the key.
+    """
+
+    def __init__(
+        self,
+        key: str,
+        publisher: zenoh.Publisher,
+        quality: Quality,
+        known_s: float,
+        board: SentBoard | None,
+        declare_token: Callable[[], zenoh.LivelinessToken],
+    ) -> None:
+        self.key, self.publisher, self.quality, self.board, self._known_s = key, publisher, quality, board, known_s
+        self._is_output = key.endswith(f"/{Conversation.OUTPUTS}")
+        self._declare_token = declare_token
+        self._token = declare_token() if quality.most_bytes_on_host else None
         self._is_matched = False
         self._matching = self._watch_matching() if board is not None else None
 
@@ -64,11 +82,48 @@ class Outlet:
         """Return whether the network is known to have no subscriber; also without a board."""
         return now_s >= self._known_s and not self.has_subscriber
 
-    def raise_token(self, session: zenoh.Session, source: str) -> None:
-        """Let listeners know this sender of the key; again, when its board was opened."""
+    def send(self, envelope: Envelope[Message], apart: Sequence[Receiver], now_s: float) -> None:
+        """Publish a message, and give its bytes to these others, too.
+
+        Of values that come repeatedly and have no listener, not even the bytes are made: the next one follows soon.
+
+        Raises:
+            OversizedMessage: The message is longer than its quality admits; nobody gets it.
+        """
+        if self.board is not None:
+            self._send_large(self.board, envelope, apart, now_s)
+            return
+        if not apart and self._is_output and self.is_unheard(now_s):
+            return
+        raw = write(envelope, self.quality.most_bytes)
+        self.publisher.put(raw)
+        for send in apart:
+            send(raw)
+
+    def _send_large(
+        self, board: SentBoard, envelope: Envelope[Message], apart: Sequence[Receiver], now_s: float
+    ) -> None:
+        """Leave the message on the board, and send it by the network if a subscriber is there."""
+        is_heard = self.is_heard(now_s)
+        if not (is_heard or apart or board.is_read):
+            return
+        raw = write(envelope, self.quality.most_bytes_on_host)
+        if board.put(raw):
+            self._raise_token()
+        if len(raw) > self.quality.most_bytes:
+            if not board.is_open:
+                refuse_oversized(len(raw), self.quality.most_bytes, type(envelope.body).__name__)
+            return
+        if is_heard:
+            self.publisher.put(raw)
+        for send in apart:
+            send(raw)
+
+    def _raise_token(self) -> None:
+        """Let listeners know this sender again, because its board was opened."""
         if self._token is not None:
             self._token.undeclare()  # type: ignore[no-untyped-call]
-        self._token = session.liveliness().declare_token(key_of_sender(self.key, source))
+        self._token = self._declare_token()
 
     def close(self) -> None:
         """Withdraw the publisher."""
@@ -84,11 +139,20 @@ class Outlets:
     """The outlets of one bus, those that were used last.
 
     Args:
+        quality_of: Returns the quality of the key of an address and a conversation.
         only_elsewhere: True: publications do not reach subscribers of the same session.
     """
 
-    def __init__(self, session: zenoh.Session, mission: str, source: str, *, only_elsewhere: bool) -> None:
-        self._session, self._mission, self._source = session, mission, source
+    def __init__(
+        self,
+        session: zenoh.Session,
+        mission: str,
+        source: str,
+        quality_of: Callable[[str, Conversation], Quality],
+        *,
+        only_elsewhere: bool,
+    ) -> None:
+        self._session, self._mission, self._source, self._quality_of = session, mission, source, quality_of
         self._destination = zenoh.Locality.REMOTE if only_elsewhere else zenoh.Locality.ANY
         self._outlets: OrderedDict[tuple[str, Conversation], Outlet] = OrderedDict()
 
@@ -119,16 +183,13 @@ class Outlets:
                 outlet.board.close()
 
     def _declare(self, address: str, conversation: Conversation, now_s: float, boards: HostBoards | None) -> Outlet:
-        priority, congestion_control = _QUALITY.get(conversation, _REPEATED)
-        name = key(self._mission, address, conversation)
-        publisher = self._session.declare_publisher(
-            name,
-            priority=priority,
-            congestion_control=congestion_control,
-            allowed_destination=self._destination,
-        )
-        board = boards.board(name, self._source) if boards is not None and conversation in LARGE else None
-        outlet = Outlet(name, publisher, now_s + KNOWN_AFTER_S, board)
-        if conversation in LARGE:
-            outlet.raise_token(self._session, self._source)
-        return outlet
+        name, quality = key(self._mission, address, conversation), self._quality_of(address, conversation)
+        publisher = self._session.declare_publisher(name, allowed_destination=self._destination, **on_the_wire(quality))
+        is_large = quality.most_bytes_on_host > 0
+        from_bytes = 0 if conversation in OF_ANY_SIZE else LARGE_BYTES
+        board = boards.board(name, self._source, from_bytes) if boards is not None and is_large else None
+
+        def declare_token() -> zenoh.LivelinessToken:
+            return self._session.liveliness().declare_token(key_of_sender(name, self._source))
+
+        return Outlet(name, publisher, quality, now_s + KNOWN_AFTER_S, board, declare_token)

@@ -27,7 +27,9 @@ import zenoh
 from backbone.bus.answers import Came, TooLate
 from backbone.bus.declared import FirstReply
 from backbone.bus.inbox import InboxBus
-from backbone.keys import ROOT
+from backbone.bus.zenoh_outlets import on_the_wire
+from backbone.keys import ROOT, Conversation
+from backbone.quality import QUALITY
 from backbone.waiting import settle
 
 MOST_WAYS = 64  # chosen: each way is a declaration at the hub; whoever is asked beyond them is asked by queries
@@ -36,11 +38,7 @@ STILL_COME_S = (
 )
 _NUMBER = struct.Struct("<Q")
 _ANSWERED, _UNANSWERED = b"\1", b"\0"
-_EXPRESS: dict[str, Any] = {  # as queries and their replies
-    "priority": zenoh.Priority.DATA,
-    "congestion_control": zenoh.CongestionControl.BLOCK,
-    "express": True,
-}
+_EXPRESS = on_the_wire(QUALITY[Conversation.ASK])
 
 log = logging.getLogger(__name__)
 
@@ -89,7 +87,7 @@ class Ways:
     def __init__(self, bus: InboxBus, session: zenoh.Session, mission: str, own: str, *, only_elsewhere: bool) -> None:
         self._bus, self._session, self._mission = bus, session, mission
         self._destination = zenoh.Locality.REMOTE if only_elsewhere else zenoh.Locality.ANY
-        self.answers = _new_key(mission, own, "answers")
+        self.answers = new_inbox_key(mission, own, "answers")
         """Key of the inbox for answers."""
         self._subscriber: zenoh.Subscriber[None] | None = None
         self._number = 0
@@ -131,9 +129,9 @@ class Ways:
 
     def answered(self, address: str, attached: zenoh.ZBytes | None) -> None:
         """Note who answered a query to this address; the second answer of one life makes a way to it."""
-        inbox = b"" if attached is None or len(attached) > _LONGEST else attached.to_bytes()
+        inbox = b"" if attached is None or len(attached) > LONGEST_KEY else attached.to_bytes()
         name = inbox.decode(errors="replace")
-        if not _is_key(name, self._mission, "asked", address):
+        if not is_inbox(name, self._mission, "asked", address):
             return
         way = self._ways.get(address)
         if way is not None and way.inbox == name:
@@ -197,9 +195,9 @@ class DirectQuestion:
     def of(cls, session: zenoh.Session, mission: str, sample: zenoh.Sample) -> DirectQuestion | None:
         """Return the question in a sample; None: it names no asker of this mission, who could be answered."""
         attached = sample.attachment
-        raw = b"" if attached is None or len(attached) > _LONGEST else attached.to_bytes()
+        raw = b"" if attached is None or len(attached) > LONGEST_KEY else attached.to_bytes()
         answers = raw[_NUMBER.size :].decode(errors="replace")
-        if not _is_key(answers, mission, "answers"):
+        if not is_inbox(answers, mission, "answers"):
             log.warning("a question on %s without an inbox for its answer", sample.key_expr)
             return None
         return cls(session, sample.payload, raw[: _NUMBER.size], answers)
@@ -242,18 +240,19 @@ class Query:
 
 def new_inbox(mission: str, address: str) -> str:
     """Return the key of an inbox for one life of the component at this address."""
-    return _new_key(mission, address, "asked")
+    return new_inbox_key(mission, address, "asked")
 
 
-_LONGEST = 1024  # chosen: bytes of a key
+LONGEST_KEY = 1024  # chosen: bytes of a key
 _OWN = re.compile(r"(.+)/(\w+)/[0-9a-f]{12}")
 
 
-def _new_key(mission: str, address: str, kind: str) -> str:
+def new_inbox_key(mission: str, address: str, kind: str) -> str:
+    """Return the key of a new inbox of this kind."""
     return f"{ROOT}/{mission}/{address}/{kind}/{os.urandom(6).hex()}"
 
 
-def _is_key(name: str, mission: str, kind: str, address: str = "") -> bool:
+def is_inbox(name: str, mission: str, kind: str, address: str = "") -> bool:
     """Return whether a name is that of an inbox in this mission, of any component if no address is given."""
     found = _OWN.fullmatch(name)
     if found is None or found[2] != kind or set(name) & set("*$#?"):

@@ -1,15 +1,18 @@
 """Settings of a Zenoh session, as plain data: of a client and of a hub. Pure.
 
-Measured settings: clients of one hub, no scouting, lease 2 s (docs/decisions/0003-zenoh-settings.md).
+Measured settings: clients of one hub, no scouting, lease 2 s, but 8 s where no link leaves the host
+(docs/decisions/0003-zenoh-settings.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
-from backbone.authentication import USER
+from backbone.authentication import SOCKET, USER
 
 LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses its own link
+HOST_LEASE_MS = 8000  # chosen: a unix socket cannot be cut, and a creator replaces a hung process after 3 s
+KEEP_ALIVES = 4  # chosen: in each lease, so that three may be late
 RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
 OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine is there within this
 WAIT_BEFORE_CLOSE_US = 1_000_000  # chosen: the longest time for which a hung consumer may block a sender
@@ -26,7 +29,7 @@ def client_settings(endpoint: str, secret: str = "") -> dict[str, object]:
     """
     return {
         "scouting": _QUIET,
-        "transport": _transport({"usrpwd": {"user": USER, "password": secret}} if secret else {}),
+        "transport": _transport([endpoint], {"usrpwd": {"user": USER, "password": secret}} if secret else {}),
         "mode": "client",
         "connect": {
             "endpoints": [endpoint],
@@ -47,7 +50,9 @@ def hub_settings(listen: list[str], connect: list[str], dictionary_file: str) ->
     """
     settings: dict[str, object] = {
         "scouting": {**_QUIET, "delay": 0},
-        "transport": _transport({"usrpwd": {"dictionary_file": dictionary_file}} if dictionary_file else {}),
+        "transport": _transport(
+            [*listen, *connect], {"usrpwd": {"dictionary_file": dictionary_file}} if dictionary_file else {}
+        ),
         "mode": "router",
         "listen": {"endpoints": listen, "exit_on_failure": True},
     }
@@ -56,13 +61,14 @@ def hub_settings(listen: list[str], connect: list[str], dictionary_file: str) ->
     return settings
 
 
-def _transport(auth: Mapping[str, object]) -> dict[str, object]:
+def _transport(endpoints: Iterable[str], auth: Mapping[str, object]) -> dict[str, object]:
+    is_inside = all(endpoint.startswith(SOCKET) for endpoint in endpoints)
     return {
         "unicast": {"open_timeout": 2000, "accept_timeout": 2000},
         "link": {
             "tx": {
-                "lease": LINK_LEASE_MS,
-                "keep_alive": 4,
+                "lease": HOST_LEASE_MS if is_inside else LINK_LEASE_MS,
+                "keep_alive": KEEP_ALIVES,
                 "queue": {"congestion_control": {"block": {"wait_before_close": WAIT_BEFORE_CLOSE_US}}},
             }
         },

@@ -143,11 +143,16 @@ def up(
         Path | None, typer.Option("--record", metavar="FILE.mcap", help="Record all from the first message on.")
     ] = None,
     pack: Annotated[
-        int,
+        int | None,
         typer.Option(
-            "--pack", metavar="N", min=0, max=64, help="Pack components into N processes a host; 0: each has its own."
+            "--pack",
+            metavar="N",
+            min=0,
+            max=64,
+            help="Pack components into N processes a host; 0: each has its own. Left out: where a host has many of one "
+            "type, these share some.",
         ),
-    ] = 0,
+    ] = None,
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""

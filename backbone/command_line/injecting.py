@@ -11,7 +11,7 @@ from backbone.command_line.connection import connected
 from backbone.command_line.watching import mission_classes
 from backbone.command_line.where import Where
 from backbone.errors import Refusal
-from backbone.keys import ROOT, Conversation
+from backbone.keys import COPIED, ROOT, Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.naming import component_of, did_you_mean
@@ -19,7 +19,7 @@ from backbone.recording.json_schema import TAG
 from backbone.recording.revival import OtherForm, message_from
 from backbone.wire import plain, schema_of
 
-LEFT_OUT = (Conversation.ALIVE, Conversation.TOLD)
+LEFT_OUT = (Conversation.ALIVE, *COPIED)
 
 
 class NoKey(Refusal):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from backbone.command_line.key_facts import TrafficRow, facts_text
 from backbone.recording.reader import Recorded
 
 LONGEST_BODY = 160  # chosen: a line of a wide terminal
@@ -84,7 +85,7 @@ class TrafficTable:
         row.messages += 1
         row.size_bytes += size_bytes
 
-    def busiest(self, lasted_s: float) -> list[dict[str, Any]]:
+    def busiest(self, lasted_s: float) -> list[TrafficRow]:
         """Return a row for each key, sender and schema, those with the most bytes first."""
         found = [
             {
@@ -100,23 +101,24 @@ class TrafficTable:
         return sorted(found, key=lambda one: (-one["bytes_per_s"], one["key"], one["source"], one["schema"]))
 
 
-def traffic_lines(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Return one line for each row.
+def traffic_lines(rows: Sequence[TrafficRow]) -> list[str]:
+    """Return one line for each row, with the facts of its key.
 
     Example:
+        >>> from backbone.command_line.key_facts import KeyFacts, with_facts
         >>> table = TrafficTable()
-        >>> table.add("scout/night/resource_pool/world/telemetry", "resource_pool/world", "WorldState/1", 40)
-        >>> traffic_lines(table.busiest(2.0))
-        ['    0.50/s        20 B/s      40 B  resource_pool/world/telemetry  WorldState/1']
+        >>> table.add("scout/night/resource_pool/world/bodies", "resource_pool/world", "WorldState/1", 40)
+        >>> traffic_lines(with_facts(table.busiest(2.0), KeyFacts(), "night"))
+        ['    0.50/s        20 B/s      40 B  resource_pool/world/bodies  WorldState/1  best effort, normal']
     """
     return [
         f"{one['messages_per_s']:8.2f}/s {one['bytes_per_s']:9.0f} B/s {one['mean_bytes']:7.0f} B  "
-        f"{short_key(one['key'])}  {one['schema'] or 'no message'}{_sender(one)}"
+        f"{short_key(one['key'])}  {one['schema'] or 'no message'}{_sender(one)}  {facts_text(one)}"
         for one in rows
     ]
 
 
-def _sender(row: dict[str, Any]) -> str:
+def _sender(row: TrafficRow) -> str:
     """Return the sender, unless it is the component of the key."""
     key, source = short_key(row["key"]), row["source"]
     return f"  from {source}" if source and not key.startswith(f"{source}/") else ""

@@ -85,6 +85,10 @@ def record_mission(
     keep: Annotated[
         int, typer.Option("--keep", min=0, max=1_000_000, help="Keep so many files, delete older ones; 0: all.")
     ] = 0,
+    is_lossless: Annotated[
+        bool,
+        typer.Option("--lossless", help="Lose nothing of a burst: senders keep up to 128 MiB."),
+    ] = False,
     is_described: Annotated[bool, typer.Option("--described", hidden=True)] = False,
     host_folder: Annotated[Path | None, typer.Option("--host-folder", hidden=True)] = None,
     host_only: Annotated[bool, typer.Option("--host-only", hidden=True)] = False,
@@ -98,7 +102,7 @@ def record_mission(
     from backbone.command_line.recording_work import OfLauncher, Splitting, record_to
 
     where, splitting = chosen(mission, connect, secret_file), Splitting(split_s, split_mb, keep)
-    told = OfLauncher(is_described, host_folder, host_only)
+    told = OfLauncher(is_described, host_folder, host_only, is_lossless)
     run(lambda: record_to(where, to, keys or [], for_s, splitting, told))
 
 

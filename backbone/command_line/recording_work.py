@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import os
 import signal
@@ -15,7 +16,9 @@ from datetime import datetime, timedelta
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from backbone import run_files
 from backbone.addresses import LAUNCHER, NAMESERVER
+from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.command_line.joining import clock_lines, clocks_json
@@ -30,6 +33,7 @@ from backbone.keys import Conversation
 from backbone.launcher import mission_connection
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.messages import AskTree, Tree
+from backbone.launcher.recorder_signs import RecorderSigns
 from backbone.mission_log.lines import event_json, story_lines
 from backbone.mission_log.log import MissionLog
 from backbone.mission_log.operators import OperatorActed, login_name
@@ -68,17 +72,20 @@ class Splitting:
 
 @dataclass(frozen=True)
 class OfLauncher:
-    """Settings that a launcher or an offer passes to the recorder that it starts.
+    """Settings that a launcher, an offer or a person passes to the recorder that it starts.
 
     Attributes:
         is_described: True: the mission is described on standard input, because it cannot be asked yet.
-        host_folder: Folder of the mission's files on this host, where its processes leave copies; None: they do not.
-        host_only: True: record those alone, until standard input ends; False: their pictures, and the rest of all.
+        host_folder: Folder of the mission's files on this host, where its processes leave copies; None: see
+            ``_folder_by_hand``.
+        host_only: True: record those alone, until standard input ends; False: those, and of others all but pictures.
+        is_lossless: A person wants every message, see ``Bus.overhear``: then the recorder hears the bus alone.
     """
 
     is_described: bool = False
     host_folder: Path | None = None
     host_only: bool = False
+    is_lossless: bool = False
 
 
 async def record_to(
@@ -93,6 +100,7 @@ async def record_to(
             mission_xml, classes = said["mission_xml"], message_classes(said["modules"])
         else:
             mission_xml, classes = await _mission_file(bus), await mission_classes(bus)
+        folder = told.host_folder or (None if told.is_lossless else _folder_by_hand(where, bus.mission, keys))
         with _new_files(path, splitting.keep) as files:
             recorder = Recorder(
                 bus,
@@ -105,11 +113,16 @@ async def record_to(
                 keys=tuple(keys),
                 mission_xml=mission_xml,
                 user=login_name(),
-                ear=HostEar(told.host_folder, pictures_only=not told.host_only) if told.host_folder else None,
+                ear=HostEar(folder, is_of_mission=not told.host_only) if folder is not None else None,
                 host_only=told.host_only,
+                is_lossless=told.is_lossless,
             )
             with suppress(OSError):
                 go_behind_others()  # who decides goes before who records
+            if told.host_folder is not None:
+                recorder.on_flushed = RecorderSigns().give
+            gc.collect()
+            gc.freeze()  # else the collector looks through all that was imported again and again
             await _run(recorder, path, for_s, ends_with_input=told.host_only)
     say(f"{path}: {counted(recorder.written, 'message')}")
     if recorder.dropped:
@@ -132,6 +145,17 @@ async def _run(recorder: Recorder, path: Path, for_s: float | None, *, ends_with
         loop.remove_reader(sys.stdin)
         if timer is not None:
             timer.cancel()
+
+
+def _folder_by_hand(where: Where, mission: str, keys: list[str]) -> Path | None:
+    """Return the folder where processes of this host leave copies; None: overhear the bus instead.
+
+    That is better for few keys, and for pictures of other hosts, of which no process sends copies.
+    """
+    if where.connect is not None or keys:
+        return None
+    folder = run_files.run_directory(mission)
+    return folder if not secret_of(str(folder)) else None  # without a secret no hub hears other hosts
 
 
 async def _mission_file(bus: Bus) -> str:

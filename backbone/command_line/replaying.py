@@ -19,7 +19,7 @@ import msgspec
 
 from backbone import run_files
 from backbone.authentication import socket_endpoint
-from backbone.bus.clock import MissionClock
+from backbone.bus.clock import PunctualClock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.command_line.comparing import print_comparison
 from backbone.command_line.message_lines import message_line
@@ -42,6 +42,8 @@ from backbone.waiting import first_to_end
 from backbone.wire import plain
 
 REPLAY = "replay"
+COLLECT_GAP_S = 0.03  # chosen: a multiple of what it takes; a mission without such a gap is a rare one
+COLLECT_EACH_S = 2.0  # chosen: what two seconds leave is collected within a millisecond or two
 LEAD_S = 0.05  # chosen: a run file is written within it; seconds of the machine
 
 
@@ -134,7 +136,7 @@ async def _play_in(
     since_s = found.begin_s if wanted.since_s is None else wanted.since_s
     if since_s > found.end_s:
         raise NoSuchTime(f"the recording ends at {found.end_s:.3f} s")
-    endpoint, clock = socket_endpoint(directory), MissionClock(time.monotonic() - since_s / wanted.speed, wanted.speed)
+    endpoint, clock = socket_endpoint(directory), PunctualClock(time.monotonic() - since_s / wanted.speed, wanted.speed)
     bus = await ZenohBus.open_when_up(name, f"{Subsystem.BACKBONE}/{REPLAY}", clock, hub_config([endpoint]))
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -148,12 +150,13 @@ async def _play_in(
         keys=wanted.keys,
         next_step=_asked_for_step if wanted.is_stepped else None,
     )
-    player.ends = ended.set
+    player.ends, player.rests = ended.set, _Collector().collect
     try:
         player.catch_up()
         player.begin()
         gc.collect()
         gc.freeze()  # a collection of all that was imported takes tens of milliseconds (measured)
+        gc.disable()  # and one of what was decoded takes milliseconds, at any time
         clock.origin_monotonic_s = time.monotonic() + LEAD_S - since_s / wanted.speed
         run_files.write(
             run_files.RunFile(
@@ -169,11 +172,27 @@ async def _play_in(
         say(f"plays {path} from {since_s:.3f} s on as mission {name}; Ctrl-C ends it")
         await first_to_end(_play_to_end(player), ended.wait())
     finally:
+        gc.enable()
         await bus.close()
+
+
+class _Collector:
+    """Collects garbage in the pauses of a recording."""
+
+    def __init__(self) -> None:
+        self._next_s = time.monotonic() + COLLECT_EACH_S
+
+    def collect(self, gap_s: float) -> None:
+        """Collect the garbage of the last seconds, if the gap is long enough."""
+        now_s = time.monotonic()
+        if gap_s > COLLECT_GAP_S and now_s >= self._next_s:
+            gc.collect(0)
+            self._next_s = now_s + COLLECT_EACH_S
 
 
 async def _play_to_end(player: Player) -> None:
     await player.run()
+    gc.enable()
     say(f"that was all, {counted(player.played, 'publication')}; questions are still answered")
     await asyncio.Event().wait()
 

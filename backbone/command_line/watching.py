@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from backbone.addresses import COMPONENT_DATABASE
 from backbone.bus.interface import Bus, Clock, Overhearing
 from backbone.command_line.connection import connected
+from backbone.command_line.key_facts import ask_facts, with_facts
 from backbone.command_line.message_lines import (
     TrafficTable,
     field_of,
@@ -37,6 +38,7 @@ from backbone.wire import Message
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 MOST_WAITING_BYTES = 16 * 1024 * 1024  # chosen: a person reads far less
+ANSWERS_HEARD_S = 0.1  # chosen: the answers to its own questions are overheard by then, and count for nothing
 LOOK_EACH_S = 1.0  # chosen: a rate over a second is readable and recent
 
 
@@ -73,28 +75,33 @@ async def watch(where: Where, wanted: Watched) -> ExitCode:
         if wanted.most is not None and shown >= wanted.most:
             ended.set()
 
-    async with _listening(where, wanted.keys, heard) as (_clock, _subscribed), _until(ended, wanted.for_s):
+    async with _listening(where, wanted.keys, heard) as (_bus, _clock, _subscribed), _until(ended, wanted.for_s):
         await ended.wait()
     return ExitCode.DONE
 
 
 async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
-    """Print rates and sizes of keys each second, or once, the busiest first."""
+    """Print rates and sizes of keys each second, or once, the busiest first, and what their listeners did not get."""
     ended, traffic = asyncio.Event(), TrafficTable()
 
     def heard(key: str, message: Translated, _at_s: float) -> None:
         traffic.add(key, message.source, message.schema, message.size_bytes)
 
-    async with _listening(where, wanted.keys, heard) as (clock, subscribed), _until(ended, wanted.for_s):
+    async with _listening(where, wanted.keys, heard) as (bus, clock, subscribed), _until(ended, wanted.for_s):
         while not ended.is_set():
             traffic.rows.clear()
             began_s = clock.now_s()
             for_s = wanted.for_s if once and wanted.for_s is not None else LOOK_EACH_S
             await clock.sleep_s(for_s * clock.rate)
-            rows = traffic.busiest((clock.now_s() - began_s) / clock.rate)
+            heard_rows = traffic.busiest((clock.now_s() - began_s) / clock.rate)
+            facts = await ask_facts(bus)
+            rows = with_facts(heard_rows, facts, bus.mission, wanted.keys)
             show(map(json.dumps, rows) if wanted.as_json else [*traffic_lines(rows), ""])
+            if facts.silent:
+                say(f"without the counts of {', '.join(sorted(facts.silent))}, which did not answer")
             if once:
                 ended.set()
+            await clock.sleep_s(ANSWERS_HEARD_S * clock.rate)
         if dropped := sum(one.dropped for one in subscribed):
             say(f"incomplete: {counted(dropped, 'message')} came too fast")
     return ExitCode.DONE
@@ -133,9 +140,9 @@ def _lines(key: str, message: Translated, at_s: float, wanted: Watched) -> Itera
 @asynccontextmanager
 async def _listening(
     where: Where, keys: tuple[str, ...], heard: Callable[[str, Translated, float], None]
-) -> AsyncIterator[tuple[Clock, list[Overhearing]]]:
+) -> AsyncIterator[tuple[Bus, Clock, list[Overhearing]]]:
     async with connected(where) as (bus, clock), overhearing(bus, clock, keys, heard) as subscribed:
-        yield clock, subscribed
+        yield bus, clock, subscribed
 
 
 @asynccontextmanager

@@ -29,6 +29,7 @@ from backbone.component.abilities import NO_ABILITIES, Abilities
 from backbone.component.asking import ask_until_answered
 from backbone.component.launch import Launch
 from backbone.component.messages import (
+    MESSAGES_DROPPED,
     PROCESSOR_S,
     Absence,
     AskParameters,
@@ -109,6 +110,9 @@ class Component(Generic[P_co]):
     """True for the RC of a robot, which operators can stop."""
     shares_process: ClassVar[bool] = True
     """False for a class that computes for long; where the mission file names no process, it then has one of its own."""
+    alike_most: ClassVar[int] = 0
+    """Most components of this class that share a process with each other, where a host has more of them and the mission
+    says nothing of processes; 1: each has its own; 0: the placer's default, or 1 if ``shares_process`` is False."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
 
@@ -153,6 +157,7 @@ class Component(Generic[P_co]):
         self._tasks: dict[asyncio.Task[None], None] = {}  # in the order of their starts
         self._token: Subscription | None = None
         self._news = asyncio.Event()
+        self._state_published: ComponentState | None = None
 
     # ------------------------------------------------------------------ hooks
     async def connect(self) -> None:
@@ -209,12 +214,20 @@ class Component(Generic[P_co]):
         """Return the name of the person at this component; empty: no person."""
         return ""
 
+    def calm_s(self) -> float:
+        """Return how long news wait for further news, seconds of the machine.
+
+        When: before each ``publish_news``. Override where news take long to make.
+        """
+        return CALM_S
+
     def publish_news(self) -> None:
-        """Publish the component's news.
+        """Publish the component's news: its state, if it is another than the one that was published last.
 
         When: ``CALM_S`` after ``report`` or ``changed``, once for all news in between.
         """
-        self._publish_state()
+        if self.component_state() != self._state_published:
+            self._publish_state()
 
     # ------------------------------------------------------------------ for derived classes
     @property
@@ -421,12 +434,13 @@ class Component(Generic[P_co]):
     async def _publish_when_calm(self) -> None:
         while True:
             await self._news.wait()
-            await self.clock.sleep_s(CALM_S * self.clock.rate)
+            await self.clock.sleep_s(self.calm_s() * self.clock.rate)
             self._news.clear()
             self.publish_news()
 
     def _publish_state(self) -> None:
-        self.bus.publish(self.address, Conversation.STATUS, self.component_state())
+        self._state_published = self.component_state()
+        self.bus.publish(self.address, Conversation.STATUS, self._state_published)
 
     async def _answer(self, asked: Envelope[Message]) -> Message:
         match asked.body:
@@ -440,7 +454,8 @@ class Component(Generic[P_co]):
                 }
                 is_virtual = isinstance(self.clock, VirtualClock)  # a mission on virtual time is the same each time
                 process = {} if is_virtual else {PROCESSOR_S: time.process_time()}
-                return Statistics({**bus, **process, **self.statistics()})
+                dropped = {f"{MESSAGES_DROPPED}{key}": float(count) for key, count in self.bus.dropped().items()}
+                return Statistics({**bus, **process, **dropped, **self.statistics()})
             case AskParameters():
                 return Parameters(msgspec.to_builtins(self.parameters))
             case SetParameter(name=name, value=value, user=user):

@@ -10,6 +10,9 @@ from backbone.errors import Refusal
 from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
+MESSAGES_DROPPED, DEADLINES_MISSED = "dropped ", "deadlines missed "
+"""Begins of the names of statistics; a key without ``scout/<mission>/`` follows."""
+
 
 class LifeState(StrEnum):
     """State of a component's life cycle; it only moves downwards in this list."""

@@ -34,6 +34,7 @@ class ComponentType(Message, frozen=True, tag="ComponentType/2"):
         needs: Role → kind of RC that an ARC holds; empty if it is no ARC type.
         abilities: What its components can be commanded to do, and what they report.
         shares_process: Whether the placer may put its components into a process with others.
+        alike_most: Most of its components that the placer puts into one process with each other; 1: none.
     """
 
     name: Mention
@@ -46,6 +47,7 @@ class ComponentType(Message, frozen=True, tag="ComponentType/2"):
     needs: Annotated[dict[Mention, Mention], FEW] = {}
     abilities: Abilities = NO_ABILITIES
     shares_process: bool = True
+    alike_most: Count = 1
 
 
 class Admit(Message, frozen=True):

@@ -68,6 +68,7 @@ class Spawn(Message, frozen=True):
         pinned: True if it may run on this host only. A restarted placer learns this and the tags from the creator.
         tags: Tags that its host must have.
         process: Name of the shared process; empty: a process of its own.
+        alike_most: Most components of its type in one process, where the placer chooses the process; 1: it does not.
     """
 
     subsystem: Subsystem
@@ -81,6 +82,7 @@ class Spawn(Message, frozen=True):
     pinned: bool = False
     tags: Annotated[list[Mention], FEW] = []
     process: NameOrNone = ""
+    alike_most: Count = 1
 
 
 class Spawned(Message, frozen=True):

@@ -31,7 +31,8 @@ class UpOptions:
         for_s: Mission seconds from readiness to the end; None: until an order ends it.
         text: What the mission file holds: its tree is changed there. Empty: its tree cannot be changed.
         record: File of the recording, or None.
-        pack: Number of processes of a host into which the placer packs components; 0: each has its own.
+        pack: Number of processes of a host into which the placer packs components; 0: each has its own; None: types
+            with many components share some.
     """
 
     speed: float = 1.0
@@ -39,7 +40,7 @@ class UpOptions:
     for_s: float | None = None
     text: bytes = b""
     record: Path | None = None
-    pack: int = 0
+    pack: int | None = None
 
 
 def core_launches(description: MissionDescription, own: Launch, options: UpOptions) -> list[Launch]:

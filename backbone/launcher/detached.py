@@ -39,7 +39,7 @@ def up_detached(mission: str, mission_file: Path, options: UpOptions) -> int:
     command += ["--tell-fd", str(telling), "--speed", str(options.speed)]
     command += ["--trace", str(options.trace.absolute())] if options.trace else []
     command += ["--for", str(options.for_s)] if options.for_s is not None else []
-    command += ["--pack", str(options.pack)] if options.pack else []
+    command += ["--pack", str(options.pack)] if options.pack is not None else []
     command += ["--record", str(options.record.absolute())] if options.record else []
     launcher = subprocess.Popen(  # noqa: S603  our own command line
         command,

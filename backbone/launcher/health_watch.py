@@ -11,19 +11,26 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, ComponentState
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import Components, ListComponents
-from backbone.picture.health import LOOK_EVERY_S, SAY_EVERY_S, MissionHealth, health
+from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
+from backbone.picture.health import LOOK_EVERY_S, SAY_EVERY_S, HealthWord, MissionHealth, health
 from backbone.picture.look import LOOK_TIME_S, look
 from backbone.picture.mission import MissionPicture
 from backbone.printable import printable_all
+from backbone.waiting import end_tasks, set_within
+from backbone.wire import Envelope
+
+REST_S = 5.0  # chosen: heartbeats, tokens and published states tell of every fault but one: a service without answers
 
 
 class HealthWatch:
-    """Examines the mission every ``LOOK_EVERY_S`` and publishes its health under the launcher's address.
+    """Examines the mission and publishes its health under the launcher's address.
+
+    While something is absent, it examines every ``LOOK_EVERY_S``. In a healthy mission it waits for news, and examines
+    every ``REST_S`` all the same, for a service that beats and does not answer.
 
     Args:
         changed: Called when ``absences`` changes.
-        own: Returns the absences that the launcher reports as an owner.
+        own: Returns the absences that the launcher reports as an owner; call ``notice`` when they change.
     """
 
     def __init__(
@@ -33,7 +40,7 @@ class HealthWatch:
         self.picture = MissionPicture(bus.mission, clock.now_s(), rate=clock.rate)
         """The mission in the last round."""
         self._components: Mapping[str, ComponentState] = {}
-        self._listed_s = clock.now_s()
+        self._news = asyncio.Event()
         self._said: MissionHealth | None = None
         self._said_s = 0.0
 
@@ -41,37 +48,66 @@ class HealthWatch:
         """Return the absences that the watch found; other owners report theirs in their own states."""
         return list(self.picture.missed)
 
+    def notice(self) -> None:
+        """Examine and publish soon, because something has changed."""
+        self._news.set()
+        self._news = asyncio.Event()
+
     async def run(self) -> None:
         """Examine and publish until cancelled; a round that waits for an answer delays no publication."""
-        async with asyncio.TaskGroup() as loops:
-            loops.create_task(self._look_again_and_again())
-            loops.create_task(self._list_again_and_again())
-            while True:
-                self._say(self._health())
-                await self._clock.sleep_s(LOOK_EVERY_S / 2 * self._clock.rate)
+        hearing = [
+            self._bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard_state),
+            self._bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, lambda _: self.notice()),
+        ]
+        try:
+            async with asyncio.TaskGroup() as loops:
+                loops.create_task(self._look_again_and_again())
+                while True:
+                    news = self._news
+                    self._say()
+                    await self._pause(news, LOOK_EVERY_S / 2, SAY_EVERY_S)
+        finally:
+            for subscription in hearing:
+                subscription.close()
 
     async def _look_again_and_again(self) -> None:
         while True:
-            missed, now_s, rate = self.absences(), self._clock.now_s(), self._clock.rate
-            await look(self._bus, now_s, before=self.picture, rate=rate, schedule=False, listed=self._listed)
+            missed, now_s, rate, news = self.absences(), self._clock.now_s(), self._clock.rate, self._news
+            listing = asyncio.create_task(self._list_meanwhile(), name="list meanwhile")
+            try:
+                await look(self._bus, now_s, before=self.picture, rate=rate, schedule=False, listed=self._listed)
+            finally:
+                await end_tasks(listing)
+            self._say()
             if self.absences() != missed:
                 self._changed()
-            await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
+            await self._clock.sleep_s(LOOK_EVERY_S * rate)
+            await self._pause(news, 0.0, REST_S)
 
-    async def _list_again_and_again(self) -> None:
-        """Collect the components' reports of absences, also while a round waits for a creator that is cut off."""
+    async def _pause(self, news: asyncio.Event, troubled_s: float, healthy_s: float) -> None:
+        """Wait for the longer of these times of the machine in a healthy mission, at most until the news."""
+        if self.picture.problems or self._health().word is not HealthWord.OK:
+            await self._clock.sleep_s(troubled_s * self._clock.rate)
+        else:
+            await set_within(news, healthy_s)
+
+    def _heard_state(self, envelope: Envelope[ComponentState]) -> None:
+        state = envelope.body
+        known = self._components.get(state.address)
+        if known is None or (known.state, known.absent) != (state.state, state.absent):
+            self.notice()
+
+    async def _list_meanwhile(self) -> None:
+        """Collect the components' reports of absences while a round waits for a creator that is cut off."""
         while True:
-            await self._clock.sleep_until_s(self._listed_s + 1.5 * LOOK_EVERY_S * self._clock.rate)
-            if self._clock.now_s() < self._listed_s + LOOK_EVERY_S * self._clock.rate:
-                continue
+            await self._clock.sleep_s(1.5 * LOOK_EVERY_S * self._clock.rate)
             with suppress(LinkError, Refusal):  # the round reports it
                 answer = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=LOOK_TIME_S)
                 self._listed(printable_all(answer))
-            self._listed_s = self._clock.now_s()
 
     def _listed(self, listing: Components) -> None:
-        self._listed_s = self._clock.now_s()
         self._components = {state.address: state for state in listing.components}
+        self._say()
 
     def _health(self) -> MissionHealth:
         # The launcher's own state in the list is one round old: its absences may have ended.
@@ -79,8 +115,8 @@ class HealthWatch:
         missed = [*self._own(), *self.picture.missed]
         return health(others, missed, self._clock.now_s(), self._clock.rate)
 
-    def _say(self, said: MissionHealth) -> None:
-        now_s = self._clock.now_s()
+    def _say(self) -> None:
+        said, now_s = self._health(), self._clock.now_s()
         if said != self._said or now_s - self._said_s >= SAY_EVERY_S * self._clock.rate:
             self._said, self._said_s = said, now_s
             self._bus.publish(self._bus.source, Conversation.HEALTH, said)

@@ -183,6 +183,11 @@ class Launcher(Component[NoParameters]):
                 return LastBranchOver(self._last.told)
         return await super().answer(asked)
 
+    def changed(self) -> None:
+        """Publish news soon, also about the mission's health."""
+        super().changed()
+        self._health_watch.notice()
+
     def absences(self) -> list[Absence]:
         """Return the absent core services, components and machines, and the absences of the health watch."""
         return [*self._own_absences(), *self._health_watch.absences()]

@@ -1,7 +1,7 @@
 """The recorder of a mission, or of one of its hosts, that was told to ``--record``: a process of its own.
 
 It begins before the first component and ends after the last. If it ends early, the recording goes on in a further file;
-if its file can grow no more, it is absent with the reason.
+if its file can grow no more, it is absent with the reason. If it hangs, it is absent until it responds again.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import itertools
 import json
 import logging
 import os
+import signal
 import sys
-from asyncio.subprocess import DEVNULL, PIPE, Process
+from asyncio.subprocess import PIPE, Process
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -21,6 +22,7 @@ from backbone.bus.interface import Clock
 from backbone.component.messages import Absence
 from backbone.errors import Refusal
 from backbone.launcher.endings import ExitCode
+from backbone.launcher.recorder_signs import watch
 from backbone.mission.model import MissionDescription
 
 BEGUN_WITHIN_S = 20.0  # chosen: as long as a component has to become ready
@@ -59,15 +61,14 @@ def first_free(path: Path) -> Path:
 def recorder_of_mission(
     description: MissionDescription, text: bytes, path: Path, clock: Clock, run_directory: str
 ) -> MissionRecorder:
-    """Return the recorder beside the launcher; on several hosts each host records its own pictures.
+    """Return the recorder beside the launcher; it records the pictures of this host alone.
 
     Args:
         text: The mission file.
     """
     modules = sorted({kind.class_path.partition(":")[0] for kind in description.types})
     facts = json.dumps({"mission_xml": text.decode(), "modules": modules}).encode()
-    own_pictures = ["--host-folder", run_directory] if description.other_hosts else []
-    return MissionRecorder(description.name, path, clock, ["--described", *own_pictures], facts)
+    return MissionRecorder(description.name, path, clock, ["--described", "--host-folder", run_directory], facts)
 
 
 class MissionRecorder:
@@ -89,10 +90,11 @@ class MissionRecorder:
         self._options, self._facts = options, facts
         self._process: Process | None = None
         self._reading: asyncio.Task[str] | None = None
+        self._watching: asyncio.Task[None] | None = None
         self._absence: Absence | None = None
 
     def absence(self) -> Absence | None:
-        """Return the recorder as absent while it does not run."""
+        """Return the recorder as absent while it does not run or respond."""
         return self._absence
 
     async def begin(self) -> None:
@@ -106,7 +108,7 @@ class MissionRecorder:
         self._process = process = await asyncio.create_subprocess_exec(
             *(sys.executable, *command, *self._options),
             stdin=PIPE,
-            stdout=DEVNULL,
+            stdout=PIPE,
             stderr=PIPE,
             start_new_session=True,  # Ctrl-C at the terminal ends the launcher, which ends the recorder last
         )
@@ -116,6 +118,8 @@ class MissionRecorder:
         except TimeoutError:
             said = f"it did not begin within {BEGUN_WITHIN_S:g} s"
         self._reading = asyncio.create_task(_last_line(process), name="what the recorder says")
+        assert process.stdout is not None  # noqa: S101  a pipe
+        self._watching = asyncio.create_task(watch(process.stdout, self._silent), name="whether the recorder responds")
         if not said.startswith("records to"):
             await self.end()
             raise RecorderFailed(f"the recorder did not begin: {said.strip() or 'it ended without a word'}")
@@ -144,6 +148,7 @@ class MissionRecorder:
             return
         with suppress(ProcessLookupError):
             process.terminate()
+            process.send_signal(signal.SIGCONT)  # one that was paused can end its file, too
         try:
             async with asyncio.timeout(ENDED_WITHIN_S):
                 await self._ended()
@@ -171,6 +176,19 @@ class MissionRecorder:
         assert self._process is not None and self._reading is not None  # noqa: S101, PT018  it was begun
         last = await asyncio.shield(self._reading)
         return last or f"exit code {await self._process.wait()}"
+
+    def _silent(self, is_silent: bool) -> None:
+        if self._process is None or self._process.returncode is not None:
+            return
+        if is_silent:
+            pid = self._process.pid
+            remedy = f"Wake it by 'kill -CONT {pid}', or 'kill -9 {pid}': then the recording goes on in a further file."
+            doing = "messages wait for it, as far as there is room"
+            self._absence = Absence(NAME, self._clock.now_s(), "it does not respond", doing, remedy)
+            self.on_changed(f"its recorder does not respond; {doing}")
+        else:
+            self._absence = None
+            self.on_changed("its recorder responds again")
 
     def _lost(self, cause: str, doing: str, remedy: str = "") -> None:
         self._absence = Absence(NAME, self._clock.now_s(), cause, doing, remedy)

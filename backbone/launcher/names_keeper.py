@@ -18,6 +18,7 @@ from backbone.picture.look import LOOK_TIME_S, types_of
 from backbone.picture.mission import MissionPicture
 from backbone.picture.names import names_in
 from backbone.printable import printable_all
+from backbone.rc_manager.messages import AskSchedule
 from backbone.run_names import MissionNames
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
@@ -29,7 +30,7 @@ LIST_AGAIN_S = 10.0  # chosen: a person who signs in, or a message that was lost
 
 
 class NamesKeeper:
-    """Listens to nameserver and RC manager, and writes the names whenever they have changed.
+    """Listens to components, asks the RC manager for its RCs, and writes the names whenever they have changed.
 
     Args:
         bus: Of the launcher.
@@ -43,11 +44,11 @@ class NamesKeeper:
         self._types: list[TypeCount] = []
         self._written: MissionNames | None = None
         self._news = asyncio.Event()
+        self._has_old_schedule = True
 
     async def run(self) -> None:
         """Keep the file until cancelled; at most one write in ``WRITE_EVERY_S``."""
         hearing = [
-            self._bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard, latest=True),
             self._bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard),
             self._bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard),
         ]
@@ -57,6 +58,8 @@ class NamesKeeper:
                 while True:
                     await self._news.wait()
                     self._news.clear()
+                    if self._has_old_schedule:
+                        await self._ask_schedule()
                     self._write()
                     await self._clock.sleep_s(WRITE_EVERY_S * self._clock.rate)
         finally:
@@ -72,14 +75,29 @@ class NamesKeeper:
                     self._types = await types_of(self._bus)
             except (LinkError, Refusal) as error:  # the health watch reports it
                 log.info("the names are as they were: %s", error)
+            self._has_old_schedule = True
             self._news.set()
             await self._clock.sleep_s(LIST_AGAIN_S * self._clock.rate)
+
+    async def _ask_schedule(self) -> None:
+        """Ask once after components came and went: RCs change no sooner, and the schedule changes all the time."""
+        self._has_old_schedule = False
+        try:
+            schedule = await self._bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=LOOK_TIME_S)
+        except (LinkError, Refusal) as error:
+            log.info("the names of RCs are as they were: %s", error)
+        else:
+            self._picture.take(printable_all(schedule))
 
     def _heard(self, envelope: Envelope[Message]) -> None:
         match printable_all(envelope.body):
             case Appeared(component=component):
                 self._picture.take(component)
-            case Schedule() | ComponentState() | Disappeared() as said:
+                self._has_old_schedule = True
+            case Disappeared() as said:
+                self._picture.take(said)
+                self._has_old_schedule = True
+            case ComponentState() as said:
                 self._picture.take(said)
         self._news.set()
 

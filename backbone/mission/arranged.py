@@ -15,6 +15,7 @@ class UnitFault(msgspec.Struct, frozen=True):
         module: The module that it is about.
         port: An input, output or parameter of the module, or ``CLASS``.
         given: A key that is given from outside.
+        quality: A key whose quality is declared.
         message: A sentence with the names.
         remedy: What to do.
     """
@@ -25,6 +26,7 @@ class UnitFault(msgspec.Struct, frozen=True):
     module: str = ""
     port: str = ""
     given: str = ""
+    quality: str = ""
 
 
 class Arranged(msgspec.Struct, frozen=True):
@@ -45,8 +47,10 @@ class UnitsQuestion(msgspec.Struct, frozen=True):
         class_path: The class that runs units.
         units: Name, frequency, modules and so on of each, as its class reads them.
         given: Key → class and source of what comes from outside.
+        qualities: Key → how its values travel, where it is not as for all outputs.
     """
 
     class_path: str
     units: tuple[dict[str, object], ...]
     given: dict[str, dict[str, object]]
+    qualities: dict[str, dict[str, object]] = {}

@@ -101,6 +101,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
         abilities: What its components can be commanded to do, and what they report.
         given: Parameters that other elements and attributes of the mission file set.
         shares_process: Whether the placer may put its components into a process with others.
+        alike_most: Most of its components that the placer puts into one process with each other; 1: none.
     """
 
     doc: str = ""
@@ -113,6 +114,7 @@ class ClassFacts(msgspec.Struct, frozen=True):
     abilities: Abilities = NO_ABILITIES
     given: tuple[str, ...] = ()
     shares_process: bool = True
+    alike_most: int = 1
 
     def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
         """Return all that can be given while this driver is used; None if nothing is known of the driver."""

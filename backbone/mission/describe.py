@@ -110,6 +110,7 @@ def _component_type(declared: TypeElement, classes: Mapping[str, ClassFacts]) ->
         needs={needed.role or needed.type: needed.type for needed in declared.needs},
         abilities=NO_ABILITIES if facts is None else facts.abilities,
         shares_process=facts is None or facts.shares_process,
+        alike_most=1 if facts is None else facts.alike_most,
     )
 
 

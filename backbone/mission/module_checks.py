@@ -23,6 +23,7 @@ def check_modules(tables: Tables, report: Report) -> None:
         return
     modules = [module for unit in tables.units for module in unit.all("module")]
     check_unique(section.all("given"), "key", "given key", report)
+    check_unique(section.all("quality"), "key", "quality of", report)
     check_unique(modules, "name", "module", report)
     check_unique([choice for unit in tables.units for choice in unit.all("choose")], "key", "choice of", report)
     for element in (*section.all("given"), *modules):
@@ -59,6 +60,7 @@ def units_question(tables: Tables) -> UnitsQuestion | None:
             }
             for one in section.all("given")
         },
+        {one.text("key"): _quality(one) for one in section.all("quality")},
     )
 
 
@@ -93,6 +95,16 @@ def _unit(unit: Element) -> dict[str, object]:
     }
 
 
+def _quality(element: Element) -> dict[str, object]:
+    return {
+        "reliable": bool(element.flag("reliable")),
+        "urgency": element.text("urgency"),
+        "express": bool(element.flag("express")),
+        "most_bytes": int(element.text("most-bytes")),
+        "deadline_s": element.number("deadline-s") or 0.0,
+    }
+
+
 def _place(tables: Tables, fault: UnitFault) -> Place:
     """Return the place of the port in the module, of the module, of the unit, or of the given key."""
     return next(_places(tables, fault), tables.root.place)
@@ -116,4 +128,5 @@ def _places(tables: Tables, fault: UnitFault) -> Iterator[Place]:
             yield unit.place_of("name")
     if section is not None:
         yield from (one.place_of("class") for one in section.all("given") if one.text("key") == fault.given)
+        yield from (one.place_of("key") for one in section.all("quality") if one.text("key") == fault.quality)
         yield section.place

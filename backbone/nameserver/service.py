@@ -18,9 +18,10 @@ from typing import assert_never
 import msgspec
 
 from backbone.authentication import NoSecret, dictionary_of
+from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
-from backbone.bus.zenoh_threads import all_threads
+from backbone.bus.zenoh_threads import threads_of_a_hub
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import AskState, ComponentState, NameTaken, Register, Registered
@@ -81,8 +82,10 @@ class Nameserver(Component[NameserverParameters]):
         if listen and not dictionary_file:
             raise NoSecret(f"the hub would listen at {', '.join(listen)} without a secret")
         config = hub_config([launch.endpoint, *listen], dictionary_file=dictionary_file)
-        all_threads()
-        return ZenohBus.open(launch.mission, launch.address, clock, config)
+        threads_of_a_hub()
+        bus = ZenohBus.open(launch.mission, launch.address, clock, config)
+        bus.copies = copies_for(launch.run_directory)
+        return bus
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

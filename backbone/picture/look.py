@@ -125,13 +125,17 @@ def _lacks(listing: Components, processes: Iterable[ProcessState]) -> list[str]:
     """Return why the list of components is incomplete, one line for each reason."""
     listed = {component_of(component.address) for component in listing.components}
     unknown = {component_of(address) for address in listing.unknown}
-    running = {process.spawn.name for process in processes if process.pid} - listed - unknown
+    kept = list(processes)
+    running = {process.spawn.name for process in kept if process.pid} - listed - unknown
+    starting = {process.spawn.name for process in kept if not process.pid and not process.last_end} - listed - unknown
     lines = []
     if unknown:
         lines.append(f"the list is incomplete: no word yet from {_count(unknown)}")
+    if starting:
+        lines.append(f"the list is incomplete: still being started: {_count(starting)}")
     if running:
         lines.append(f"the list is incomplete: running and not registered yet: {_count(running)}")
-    elif not listing.complete and not unknown:
+    elif not listing.complete and not lines:
         lines.append("the list may be incomplete: the nameserver began a moment ago and components still come back")
     return lines
 

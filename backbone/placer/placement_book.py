@@ -34,7 +34,7 @@ from backbone.creator.messages import HostLoad, ProcessState, Spawn
 from backbone.naming import Subsystem, did_you_mean
 from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase, PlacementRecord
 from backbone.placer.messages import NotPlaced
-from backbone.placer.packing import is_packed, pack
+from backbone.placer.packing import is_packed, joined, whole
 from backbone.placer.placement import CandidateHost, Choice, obstacle, place
 
 STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; no mission stops so many in that time
@@ -198,9 +198,8 @@ class PlacementBook:
         record = self.record(name)
         record.host = ""  # it must not count on the host that it leaves
         choice = place(name, record.spawn.tags, record.pin, self.hosts(), colocation=self._colocation(record))
-        if is_packed(record.spawn.process):
-            there = [one.spawn.process for one in self.records() if one is not record and one.host == choice.host]
-            record.spawn = msgspec.structs.replace(record.spawn, process=pack(there, self._packs))
+        there = [one.spawn for one in self._records.values() if one is not record and one.host == choice.host]
+        record.spawn = msgspec.structs.replace(record.spawn, process=joined(record.spawn, there, self._packs))
         record.phase, record.host, record.reasons, record.since_s = (
             PlacementPhase.STARTING,
             choice.host,
@@ -344,12 +343,13 @@ class PlacementBook:
     # ------------------------------------------------------------------
     def _colocation(self, record: PlacementRecord) -> str:
         """Return the host of the other members of its process; empty if they have none or there are none."""
-        if not record.spawn.process or is_packed(record.spawn.process):
+        spawn = record.spawn
+        if not spawn.process or is_packed(spawn.process) or spawn.alike_most > 1:
             return ""
         hosts = [
             other.host
             for other in self.records()
-            if other is not record and other.spawn.process == record.spawn.process and self.is_alive(other.host)
+            if other is not record and whole(other.spawn.process) == whole(spawn.process) and self.is_alive(other.host)
         ]
         return hosts[0] if hosts else ""
 

@@ -63,10 +63,11 @@ class PlacerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters of ``Placer``.
 
     Attributes:
-        packs: Number of shared processes a host into which components without a process are packed; 0: none.
+        packs: Number of shared processes a host into which components without a process are packed; 0: none; None:
+            only components of a type that has many.
     """
 
-    packs: Annotated[int, msgspec.Meta(ge=0, le=MOST_PACKS)] = 0
+    packs: Annotated[int, msgspec.Meta(ge=0, le=MOST_PACKS)] | None = None
 
 
 class Placer(Component[PlacerParameters]):
@@ -77,7 +78,7 @@ class Placer(Component[PlacerParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._book = PlacementBook(self.parameters.packs)
+        self._book = PlacementBook(self.parameters.packs or 0)
         self._queue: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
         self._happened = News(clock)
         self._creators = Creators(bus, clock, self._book, self._happened)
@@ -177,7 +178,9 @@ class Placer(Component[PlacerParameters]):
             if component_type.multiplicity is Multiplicity.MANY:
                 await alone.aclose()
             spawn = _spawn(name, order, component_type, requester)
-            if not spawn.process and component_type.shares_process and self.parameters.packs:
+            if not spawn.process and self.parameters.packs is None:
+                spawn = msgspec.structs.replace(spawn, alike_most=component_type.alike_most)
+            elif not spawn.process and component_type.shares_process and self.parameters.packs:
                 spawn = msgspec.structs.replace(spawn, process=WANTS_PACK)
             record = self._book.reserve(spawn, order.host, self.clock.now_s())
             try:

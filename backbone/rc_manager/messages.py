@@ -38,8 +38,8 @@ from backbone.wire import Message
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
 EPOCHS_PER_S = 1000  # chosen: a restarted RC begins above all its earlier epochs, as no RC changes hands so often
 EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s
-BEAT_EVERY_S = 0.3  # chosen: ARC to RC manager; a hung ARC is noticed within BEAT_MISSED_S
-BEAT_MISSED_S = 1.0  # chosen: three beats
+BEAT_WITHIN_S = 0.7  # chosen: an ARC beats after each renewal; one that gets no renewal beats so long after its last
+BEAT_MISSED_S = 1.2  # chosen: one of the two beats that are due may be lost; named at the third renewal, after 1.5 s
 LONGEST_PACKET_S = 10.0  # chosen: a radio gives a packet up after a second; a longer time is a fault of its driver
 
 
@@ -94,7 +94,7 @@ class Done(Message, frozen=True):
 
 
 class Beat(Message, frozen=True):
-    """Heartbeat of an ARC and its owner; the ARC publishes it under ``Conversation.BEAT`` every ``BEAT_EVERY_S``."""
+    """Heartbeat of an ARC and its owner; the ARC publishes it under ``Conversation.BEAT`` after each ``Leases``."""
 
     arc: Mention
 

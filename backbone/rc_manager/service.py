@@ -20,7 +20,7 @@ from typing import assert_never
 
 from backbone.addresses import DEPENDENCY_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import Component
+from backbone.component.component import CALM_S, Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
@@ -102,6 +102,7 @@ from backbone.wire import Envelope, Message
 log = logging.getLogger(__name__)
 
 ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; after this it hangs or is gone
+CALM_EACH_S = 0.002  # chosen: of 100 ARCs five schedules a second, and people cannot read more
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
 
 
@@ -156,6 +157,7 @@ class RcManager(Component[RcManagerParameters]):
         self._resources = self._hardware.resources
         self._found = Found({}, {})
         self._switch_times = SwitchTimes()
+        self._lines_published = 0
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
@@ -440,9 +442,14 @@ class RcManager(Component[RcManagerParameters]):
         leases = Leases(self._leases(), LEASE_S * self.clock.rate, self._rcs.missing())
         self.bus.publish(self.address, Conversation.LEASES, leases)
 
+    def calm_s(self) -> float:
+        """Wait longer the more ARCs there are: no switch waits for a schedule that is made for people."""
+        return max(CALM_S, CALM_EACH_S * self._lines_published)
+
     def publish_news(self) -> None:
         """Publish the schedule, and how many run if that is news."""
         schedule = self.answers.schedule(self.clock.now_s())
+        self._lines_published = len(schedule.requests)
         running = sum(1 for request in schedule.requests if request.state == "running")
         feedback = f"{running} of {len(schedule.requests)} ARCs run"
         if self._log.why_no_trace:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import COPIED, Conversation
+from backbone.quality import NEVER_DROPPED
 from backbone.recording.translation import Translated, Translator, copies_in
 from backbone.wire import Message
 
-_COPIED = frozenset({*NEVER_DROPPED, Conversation.ASK})
-_DIRECT = tuple(one for one in Conversation if one not in {*_COPIED, Conversation.TOLD, Conversation.ALIVE})
+_OVERHEARD_AS_COPIES = frozenset({*NEVER_DROPPED, Conversation.ASK})
+_TOLD = f"/{Conversation.TOLD}"
+_DIRECT = tuple(one for one in Conversation if one not in {*_OVERHEARD_AS_COPIES, *COPIED, Conversation.ALIVE})
 
 
 class Hearing:
@@ -24,29 +26,31 @@ class Hearing:
     def __init__(self, classes: Mapping[str, type[Message]], keys: Sequence[str] = ()) -> None:
         self._translator, self._keys = Translator(classes), tuple(keys)
 
-    def heard(self, key: str, raw: bytes, at_s: float) -> Iterator[tuple[str, Translated]]:
-        """Yield key and message; of ``Told`` the copied ones, with the key that they had.
+    def heard(self, key: str, raw: bytes, at_s: float) -> list[tuple[str, Translated]]:
+        """Return key and message; of ``Told`` the copied ones, with the key that they had.
 
         Args:
             key: At which the bytes were overheard.
             raw: The bytes.
             at_s: Mission time when they came.
         """
-        for said_at, envelope in unfolded(key, raw):
-            if not self._keys or is_meant(said_at, self._keys):
-                yield said_at, self._translator.translate(envelope, at_s)
+        translate, keys = self._translator.translate, self._keys
+        return [
+            (said_at, translate(envelope, at_s))
+            for said_at, envelope in unfolded(key, raw)
+            if not keys or is_meant(said_at, keys)
+        ]
 
 
-def unfolded(key: str, raw: bytes) -> Iterator[tuple[str, bytes]]:
-    """Yield key and envelope of what was overheard; of ``Told`` each copied message, with the key that it had."""
-    told = copies_in(raw) if key.endswith(f"/{Conversation.TOLD}") else None
+def unfolded(key: str, raw: bytes) -> list[tuple[str, bytes]]:
+    """Return key and envelope of what was overheard; of ``Told`` each copied message, with the key that it had."""
+    told = copies_in(raw) if key.endswith(_TOLD) else None
     if told is None:
-        yield key, raw
-        return
+        return [(key, raw)]
     mission = "/".join(key.split("/")[:2])
-    for copies in told:
-        for quoted in copies.messages:
-            yield f"{mission}/{copies.address}/{copies.conversation}", quoted
+    return [
+        (f"{mission}/{copies.address}/{copies.conversation}", quoted) for copies in told for quoted in copies.messages
+    ]
 
 
 def is_meant(key: str, patterns: Sequence[str]) -> bool:
@@ -75,4 +79,4 @@ def to_overhear(patterns: Sequence[str]) -> list[Conversation]:
     ends = {pattern.rpartition("/")[2] for pattern in patterns}
     if not ends or not ends <= set(Conversation):
         return [Conversation.TOLD, *_DIRECT]
-    return [*([Conversation.TOLD] if ends & _COPIED else []), *(one for one in _DIRECT if one in ends)]
+    return [*([Conversation.TOLD] if ends & _OVERHEARD_AS_COPIES else []), *(one for one in _DIRECT if one in ends)]

@@ -12,7 +12,7 @@ from operator import or_
 
 from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.keys import Conversation, address_of
+from backbone.keys import COPIED, Conversation, address_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.hearing import is_meant
@@ -22,7 +22,8 @@ from backbone.recording.recorded_mission import RecordedMission
 from backbone.recording.revival import message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message
 
-_PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, Conversation.TOLD}
+SERVE_GAP_S = 0.005  # chosen: a component is served in a millisecond or two; seconds of the machine
+_PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, *COPIED}
 
 
 class Player:
@@ -59,8 +60,11 @@ class Player:
         self._accepts = reduce(or_, classes.values())
         self._tokens: dict[str, Subscription] = {}
         self._served: dict[str, Subscription] = {}
+        self._to_serve: dict[str, None] = {}
         self.ends: Callable[[], None] = lambda: None
         """Called when a person orders the mission to end."""
+        self.rests: Callable[[float], None] = lambda _gap_s: None
+        """Called before each message with the seconds of the machine until it is due; settable."""
         self.played = 0
         """Publications so far."""
 
@@ -100,14 +104,23 @@ class Player:
             await self._wait_until_due(following.message)
             self._ahead.pop()
             self._play(following)
+        self._serve_all()
 
     async def _wait_until_due(self, message: Recorded) -> None:
-        while self._ahead.has_time((message.at_s - self._clock.now_s()) / self._clock.rate):
+        clock, now_s = self._clock, self._clock.now_s()
+        while self._ahead.has_time((message.at_s - now_s) / clock.rate):
             self._ahead.decode_one()
-            await self._clock.sleep_s(0.0)
+            self._ahead.took((clock.now_s() - now_s) / clock.rate)
+            await clock.sleep_s(0.0)
+            now_s = clock.now_s()
+        while self._to_serve and message.at_s - now_s > SERVE_GAP_S * clock.rate:
+            self._serve(next(iter(self._to_serve)))
+            now_s = clock.now_s()
+        self.rests((message.at_s - now_s) / clock.rate)
         if self._next_step is None:
-            await self._clock.sleep_until_s(message.at_s)
+            await clock.sleep_until_s(message.at_s)
         elif self._is_published(message):
+            self._serve_all()
             await self._next_step(message)
 
     def _play(self, following: Ready) -> None:
@@ -117,8 +130,10 @@ class Player:
             self._publish(message, said)
             self.played += 1
         self._mission.take_said(message, said)
-        self._serve(address)
+        if address not in self._served:
+            self._to_serve[address] = None  # in a gap: it starts threads, and the next message may be due
         if message.key.endswith(f"/{Conversation.ALIVE}"):
+            self._serve(address)
             self._token_changed(address)
 
     def _is_published(self, message: Recorded) -> bool:
@@ -136,7 +151,12 @@ class Player:
             self._tokens.pop(address).close()
             self._served.pop(address).close()
 
+    def _serve_all(self) -> None:
+        for address in tuple(self._to_serve):
+            self._serve(address)
+
     def _serve(self, address: str) -> None:
+        self._to_serve.pop(address, None)
         if address not in self._served:
             self._served[address] = self._bus.serve(address, self._accepts, partial(self._answer, address))
 

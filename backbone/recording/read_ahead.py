@@ -6,6 +6,7 @@ gaps between messages. A message that is due is then only published.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,8 +15,10 @@ from backbone.recording.reader import NoRecording, Recorded, Recording
 from backbone.recording.revival import message_as_sent
 from backbone.wire import Message
 
-MOST_AHEAD_BYTES = 1 << 20  # chosen: ten pictures, or seconds of readings; a picture is the largest common message
+MOST_AHEAD_BYTES = 1 << 22  # chosen: forty pictures, or many seconds of readings; a busy machine gets behind seldom
 GAP_S = 0.01  # chosen: a chunk of readings is decoded within half of it (measured: 4 ms)
+SPARE = 2.0  # chosen: the next chunk takes at most so many times as long as the longest of the last ones
+FORGOTTEN = 0.98  # chosen: after some dozens of messages a machine that was busy for a moment counts as quick again
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +50,21 @@ class ReadAhead:
         self._ready: deque[Ready] = deque()
         self._bytes, self._is_over = 0, False
         self._damage: NoRecording | None = None
+        self._longest_s = 0.0
 
     def has_time(self, gap_s: float) -> bool:
         """Return whether to decode one more in a gap of so many seconds of the machine.
 
         The less is decoded, the shorter a gap suffices: a mission without long gaps is read ahead, too.
         """
-        return not self._is_over and self._bytes < MOST_AHEAD_BYTES and gap_s > GAP_S * self._bytes / MOST_AHEAD_BYTES
+        needed_s = max(GAP_S, SPARE * self._longest_s)
+        return (
+            not self._is_over and self._bytes < MOST_AHEAD_BYTES and gap_s > needed_s * self._bytes / MOST_AHEAD_BYTES
+        )
+
+    def took(self, seconds: float) -> None:
+        """Record how long the last message took, seconds of the machine: a slow machine needs longer gaps."""
+        self._longest_s = max(seconds, FORGOTTEN * self._longest_s)
 
     def decode_one(self) -> None:
         """Decode one message more, if there is one."""
@@ -70,7 +81,7 @@ class ReadAhead:
 
     def fill(self) -> None:
         """Decode as much as may wait."""
-        while self.has_time(GAP_S):
+        while self.has_time(math.inf):
             self.decode_one()
 
     def first(self) -> Ready | None:

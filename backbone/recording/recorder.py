@@ -12,7 +12,7 @@ import shutil
 from collections.abc import Callable, Mapping
 
 from backbone.addresses import COMPONENT_DATABASE, RC_MANAGER
-from backbone.bus.host_copies import PICTURES
+from backbone.bus.host_copies import copy_at
 from backbone.bus.interface import Bus, Clock, Overhearing, Reply
 from backbone.component.messages import (
     AskParameters,
@@ -26,13 +26,13 @@ from backbone.component.messages import (
 )
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
-from backbone.keys import Conversation
+from backbone.keys import ROOT, Conversation
 from backbone.keys import key as key_of
 from backbone.naming import component_of
 from backbone.rc_manager.messages import AskSchedule, AskSnapshot, ScheduleSnapshot
 from backbone.recording.files import SPLIT_BYTES, SPLIT_S, RecordingFiles
 from backbone.recording.hearing import to_overhear
-from backbone.recording.host_ear import HostEar
+from backbone.recording.host_ear import EarTaken, HostEar
 from backbone.recording.presence import Presence
 from backbone.recording.writer import RecordingWriter
 from backbone.scheduling.views import Schedule
@@ -42,13 +42,16 @@ from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
 FLUSH_EACH_S = 0.25  # chosen: a killed recorder may lose half a second, also on a busy machine; seconds of the machine
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
-OVERHEARD_WITHIN_S = 0.1  # a copy gathers 10 ms at its sender and 50 ms here; seconds of the machine
+OVERHEARD_WITHIN_S = 0.2  # a copy gathers 10 ms at its sender and up to 100 ms here; seconds of the machine
 MOST_ATTEMPTS = 5  # chosen: together ten times as long
 SNAPSHOT_EACH_S = 10.0  # chosen: a replay from the middle decides on few events that are not shown
 SNAPSHOT_S_PER_BYTE = 1.5e-4  # measured: a kilobyte is written in 0.15 ms; so it takes a thousandth of the time
 GONE_AFTER_S = 5.0  # chosen: a restarted hub is back within two; seconds of the machine
 LEAST_FREE_BYTES = 100 * 1000 * 1000  # B-Human's logger: it stops below 100 MB
 MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: a second of four cameras in color
+
+_ANSWERS = (Conversation.TOLD, Conversation.ASK)
+"""Where copies of an answer come: over the bus, and from processes."""
 
 log = logging.getLogger(__name__)
 
@@ -66,9 +69,11 @@ class Recorder:
         keys: Patterns of the keys to record, without ``scout/<mission>/``; empty: all.
         mission_xml: The mission's file; empty: not known.
         user: The person who records; empty: nobody.
-        ear: Receives the copies that processes of this host send. None: the recorder overhears the bus alone.
-        host_only: True: the recorder writes these copies alone, and asks no component. False: it also overhears the
-            bus, but for pictures.
+        ear: Receives the copies that processes of this host send. None, or another recorder has taken it: the recorder
+            overhears the bus alone.
+        is_lossless: True: all that is overheard is kept by its senders until it came, however much comes at once.
+        host_only: True: the recorder writes these copies alone, and asks no component. False: it also overhears those
+            that other processes send by network, which have no pictures.
     """
 
     def __init__(
@@ -86,7 +91,9 @@ class Recorder:
         user: str = "",
         ear: HostEar | None = None,
         host_only: bool = False,
+        is_lossless: bool = False,
     ) -> None:
+        self._is_lossless = is_lossless
         self._bus, self._clock, self._user = bus, clock, user
         self._files, self._keys = files, keys
         self._ear, self._host_only = ear, host_only and ear is not None
@@ -96,11 +103,13 @@ class Recorder:
         self._begun_s = clock.now_s()
         self._subscribed: list[Overhearing] = []
         self._appeared: asyncio.Queue[str] = asyncio.Queue()
-        self._awaited, self._was_told = "", asyncio.Event()
+        self._awaited, self._was_told = frozenset[str](), asyncio.Event()
         self._bug: BaseException | None = None
         self._one_at_a_time, self._needs_snapshot = asyncio.Lock(), asyncio.Event()
         self._ended = asyncio.Event()
         self._has_link = True
+        self.on_flushed: Callable[[], None] = lambda: None
+        """Called after each flush; settable."""
         self.full = ""
         """Why the file can grow no more; empty: it can."""
 
@@ -129,7 +138,7 @@ class Recorder:
         """
         self._bus.on_bug = self._fail
         if self._ear is not None:
-            await self._ear.open(self._heard, self._fail)
+            await self._open_ear(self._ear)
         if not self._host_only:
             self._overhear()
         self._bus.watch_link(self._link_changed)
@@ -150,11 +159,24 @@ class Recorder:
         if self._bug is not None:
             raise self._bug
 
+    async def _open_ear(self, ear: HostEar) -> None:
+        ear.on_lack = lambda what: self._say(f"{self._who} {what}", LogLevel.WARNING)
+        try:
+            await ear.open(self._heard, self._fail)
+        except (EarTaken, OSError) as error:
+            if self._host_only:
+                raise
+            log.info("overhears the bus: %s", error)
+            self._ear = None
+
     def _overhear(self) -> None:
-        elsewhere = PICTURES if self._ear is not None else frozenset()
-        for conversation in to_overhear(self._keys):
-            if conversation not in elsewhere:
-                self._subscribed.append(self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES))
+        if self._ear is not None:
+            self._subscribed.append(self._bus.overhear(Conversation.FAR, self._heard_far, MOST_WAITING_BYTES))
+        else:
+            for conversation in to_overhear(self._keys):
+                self._subscribed.append(
+                    self._bus.overhear(conversation, self._heard, MOST_WAITING_BYTES, lossless=self._is_lossless)
+                )
         self._bus.watch_alive("*/*", self._alive_changed)
 
     async def _flush_until_end(self) -> None:
@@ -162,6 +184,7 @@ class Recorder:
         while not self._ended.is_set() and not self.full:
             await self._clock.sleep_s(FLUSH_EACH_S * self._clock.rate)
             self._flush()
+            self.on_flushed()
             news = self.dropped - dropped
             if news:
                 self._say(f"{counted(news, 'message')} came too fast to be recorded", LogLevel.WARNING)
@@ -171,6 +194,8 @@ class Recorder:
                 self.end()
 
     def _flush(self) -> None:
+        if self._ear is not None:
+            self._ear.hear()
         try:
             self._writer.flush()
             if shutil.disk_usage(self._files.path.parent).free < LEAST_FREE_BYTES:
@@ -236,8 +261,18 @@ class Recorder:
         event = StoryEvent(self._clock.now_s(), self._bus.source, what, "recording", "", level, self._user)
         self._bus.publish(self._bus.source, Conversation.LOG, event)
 
+    def _heard_far(self, at: str, raw: bytes) -> None:
+        end, own = 0, f"{ROOT}/{self._bus.mission}/"
+        try:
+            while (copy := copy_at(raw, end)) is not None:
+                end = copy.end
+                if copy.key.startswith(own):  # anybody may publish there
+                    self._heard(copy.key, copy.raw)
+        except (ConnectionError, UnicodeDecodeError) as error:
+            log.warning("no copies at %s: %s", at, error)
+
     def _heard(self, key: str, raw: bytes) -> None:
-        if key == self._awaited:
+        if key in self._awaited:
             self._was_told.set()
         if self.full:
             return
@@ -275,7 +310,7 @@ class Recorder:
     async def _asked(self, address: str, question: Message, reply: type[Reply]) -> Reply | None:
         """Return the answer once it was overheard too; None: there is none."""
         async with self._one_at_a_time:
-            self._awaited = key_of(self._bus.mission, address, Conversation.TOLD)
+            self._awaited = frozenset(key_of(self._bus.mission, address, one) for one in _ANSWERS)
             for _attempt in range(MOST_ATTEMPTS):
                 self._was_told.clear()
                 try:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
-from typing import Any, Union, cast
+from typing import Any, NamedTuple, Union, cast
 
 import msgspec
 from msgspec import inspect
@@ -31,8 +30,7 @@ _PLAIN = (
 _UNSPEAKABLE = (TypeError, ValueError, OverflowError, RecursionError)  # what MessagePack can say, and JSON cannot
 
 
-@dataclass(frozen=True, slots=True)
-class Translated:
+class Translated(NamedTuple):
     """A message as a recording holds it.
 
     Attributes:
@@ -63,7 +61,7 @@ class Translator:
 
     def __init__(self, classes: Mapping[str, type[Message]]) -> None:
         known: Any = Union[tuple(classes.values())]  # noqa: UP007  made at run time
-        self._known = msgspec.msgpack.Decoder(Envelope[known])
+        self._known: Any = msgspec.msgpack.Decoder(Envelope[known])
         self._any: Any = msgspec.msgpack.Decoder(Envelope[Any])
 
     def translate(self, raw: bytes, heard_s: float) -> Translated:
@@ -74,8 +72,7 @@ class Translator:
             return self._unknown(raw, heard_s)
         kind = type(envelope.body)
         try:
-            fields = named(envelope.body)
-            return _translated(cast("Envelope[Message]", envelope), schema_of(kind), kind, fields, heard_s, len(raw))
+            return _translated(envelope, schema_of(kind), kind, named(envelope.body), heard_s, len(raw))
         except _UNSPEAKABLE:
             return Translated("", envelope.source, envelope.sequence, envelope.stamp_s, None, raw, len(raw))
 
@@ -112,6 +109,7 @@ class Heading(msgspec.Struct, frozen=True, array_like=True):
 
 
 NO_HEADING = Heading(0, "", 0, 0.0, "", _Tagged(""))
+_to_json = msgspec.json.Encoder().encode
 _headings = msgspec.msgpack.Decoder(Heading)
 _told = msgspec.msgpack.Decoder(Envelope[Told])
 
@@ -135,9 +133,9 @@ def copies_in(raw: bytes) -> list[Copies] | None:
 def _translated(
     envelope: Envelope[Any], schema: str, kind: type[Message] | None, body: object, heard_s: float, size_bytes: int
 ) -> Translated:
-    said = {"sequence": envelope.sequence, "stamp_s": envelope.stamp_s, "heard_s": heard_s, "cause": envelope.cause}
-    data = msgspec.json.encode({**said, "body": body})
-    return Translated(schema, envelope.source, envelope.sequence, envelope.stamp_s, kind, data, size_bytes)
+    sequence, stamp_s = envelope.sequence, envelope.stamp_s
+    said = {"sequence": sequence, "stamp_s": stamp_s, "heard_s": heard_s, "cause": envelope.cause, "body": body}
+    return Translated(schema, envelope.source, sequence, stamp_s, kind, _to_json(said), size_bytes)
 
 
 def named(body: msgspec.Struct) -> dict[str, Any]:

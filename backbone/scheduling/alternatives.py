@@ -21,8 +21,9 @@ from backbone.scheduling.requests import (
     UnknownRc,
     Usage,
 )
-from backbone.scheduling.response_time import admissible, remedy, stream, utilization
+from backbone.scheduling.response_time import admissible, remedy
 from backbone.scheduling.state import ScheduleState
+from backbone.scheduling.streams import stream, utilization
 
 Wish = Mapping[str, RcUse]
 

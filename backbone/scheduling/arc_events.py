@@ -23,6 +23,7 @@ from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry, Decisio
 from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.packet_times import PacketTimes
+from backbone.scheduling.preemption import understating
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import MeasuredPackets, RcUse, RequestState, SchedulingRequest
@@ -227,12 +228,12 @@ class ArcEvents:
         """Let connected ARCs ask anew where an RC cannot serve all of them by the measured times."""
         held = dict.fromkeys(rc for arc in self.understating.values() if arc.state in CONNECTED for rc in arc.shares)
         for rc in held:
-            for arc in self._table.understating(rc):
+            for arc in understating(self._table, rc):
                 self._ask_anew(arc)
 
     def ask_anew_beside(self, arc: ArcEntry) -> bool:
         """Let holders ask anew beside which the ARC would be late; return whether there are any."""
-        asked = dict.fromkeys(holder for rc in arc.shares for holder in self._table.understating(rc, [arc]))
+        asked = dict.fromkeys(holder for rc in arc.shares for holder in understating(self._table, rc, [arc]))
         for holder in asked:
             self._ask_anew(holder)
         return bool(asked)

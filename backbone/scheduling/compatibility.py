@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from backbone.scheduling.entries import ArcEntry, RcEntry
-from backbone.scheduling.priority import by_precedence
-from backbone.scheduling.response_time import Analysis, Stream, admissible, exceeds
+from backbone.scheduling.precedence import by_precedence
+from backbone.scheduling.response_time import Analysis, admissible
+from backbone.scheduling.streams import Stream, exceeds
 
 SETS_REMEMBERED = 4096  # chosen: sets of users of one RC; a group of 30 meets some hundred between two arrivals
 
@@ -52,11 +53,9 @@ class Compatibility:
                 if common & (arc.excludes | other.excludes):
                     return False
                 beside.append(other)
-        return all(self.can_share(rc, [arc, *(other for other in beside if rc in other.uses)]) for rc in arc.shares)
-
-    def clash(self, arc: ArcEntry, other: ArcEntry) -> bool:
-        """Return whether the ARC cannot hold all its RCs together with this other one."""
-        return bool(arc.touches & other.excludes or arc.excludes & other.touches) or not self.fits(arc, (other,))
+        return not arc.shares or all(
+            self.can_share(rc, [arc, *(other for other in beside if rc in other.uses)]) for rc in arc.shares
+        )
 
     def usable(self, arc: ArcEntry) -> bool:
         """Return whether the ARC could run alone: its RCs are up and can serve it."""

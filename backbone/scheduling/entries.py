@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from backbone.scheduling.events import Instruction
-from backbone.scheduling.priority import Level, Path, higher
+from backbone.scheduling.priority import Level, Path, rank
 from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
-from backbone.scheduling.response_time import Stream
+from backbone.scheduling.streams import Stream
 
 INSTANT_S = 1e-9  # chosen: times closer than this are the same; far above the rounding of sums of times
 SOON_S = 1e-6  # chosen: an RC that should be free by now is expected at once, but is not free yet
@@ -167,7 +167,7 @@ class ArcEntry:
 
     def goes_before(self, other: ArcEntry) -> bool:
         """Return whether its owner is strictly higher than the other's."""
-        return self.level is not other.level and higher(self.path, other.path)
+        return self.level is not other.level and rank(self.path, other.path) > 0
 
     @property
     def understates(self) -> bool:

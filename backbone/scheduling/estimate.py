@@ -52,20 +52,16 @@ def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot
             for rc in alone:
                 ends_s[rc] = start_s + arc.length_s + arc.release_s
             for rc in crowded:
-                taken_s[rc] = taken_s.get(rc, 0.0) + arc.length_s * _share(table, arc, rc)
+                demanded = sum(one.packet_time_s / one.period_s for one in arc.uses[rc].streams)
+                share = min(1.0, demanded / table.state.rcs[rc].capacity)
+                taken_s[rc] = taken_s.get(rc, 0.0) + arc.length_s * share
     return slots
-
-
-def _share(table: Table, arc: ArcEntry, rc: str) -> float:
-    """Return the ARC's demand as a part of the RC's capacity, 0 to 1."""
-    demanded = sum(one.packet_time_s / one.period_s for one in arc.uses[rc].streams)
-    return min(1.0, demanded / table.state.rcs[rc].capacity)
 
 
 def _standing(table: Table, arc: ArcEntry, now_s: float) -> list[Hold]:
     """Return the holders that the ARC cannot run beside."""
     return [
         (holder, -math.inf, table.stands_until_s(holder, arc, now_s))
-        for holder in table.state.holders(arc)
-        if table.clash(arc, holder)
+        for holder in table.holders(arc)
+        if not table.fits(arc, [holder])
     ]

@@ -38,18 +38,9 @@ class Fairness(Protocol):
     def seniority(self, arc: ArcEntry, now_s: float) -> Seniority:
         """Return the key of the ARC among its equals; ARCs with a reservation come first."""
 
-    def joined(self, arc: ArcEntry, now_s: float) -> None:
-        """Count an ARC that became active."""
-
-    def stopped(self, arc: ArcEntry, now_s: float) -> None:
-        """Count the run time of an ARC that was revoked."""
-
-    def runs_on(self, arc: ArcEntry, waiting: Iterable[ArcEntry], now_s: float) -> bool:
-        """Return whether an ARC gets one more slice at once, before these equals that wait for its RCs."""
-
 
 class Turns:
-    """Each its own minimum run time in turn."""
+    """Each its own minimum run time in turn; no ARC has two turns in a row while equals wait."""
 
     discipline: Discipline = "turns"
 
@@ -57,17 +48,6 @@ class Turns:
         """Return its stamp."""
         del now_s
         return _of_reservation(arc) or (False, 0.0, *arc.stamp)
-
-    def joined(self, arc: ArcEntry, now_s: float) -> None:
-        """Count nothing."""
-
-    def stopped(self, arc: ArcEntry, now_s: float) -> None:
-        """Count nothing."""
-
-    def runs_on(self, arc: ArcEntry, waiting: Iterable[ArcEntry], now_s: float) -> bool:
-        """Give no ARC two turns in a row while equals wait."""
-        del arc, waiting, now_s
-        return False
 
 
 class EqualTime:

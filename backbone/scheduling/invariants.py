@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from backbone.scheduling.entries import CONNECTED, ArcEntry, RcEntry
 from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.preemption import understating
 from backbone.scheduling.requests import RequestState
 
 Broken = tuple[str, Sequence[ArcEntry]]
@@ -44,7 +45,7 @@ def _broken_of(schedule: MasterSchedule, rc: RcEntry, holders: Sequence[ArcEntry
     connected = [arc for arc in holders if arc.state in CONNECTED]
     if connected and not rc.up:
         yield f"{rc.name} is down and has no holders", connected
-    if rc.sharable and any(arc.understates for arc in connected) and schedule.table.understating(rc.name):
+    if rc.sharable and any(arc.understates for arc in connected) and understating(schedule.table, rc.name):
         yield f"{rc.name} serves all its holders in time, with the packet times that were measured", connected
     for arc in connected:
         if not schedule.table.fits(arc, [other for other in connected if other is not arc]):

@@ -53,6 +53,7 @@ class MasterSchedule:
         self._large: Planner = LargeGroupPlanner(self.table, slack_s=tolerance_s)
         if planner is not None:
             self._small = self._large = planner(self.table, slack_s=tolerance_s)
+        self._changed_in_large: dict[str, None] = {}
         self._exact_up_to = exact_up_to
         whole_up_to = math.inf if self._large.is_exact else exact_up_to
         self.planned_whole_up_to: float = whole_up_to if self._small.is_exact else 0
@@ -67,19 +68,27 @@ class MasterSchedule:
         Examines groups that changed since the last None; to be called again after the turn was carried out.
         """
         self._look_where_it_changed()
-        return self._small.due(now_s) or self._large.due(now_s)
+        turn = self._small.due(now_s)
+        if turn is None:
+            for rc in self._changed_in_large:
+                self._large.look_near(rc)
+            self._changed_in_large.clear()
+            turn = self._large.due(now_s)
+        return turn
 
     def _look_where_it_changed(self) -> None:
         changed = [rc for rc in self.state.changed if self.state.users.get(rc)]
         self.state.changed.clear()
         planners = [self.planner_of(next(iter(self.state.users[rc]))) for rc in changed]
         for rc, planner in zip(changed, planners, strict=True):
-            planner.look_near(rc)
+            if planner is self._small:
+                planner.look_near(rc)
+            else:
+                self._changed_in_large[rc] = None
         if (
             self.table.strict and not self._large.is_exact and self._large in planners
         ):  # before the change any ARC of a large group may have been held back
-            for rc in self.state.rcs.keys() - {*changed}:
-                self._large.look_near(rc)
+            self._changed_in_large.update(dict.fromkeys(self.state.rcs))
 
     def forgotten(self, now_s: float) -> ArcEntry | None:
         """Return an ARC whose time is now although no turn was found for it; for checks."""

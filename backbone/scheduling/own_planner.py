@@ -42,7 +42,13 @@ def load_planner(class_path: str) -> PlannerType | None:
         found = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, ValueError) as error:
         raise WrongPlanner(f"{class_path}: {error}", class_path=class_path) from error
-    lacking = sorted(one for one in vars(Planner) if not one.startswith("_") and not hasattr(found, one))
+    lacking = sorted(one for one in vars(Planner) if not one.startswith("_") and not _has(found, one))
     if lacking or not isinstance(found, type):
         raise WrongPlanner(f"{class_path} is no planner: it lacks {', '.join(lacking)}", class_path=class_path)
     return cast(PlannerType, found)
+
+
+def _has(found: object, name: str) -> bool:
+    """Return whether the class defines this, or declares it as an attribute of its objects."""
+    declared = (vars(base).get("__annotations__", {}) for base in getattr(found, "__mro__", ()))
+    return hasattr(found, name) or any(name in one for one in declared)

@@ -14,7 +14,8 @@ from collections.abc import Collection, Iterable, Sequence
 
 from backbone.scheduling.entries import CONNECTED, INSTANT_S, ArcEntry
 from backbone.scheduling.planner import Hold, Slot, Turn
-from backbone.scheduling.priority import higher, rank
+from backbone.scheduling.preemption import in_the_way, must_let_higher_go_first
+from backbone.scheduling.priority import rank
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
@@ -60,19 +61,20 @@ class GroupPlans:
         table, now = self._table, self.now
         if not any(now.starts_now(arc) for arc in queued if arc in possible):
             return None
+        exact = certain = self._make(slack_s=0.0)
+        if any(arc.state is RequestState.REVOKING for arc in self._group):
+            certain = self._make(slack_s=0.0, handed_over=True)
         before: list[ArcEntry] = []
         for arc in queued:
-            if arc.state is not RequestState.WAITING or table.must_let_higher_go_first(arc):
+            if arc.state is not RequestState.WAITING or must_let_higher_go_first(table, arc):
                 continue
-            if arc in possible and (
-                now.starts_now(arc) or (self.exact.starts_now(arc) and self.certain.starts_now(arc))
-            ):
-                pending = [other for other in before if self.certain.starts_now(other)]
-                in_the_way = table.in_the_way(arc, pending, self._group, self._now_s)
-                if in_the_way and self.certain.starts_now(arc):
-                    return Turn(arc, in_the_way)
+            if arc in possible and (now.starts_now(arc) or (exact.starts_now(arc) and certain.starts_now(arc))):
+                pending = [other for other in before if certain.starts_now(other)]
+                displaced = in_the_way(table, arc, pending, self._group, self._now_s)
+                if displaced and certain.starts_now(arc):
+                    return Turn(arc, displaced)
                 holders = [holder for holder in self._group if holder.holds]
-                if not in_the_way and now.starts_now(arc) and table.fits(arc, holders):
+                if not displaced and now.starts_now(arc) and table.fits(arc, holders):
                     return Turn(arc, [])
             before.append(arc)
         return None
@@ -81,18 +83,6 @@ class GroupPlans:
     def now(self) -> Plan:
         """The plan of the present state, with the tolerance of this run."""
         return self._make(slack_s=self._slack_s)
-
-    @functools.cached_property
-    def exact(self) -> Plan:
-        """The plan in which no ARC overlaps another."""
-        return self._make(slack_s=0.0)
-
-    @functools.cached_property
-    def certain(self) -> Plan:
-        """The same, as if all RCs that are being freed were free already."""
-        if not any(arc.state is RequestState.REVOKING for arc in self._group):
-            return self.exact
-        return self._make(slack_s=0.0, handed_over=True)
 
 
 class Plan:
@@ -125,7 +115,8 @@ class Plan:
         self._slack_s = slack_s
         self._handed_over = handed_over
         self._among_equals = among_equals
-        self._holders = [arc for arc in group if arc.state in CONNECTED or (arc.holds and not handed_over)]
+        self._group = group
+        self._holders: list[ArcEntry] = []
         self._starts_s: dict[ArcEntry, float] = {}
         self._reserved: list[_Reservation] = []
 
@@ -145,6 +136,9 @@ class Plan:
 
     def _find_next(self) -> None:
         place = len(self._starts_s)
+        if not place:
+            handed_over = self._handed_over
+            self._holders = [arc for arc in self._group if arc.state in CONNECTED or (arc.holds and not handed_over)]
         arc = self._order[place]
         start_s = self._starts_s[arc] = self._earliest_s(arc, place)
         if start_s < math.inf:
@@ -159,7 +153,7 @@ class Plan:
         if not table.usable(arc):
             return math.inf
         touches, excludes = arc.touches, arc.excludes
-        start_s = table.free_s(arc, now_s) if arc.holds and not self._handed_over else now_s
+        start_s = table.stands_until_s(arc, arc, now_s) if arc.holds and not self._handed_over else now_s
         for holder in self._holders:
             if (holder.touches & excludes or holder.excludes & touches) and holder is not arc:
                 until_s = table.stands_until_s(holder, arc, now_s)
@@ -210,7 +204,7 @@ class Plan:
     def _earliest_in_a_crowd_s(self, arc: ArcEntry, from_s: float, length_s: float, against: Sequence[Hold]) -> float:
         """Return the first time at which the sharable RCs have room for the ARC's streams, too."""
         lasting = [
-            (other, begin_s, math.inf if begin_s > -math.inf and higher(other.path, arc.path) else end_s)
+            (other, begin_s, math.inf if begin_s > -math.inf and rank(other.path, arc.path) > 0 else end_s)
             for other, begin_s, end_s in against
         ]
         times = sorted({from_s, *(end_s for _, _, end_s in lasting if from_s < end_s < math.inf)})

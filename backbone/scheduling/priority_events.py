@@ -7,6 +7,7 @@ from collections.abc import Callable
 from backbone.scheduling.entries import Decision
 from backbone.scheduling.events import RenewLeases
 from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.preemption import overloading
 from backbone.scheduling.priority_tree import PriorityTree, carried
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.rules import ROUNDING, SchedulingRules
@@ -14,10 +15,6 @@ from backbone.scheduling.transitions import Transitions
 
 Place = tuple[str, ...]
 """Names from the root to a node."""
-
-
-def _stays(place: Place) -> Place:
-    return place
 
 
 class PriorityEvents:
@@ -41,8 +38,7 @@ class PriorityEvents:
 
     def priority_changed(self, node: str, priority: int) -> None:
         """Set the number of a node or console."""
-        self._tree.change(node, priority)
-        self._changed()
+        self._change(lambda: self._tree.change(node, priority))
 
     def node_moved(self, node: str, parent: str) -> None:
         """Move a node below another parent, if possible."""
@@ -50,7 +46,7 @@ class PriorityEvents:
             return
         old, new = self._tree.move(node, parent)
         self._trace.nodes_moved(old, new)
-        self._changed(lambda place: carried(place, old, new))
+        self._change(moved=lambda place: carried(place, old, new))
 
     def age(self) -> None:
         """Raise ARCs that wait long, if the rules say so; they keep their level until they are served or idle."""
@@ -60,23 +56,27 @@ class PriorityEvents:
             elif arc.served(self._decision.now_s) or not arc.active:
                 self._state.raise_to(arc, 0)
         if self._tree.age((arc.place_in_tree, arc.raised) for arc in self._state.arcs.values() if arc.raised):
-            self._changed()
+            self._change()
 
     def next_aging_s(self) -> float | None:
         """Return when the next ARC rises; None if none does."""
         waiting = [arc for arc in self._state.arcs.values() if arc.state is RequestState.WAITING]
         return min((arc.since_s + (arc.raised + 1) * self._aging_s for arc in waiting), default=None)
 
-    def _changed(self, moved: Callable[[Place], Place] = _stays) -> None:
-        self.renumber(moved)
+    def _change(self, change: Callable[[], None] | None = None, moved: Callable[[Place], Place] | None = None) -> None:
+        """Change the tree, and count its numbers, and the places where ARCs moved to, from now on."""
+        if change is not None:
+            change()
+        places = [(arc, moved(arc.place_in_tree) if moved else arc.place_in_tree) for arc in self._state.arcs.values()]
+        self._state.set_paths([(arc, place, self._tree.path(place)) for arc, place in places])
         for names in self._trace.nodes():
             self._trace.introduce_nodes(self._tree.path(names))
         for rc in self._state.rcs.values():
-            for holder in self._table.overloading(rc.name) if rc.sharable else ():
+            for holder in overloading(self._table, rc.name) if rc.sharable else ():
                 self._transitions.revoke(holder, "order", rc.name)
         self._decision.instructions.append(RenewLeases())
 
-    def renumber(self, moved: Callable[[Place], Place] = _stays) -> None:
+    def renumber(self) -> None:
         """Give all ARCs the present numbers of their nodes."""
-        places = [(arc, moved(arc.place_in_tree)) for arc in self._state.arcs.values()]
-        self._state.set_paths((arc, place, self._tree.path(place)) for arc, place in places)
+        arcs = self._state.arcs.values()
+        self._state.set_paths([(arc, arc.place_in_tree, self._tree.path(arc.place_in_tree)) for arc in arcs])

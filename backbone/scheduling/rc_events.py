@@ -8,6 +8,7 @@ from __future__ import annotations
 from backbone.scheduling.entries import CONNECTED
 from backbone.scheduling.events import RcKnown
 from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.preemption import overloading
 from backbone.scheduling.transitions import Transitions
 
 
@@ -72,5 +73,5 @@ class RcEvents:
         self._state.set_capacity(rc, capacity)
         if self._trace.has_introduced(name):
             self._trace.record("rc_cap", id=name, cap=capacity)
-        for holder in self._table.overloading(name):
+        for holder in overloading(self._table, name):
             self._transitions.revoke(holder, "capacity", name)

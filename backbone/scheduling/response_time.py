@@ -26,48 +26,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from typing import Literal, NamedTuple
+from typing import Literal
 
-from backbone.scheduling.requests import Usage
+from backbone.scheduling.streams import ROUNDING, Stream, exceeds, utilization
 
 Analysis = Literal["exact", "sum"]
 
 MAX_ROUNDS = 100_000  # chosen: a longer search means a load within a millionth of the RC's capacity
-ROUNDING = 1e-9  # chosen: three shares of 0.1 fit a capacity of 0.3
 FLOAT_MARGIN = 1e-9  # chosen: a million times the rounding of a sum of a thousand shares
 LEAST_IDLE = 1e-4  # chosen: closer to a full load the linear bounds divide by too little to be of use
-
-
-class Stream(NamedTuple):
-    """Periodic packets of one ARC, times in whole microseconds."""
-
-    period_us: int
-    packet_us: int
-    deadline_us: int
-    jitter_us: int
-
-    @property
-    def share(self) -> Fraction:
-        """Part of the RC's time it needs, 0 to 1."""
-        return Fraction(self.packet_us, self.period_us)
-
-
-def stream(usage: Usage) -> Stream:
-    """Return the usage in whole microseconds; a deadline of 0 is the period."""
-    deadline_s = usage.deadline_s or usage.period_s
-    return Stream(
-        *(round(time_s * 1e6) for time_s in (usage.period_s, usage.packet_time_s, deadline_s, usage.jitter_s))
-    )
-
-
-def utilization(streams: Sequence[Stream]) -> float:
-    """Return the part of the RC's time they need together."""
-    return sum(one.packet_us / one.period_us for one in streams)
-
-
-def exceeds(capacity: float, streams: Sequence[Stream]) -> bool:
-    """Return whether their common demand exceeds the RC's capacity, in any order."""
-    return utilization(streams) > capacity + ROUNDING
 
 
 def admissible(streams: Sequence[Stream], capacity: float, analysis: Analysis = "exact") -> bool:

@@ -13,6 +13,7 @@ from typing import assert_never
 
 from backbone.scheduling.alternatives import choose
 from backbone.scheduling.arc_events import ArcEvents
+from backbone.scheduling.closing import Closing
 from backbone.scheduling.entries import CONNECTED, Decision
 from backbone.scheduling.events import (
     Adopted,
@@ -48,7 +49,7 @@ from backbone.scheduling.requests import Lease, NotMovable, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.slice_ends import SliceEnds
 from backbone.scheduling.state import ScheduleState
-from backbone.scheduling.timers import Timers
+from backbone.scheduling.switch import Switching
 from backbone.scheduling.trace_writer import TraceWriter
 from backbone.scheduling.transitions import Transitions
 
@@ -96,14 +97,16 @@ class ScheduleManager:
             planner=planner,
         )
         self.tree = PriorityTree(mission, mission_priority)
-        decision, schedule, ends = Decision(), self.master_schedule, SliceEnds(self._state)
+        decision, schedule = Decision(), self.master_schedule
         self._decision = decision
+        self._ends = ends = SliceEnds(self._state)
         self._trace = TraceWriter(decision, goes_on=goes_on)
         self._transitions = Transitions(decision, schedule, ends, self._trace, rules, tolerance_s=tolerance_s)
         self._priorities = PriorityEvents(decision, self._transitions, schedule, self.tree, rules)
         self._arcs = ArcEvents(decision, self._transitions, schedule, self.tree, self._priorities, rules)
         self._rcs = RcEvents(self._transitions, schedule)
-        self._timers = Timers(decision, self._arcs, ends, self._priorities, rules)
+        self._switching = Switching(decision, self._transitions, schedule)
+        self._closing = Closing(decision, self._transitions, schedule, self._arcs, ends, self._priorities, rules)
 
     def begun_anew(self, rules: SchedulingRules, planner: PlannerType | None = None) -> ScheduleManager:
         """Return another one that begins as this one began, with these rules."""
@@ -126,7 +129,7 @@ class ScheduleManager:
     @property
     def wake_s(self) -> float | None:
         """Mission time at which it asked to be woken; None: it did not."""
-        return self._timers.wake_s
+        return self._closing.wake_s
 
     # Events in, instructions out: apply, plan, switch.
 
@@ -141,16 +144,21 @@ class ScheduleManager:
         decision = self._decision
         decision.now_s, decision.instructions, decision.ended = max(now_s, decision.now_s), [], []
         self._apply(event)
-        self._timers.ring()
+        if self._arcs.retrying:
+            self._arcs.retry()
+        self._ends.check(decision.now_s)
+        if self.rules.aging_s:
+            self._priorities.age()
+        if self._arcs.understating:
+            self._arcs.ask_anew_where_late()
         while turn := self.master_schedule.due(decision.now_s):
             if turn.in_the_way:
-                self._transitions.make_way(turn)
+                self._switching.make_way(turn)
             elif not (self._arcs.understating and self._arcs.ask_anew_beside(turn.arc)):
-                self._transitions.connect(turn.arc)
+                self._switching.connect(turn.arc)
             if self.rules.aging_s:
                 self._priorities.age()
-        self._transitions.finish()
-        self._timers.set(rang=isinstance(event, Woken))
+        self._closing.close(rang=isinstance(event, Woken))
         return decision.instructions
 
     def _apply(self, event: Event) -> None:
@@ -227,7 +235,7 @@ class ScheduleManager:
             Lease(rc, arc.name, epoch, ranks.get(rc, -1))
             for arc in self._state.arcs.values()
             if arc.state in CONNECTED
-            for ranks in [self._transitions.ranks(arc)]
+            for ranks in [self._switching.ranks(arc)]
             for rc, epoch in arc.epochs.items()
         ]
 

@@ -19,8 +19,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from backbone.scheduling.requests import Usage
-from backbone.scheduling.response_time import stream, utilization
 from backbone.scheduling.step_average import StepAverage
+from backbone.scheduling.streams import stream, utilization
 from backbone.scheduling.trace import EXCLUSIVE, Line
 from backbone.scheduling.views import Period, RcUtilization
 

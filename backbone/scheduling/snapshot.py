@@ -18,11 +18,13 @@ import msgspec
 from backbone.errors import Refusal
 from backbone.scheduling import requests
 from backbone.scheduling.arc_events import ArcEvents
+from backbone.scheduling.closing import Closing
 from backbone.scheduling.compatibility import Compatibility
 from backbone.scheduling.damping import Damping
 from backbone.scheduling.entries import Afterwards, ArcEntry, Decision, RcEntry
 from backbone.scheduling.events import Requested
 from backbone.scheduling.fairness import EqualTime, Turns
+from backbone.scheduling.first_in_line import FirstInLine
 from backbone.scheduling.groups import Group, Groups
 from backbone.scheduling.large_group import LargeGroupPlanner
 from backbone.scheduling.master_schedule import MasterSchedule
@@ -30,25 +32,34 @@ from backbone.scheduling.packet_times import PacketTimes
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
-from backbone.scheduling.response_time import Stream
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.slice_ends import SliceEnds
 from backbone.scheduling.state import ScheduleState
+from backbone.scheduling.streams import Stream
+from backbone.scheduling.switch import Switching
 from backbone.scheduling.table import Table
-from backbone.scheduling.timers import Timers
 from backbone.scheduling.trace_writer import TraceWriter
 from backbone.scheduling.transitions import Transitions
 from backbone.scheduling.whole_group import WholeGroupPlanner
 
-FORM = 2
+FORM = 3
 """Grows when a snapshot of an earlier release cannot be read any more."""
 _OBJECTS: dict[str, type[Any]] = {
     kind.__name__: kind
     for kind in (
-        *(ScheduleManager, ScheduleState, MasterSchedule, Table, WholeGroupPlanner, LargeGroupPlanner, Transitions),
+        *(
+            ScheduleManager,
+            ScheduleState,
+            MasterSchedule,
+            Table,
+            WholeGroupPlanner,
+            LargeGroupPlanner,
+            FirstInLine,
+            Transitions,
+        ),
         *(TraceWriter, PriorityTree, PriorityEvents, ArcEvents, RcEvents, Damping, PacketTimes, Compatibility),
-        *(Timers, SliceEnds, Turns, EqualTime, Groups, Group, Decision, ArcEntry, RcEntry),
+        *(Transitions, Switching, Closing, SliceEnds, Turns, EqualTime, Groups, Group, Decision, ArcEntry, RcEntry),
     )
 }
 _VALUES: dict[str, type[Any]] = {

@@ -16,7 +16,8 @@ from backbone.scheduling.fairness import Discipline, EqualTime, Fairness, Turns
 from backbone.scheduling.groups import Group, Groups
 from backbone.scheduling.priority import Level, Path, rank
 from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
-from backbone.scheduling.response_time import Analysis, stream
+from backbone.scheduling.response_time import Analysis
+from backbone.scheduling.streams import stream
 
 
 class ScheduleState:
@@ -30,7 +31,10 @@ class ScheduleState:
         fairness: The order among equals.
         now_s: Time of the last change of an ARC's state.
         version: Grows with every change.
+        service_version: Grows with every change of what RCs can serve, and of priorities.
+        rc_versions: RC → a number that grows with every other change that concerns it.
         changed: RCs that changes concerned since the planners examined them, first concerned first.
+        bits: RC → its bit in sets of RCs.
         held_alone: RCs that an ARC holds alone whose slice is not over, as a set of bits.
     """
 
@@ -50,41 +54,38 @@ class ScheduleState:
         self.roomy: dict[str, bool] = {}
         """Sharable RC → whether its whole active demand fits, where this is known; see ``Compatibility``."""
         self.compatibility = Compatibility(self.rcs, self.users, admission, self.roomy)
-        self.fairness: Fairness = Turns() if discipline == "turns" else EqualTime(self.rivals, tolerance_s)
+        self._accounts = EqualTime(self.rivals, tolerance_s) if discipline == "time" else None
+        self.fairness: Fairness = self._accounts or Turns()
         self.now_s = 0.0
         self.version = 0
-        self._service_version = 0
-        self._rc_versions: dict[str, int] = {}
+        self.service_version = 0
+        self.rc_versions: dict[str, int] = {}
         self.changed: dict[str, None] = {}
-        self._bits: dict[str, int] = {}
+        self.bits: dict[str, int] = {}
         self._epochs_of_removed: dict[str, int] = {}
         self._levels: dict[Level, Level] = {}
         self.held_alone = 0
 
     # Changes.
 
-    def version_of(self, rc: str) -> int:
-        """Return a number that grows with every change that concerns the RC."""
-        return self._rc_versions.get(rc, 0) + self._service_version
-
     def concerns(self, rcs: Iterable[str]) -> None:
         """Note that a change concerns these RCs."""
         for rc in rcs:
             self.changed[rc] = None
-            self._rc_versions[rc] = self._rc_versions.get(rc, 0) + 1
+            self.rc_versions[rc] = self.rc_versions.get(rc, 0) + 1
         self.version += 1
 
     def _service_changed(self, rcs: Collection[str]) -> None:
         """Drop the cached answers about these RCs, and with them the first ARCs in line everywhere."""
-        self.compatibility.service_changed(rcs)
-        self._service_version += 1
+        self.service_version += 1
         self.concerns(rcs)
+        self.compatibility.service_changed(rcs)
 
     # RCs.
 
     def add_rc(self, known: RcKnown) -> RcEntry:
         """Take in an RC and return its entry."""
-        self._bits.setdefault(known.rc, 1 << len(self._bits))
+        self.bits.setdefault(known.rc, 1 << len(self.bits))
         entry = RcEntry(
             known.rc,
             known.kind,
@@ -105,7 +106,7 @@ class ScheduleState:
         del self.rcs[rc.name]
         self.changed.pop(rc.name, None)
         self.compatibility.service_changed([rc.name])
-        self._service_version += 1
+        self.service_version += 1
         self.version += 1
 
     def rc_down(self, rc: RcEntry, fault: str | None) -> bool:
@@ -170,8 +171,8 @@ class ScheduleState:
             settle_s=settle_s,
             release_s=max((rc.disconnect_s for rc in rcs), default=0.0),
             since_s=now_s,
-            touches=sum(self._bits[rc.name] for rc in rcs),
-            excludes=sum(self._bits[rc.name] for rc in rcs if rc.name not in shares),
+            touches=sum(self.bits[rc.name] for rc in rcs),
+            excludes=sum(self.bits[rc.name] for rc in rcs if rc.name not in shares),
             shares=shares,
             streams=streams,
             measured=streams,
@@ -214,8 +215,8 @@ class ScheduleState:
         """Let the ARC enter this state."""
         self.now_s = now_s
         was_active, held = arc.active, arc.holds
-        if arc.state is RequestState.RUNNING:
-            self.fairness.stopped(arc, now_s)
+        if self._accounts is not None and arc.state is RequestState.RUNNING:
+            self._accounts.stopped(arc, now_s)
         arc.state, arc.since_s = state, now_s
         arc.active, arc.holds = state is not RequestState.IDLE, state in HOLDING
         arc.queued = state is RequestState.WAITING or (
@@ -239,8 +240,8 @@ class ScheduleState:
         if arc.active is not was_active:
             for rc in arc.uses:
                 self.roomy.pop(rc, None)  # another ARC wants it, to share or alone, or one less
-        if arc.active and not was_active:
-            self.fairness.joined(arc, now_s)
+        if self._accounts is not None and arc.active and not was_active:
+            self._accounts.joined(arc, now_s)
 
     def set_afterwards(self, arc: ArcEntry, afterwards: Afterwards) -> None:
         """Set the state of an ARC that is being revoked, once its RCs are free."""
@@ -256,8 +257,10 @@ class ScheduleState:
 
     def runs_on(self, arc: ArcEntry) -> bool:
         """Return whether the discipline prefers an ARC whose slice is over to the equals that wait for its RCs."""
+        if self._accounts is None:
+            return False
         waiting = [other for other in self.beside(arc) if other.state is RequestState.WAITING]
-        return self.fairness.runs_on(arc, filter(self.compatibility.usable, waiting), self.now_s)
+        return self._accounts.runs_on(arc, filter(self.compatibility.usable, waiting), self.now_s)
 
     def beside(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the others that use an RC of this one."""
@@ -269,22 +272,6 @@ class ScheduleState:
         """Return the equals that cannot run beside the ARC."""
         fits = self.compatibility.fits
         return [other for other in self.beside(arc) if not rank(other.path, arc.path) and not fits(arc, [other])]
-
-    def holders(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return the others that hold an RC of the ARC."""
-        holders: dict[ArcEntry, None] = {}
-        for rc in arc.uses:
-            holders.update(self.rcs[rc].holders)
-        holders.pop(arc, None)
-        return [*holders]
-
-    def is_held_alone(self, rc: str) -> bool:
-        """Return whether an ARC holds the RC alone, and its slice is not over."""
-        return bool(self.held_alone & self._bits[rc])
-
-    def is_kept_out(self, arc: ArcEntry) -> bool:
-        """Return whether another ARC holds an RC of this one alone, and its slice is not over."""
-        return bool(self.held_alone & arc.touches)
 
     def group_of(self, arc: ArcEntry) -> Sequence[ArcEntry]:
         """Return the ARC's group; none if it is not active."""

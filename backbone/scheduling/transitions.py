@@ -1,30 +1,21 @@
 """Transitions: each step of an ARC's life, with its line in the trace and its instruction to the loop.
 
 * ``queue``: IDLE → WAITING, with a new stamp
-* ``make_way``: a waiting ARC gets its RCs; their holders are revoked
-* ``connect``: WAITING → CONNECTING, with new epochs
-* ``grant``: CONNECTING → RUNNING; its slice counts from here; ``renew_slices``: it stays for one more
+* ``grant``: CONNECTING → RUNNING; its slice counts from here; ``renew``: it stays for one more
 * ``revoke``, ``lose``: CONNECTING, RUNNING → REVOKING
 * ``free``: REVOKING → WAITING or IDLE
 * ``rest``: WAITING → IDLE
 
-Rules of this file (numbers as in docs and ``why``): no decision on an ARC's turn.
-
-* 4  Preempted RCs go to the ARC that preempted them: it has a reservation, and comes before its equals.
-* 6  revoke → free → connect → grant. An ARC connects only when all its RCs are free.
+Rule of this file: no decision on an ARC's turn. ``switch`` connects: WAITING → CONNECTING.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import replace
 
-from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry, Decision
-from backbone.scheduling.events import ConnectArc, Record, RenewLeases, RevokeArc
+from backbone.scheduling.entries import Afterwards, ArcEntry, Decision
+from backbone.scheduling.events import Record, RevokeArc
 from backbone.scheduling.master_schedule import MasterSchedule
-from backbone.scheduling.planner import Turn, in_order_of_revocation
-from backbone.scheduling.priority import higher, rank
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.slice_ends import SliceEnds
@@ -89,19 +80,21 @@ class Transitions:
 
     def queue(self, arc: ArcEntry) -> None:
         """Queue the ARC behind its equals; the trace has a line if its group is too large to be planned whole."""
-        arc.stamp = self._stamp()
+        arc.stamp = self.stamp()
         arc.reservation = arc.retry_s = None
         arc.has_forced = False
-        self._enter(arc, RequestState.WAITING)
+        self.enter(arc, RequestState.WAITING)
         if not self._relaxed and len(self._state.groups.of[arc].arcs) > self._schedule.planned_whole_up_to:
             self._relaxed = True
             self.trace.record("meta", "a group is too big to be planned whole", **self._meta())
 
-    def _stamp(self) -> tuple[float, int]:
+    def stamp(self) -> tuple[float, int]:
+        """Return a new stamp: behind all that were given."""
         self._stamped += 1
         return self._decision.now_s, self._stamped
 
-    def _enter(self, arc: ArcEntry, state: RequestState) -> None:
+    def enter(self, arc: ArcEntry, state: RequestState) -> None:
+        """Let the ARC enter this state now; the ends of the slices it waits for are checked."""
         self._state.enter(arc, state, self._decision.now_s)
         if state is RequestState.WAITING:
             for holder in [holder for rc in arc.uses for holder in self._state.rcs[rc].holders]:
@@ -111,61 +104,23 @@ class Transitions:
     def rest(self, arc: ArcEntry) -> None:
         """Idle a waiting ARC."""
         arc.reservation = None
-        self._enter(arc, RequestState.IDLE)
+        self.enter(arc, RequestState.IDLE)
 
-    # It gets its RCs.
-
-    def make_way(self, turn: Turn) -> None:
-        """Revoke the holders of the RCs of the ARC whose turn it is."""
-        for holder in in_order_of_revocation(turn):
-            served, overridden = holder.served(self._decision.now_s), turn.arc.goes_before(holder)
-            forced = overridden and not served
-            if forced or not self._schedule.planner_of(turn.arc).reserves:
-                self._reserve(turn.arc, forced=forced)
-            if overridden:
-                self.revoke(holder, "higher", turn.arc.name)
-            else:
-                self._decision.ended += [(holder, rc) for rc in holder.shares if rc in turn.arc.shares]
-                self.revoke(holder, "slice", turn.arc.name)
-
-    def _reserve(self, arc: ArcEntry, *, forced: bool) -> None:
+    def reserve(self, arc: ArcEntry, *, forced: bool) -> None:
         """Place a waiting ARC before all equals until it is connected; note if others were preempted for it."""
         arc.has_forced |= forced
         if arc.reservation is None:
-            arc.reservation = self._stamp()[1]
+            arc.reservation = self.stamp()[1]
             self._state.concerns(arc.uses)
 
-    def connect(self, arc: ArcEntry) -> None:
-        """Connect an ARC whose RCs are all free, each under a new epoch: they begin to settle."""
-        now_s, rcs = self._decision.now_s, self._state.rcs
-        for rc in arc.uses:
-            rcs[rc].epoch += 1
-        arc.epochs = {rc: rcs[rc].epoch for rc in arc.uses}
-        arc.reservation = None
-        arc.began_s = now_s
-        self._enter(arc, RequestState.CONNECTING)
-        if any(len(rcs[rc].holders) > 1 for rc in arc.shares):  # the other holders' ranks may change
-            self._decision.instructions.append(RenewLeases())
-        cause = "it is next, and all its RCs are free (rule 3)"
-        self.trace.record("connect", cause, arc=arc.name, epoch=dict(arc.epochs))
-        self._decision.instructions.append(
-            ConnectArc(arc.name, dict(arc.epochs), arc.settle_s, now_s + arc.length_s, self.ranks(arc))
-        )
-
-    def ranks(self, arc: ArcEntry) -> dict[str, int]:
-        """Return the ARC's place by user priority among the holders of each sharable RC it uses."""
-        return {
-            rc: sum(other.state in CONNECTED and higher(other.path, arc.path) for other in self._state.rcs[rc].holders)
-            for rc in arc.uses
-            if self._state.rcs[rc].sharable
-        }
+    # It has its RCs.
 
     def grant(self, arc: ArcEntry) -> None:
         """Grant an ARC whose RCs have settled: its slice begins."""
         arc.granted_s = arc.slice_s = self._decision.now_s
         arc.has_forced = False
         arc.turns += 1
-        self._enter(arc, RequestState.RUNNING)
+        self.enter(arc, RequestState.RUNNING)
         self._ends.end_at(arc, self._slice_end_s(arc))
         # On a sharable RC an ARC of shorter settling time may overtake: the overtaken epoch is in the line of its
         # connection only, so that a reader sees each RC's numbers grow.
@@ -187,8 +142,17 @@ class Transitions:
             entry.granted_epoch = max(entry.granted_epoch, epoch)
         arc.turns = 1
         arc.began_s, arc.granted_s, arc.slice_s = self._decision.now_s, granted_s, granted_s
-        self._enter(arc, RequestState.RUNNING)
+        self.enter(arc, RequestState.RUNNING)
         self._ends.end_at(arc, granted_s + arc.minimum_s)
+
+    def renew(self, arc: ArcEntry) -> None:
+        """Begin a new slice of a served ARC that stays where an equal's slice ended; its place is behind its equals."""
+        arc.stamp = self.stamp()
+        arc.slice_s = self._decision.now_s
+        arc.turns += 1
+        self._ends.end_at(arc, self._slice_end_s(arc))
+        self.trace.record("slice", "it stays where an equal's slice ended (rule 5)", arc=arc.name)
+        self._record_grid(arc)
 
     def extend(self, arc: ArcEntry, until_s: float) -> None:
         """Extend the slice of a running ARC."""
@@ -208,46 +172,16 @@ class Transitions:
         """Count the ARC's RCs as being disconnected; a served ARC has its next place behind its equals."""
         cause = because(why, by)
         if arc.served(self._decision.now_s):
-            arc.stamp = self._stamp()
+            arc.stamp = self.stamp()
         arc.swapped_out, arc.swapped_out_by = why, by
         arc.afterwards = afterwards
-        self._enter(arc, RequestState.REVOKING)
+        self.enter(arc, RequestState.REVOKING)
         self.trace.record("revoke", cause, arc=arc.name, why=why, **({"by": by} if by else {}))
 
     def free(self, arc: ArcEntry, state: RequestState) -> None:
         """Queue or idle an ARC whose RCs are in their safe states."""
         arc.epochs = {}
-        self._enter(arc, state)
-
-    # The end of a decision.
-
-    def finish(self) -> None:
-        """Begin new slices of ARCs that stay connected, and predict the next grants of revoked ones."""
-        self._renew_slices()
-        self._expect()
-
-    def _renew_slices(self) -> None:
-        """Begin a new slice of served equals that stay on a sharable RC where another slice was ended (rule 5)."""
-        for ended, rc in self._decision.ended:
-            for arc in [*self._state.rcs[rc].holders]:
-                if rc in arc.shares and arc.served(self._decision.now_s) and not rank(arc.path, ended.path):
-                    arc.stamp = self._stamp()  # its next place is behind its equals
-                    arc.slice_s = self._decision.now_s
-                    arc.turns += 1
-                    self._ends.end_at(arc, self._slice_end_s(arc))
-                    self.trace.record("slice", "it stays where an equal's slice ended (rule 5)", arc=arc.name)
-                    self._record_grid(arc)
-
-    def _expect(self) -> None:
-        """Add the predicted next grants of revoked ARCs to the instructions."""
-        for place, instruction in enumerate(self._decision.instructions):
-            if not isinstance(instruction, RevokeArc):
-                continue
-            arc = self._state.arcs.get(instruction.arc)
-            if arc is not None and arc.queued:
-                start_s = self._schedule.planner_of(arc).start_s(arc, self._decision.now_s)
-                if start_s < math.inf:
-                    self._decision.instructions[place] = replace(instruction, expected_s=start_s + arc.settle_s)
+        self.enter(arc, state)
 
     def _slice_end_s(self, arc: ArcEntry) -> float:
         return self._rules.slice_end_s(self._decision.now_s, arc.minimum_s)

@@ -22,8 +22,7 @@ from backbone.scheduling.entries import CONNECTED, ArcEntry
 from backbone.scheduling.groups import Group
 from backbone.scheduling.plan import GroupPlans, Plan
 from backbone.scheduling.planner import Slot, Turn, in_order_of_revocation
-from backbone.scheduling.priority import by_precedence
-from backbone.scheduling.requests import RequestState
+from backbone.scheduling.precedence import by_precedence
 from backbone.scheduling.table import Table
 
 
@@ -31,6 +30,8 @@ class WholeGroupPlanner:
     """Plans each group whole."""
 
     is_exact = True
+    reserves: bool
+    """Under the discipline ``time`` a later start does not bind equals."""
 
     def __init__(self, table: Table, *, slack_s: float) -> None:
         """Begin with no groups to examine.
@@ -42,15 +43,10 @@ class WholeGroupPlanner:
         self._table = table
         self._state = table.state
         self._slack_s = slack_s
-        self._among_equals = table.state.fairness.discipline == "turns"
+        self.reserves = table.state.fairness.discipline == "turns"
         self._near: dict[str, None] = {}
         self._plans: dict[Group[ArcEntry], GroupPlans] = {}
         self._planned = -1
-
-    @property
-    def reserves(self) -> bool:
-        """Whether a later start binds equals: not under the discipline ``time``."""
-        return self._among_equals
 
     def look_near(self, rc: str) -> None:
         """Examine the group that uses the RC in the next decision."""
@@ -58,6 +54,7 @@ class WholeGroupPlanner:
 
     def due(self, now_s: float) -> Turn | None:
         """Return an ARC whose time is now, and the holders to revoke for it; None if no examined group has one."""
+        self._forget_outdated()
         while self._near:
             rc = next(iter(self._near))
             users = self._state.users.get(rc, ())
@@ -78,7 +75,7 @@ class WholeGroupPlanner:
         Where RCs are freed late, or an ARC runs on beyond its slice under the discipline ``time``, plans change as
         time passes; such a group is examined when they are free, or when that ARC's next check is due.
         """
-        runs_on = not self._among_equals and any(arc.served(now_s) for arc in group)
+        runs_on = not self.reserves and any(arc.served(now_s) for arc in group)
         if runs_on or any(self._table.is_overdue(arc, now_s) for arc in group):
             return None
         self._plans.clear()
@@ -86,15 +83,13 @@ class WholeGroupPlanner:
         return turn.arc if turn is not None else None
 
     def _due_in(self, group: Group[ArcEntry], now_s: float) -> Turn | None:
-        holders = [arc for arc in group.arcs if arc.holds]
-        waiting = (arc for arc in group.arcs if arc.state is RequestState.WAITING)
-        possible = {arc for arc in waiting if self._table.could_start(arc, holders, now_s)}
+        order, possible = self._table.line(group.arcs, now_s, self.order)
         if not possible:
             return None
-        plans = self._plans_of(group, now_s)
-        last = max(place for place, arc in enumerate(plans.order) if arc in possible)
-        queued = plans.order[: last + 1]  # later ARCs change nothing for these
-        if self._among_equals:
+        plans = self._plans[group] = GroupPlans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
+        last = max(place for place, arc in enumerate(order) if arc in possible)
+        queued = order[: last + 1]  # later ARCs change nothing for these
+        if self.reserves:
             return plans.due(queued, possible)
         while queued:
             by_time = GroupPlans(self._table, queued, group.arcs, now_s, slack_s=self._slack_s, among_equals=False)
@@ -109,15 +104,10 @@ class WholeGroupPlanner:
         only_lower = turn is not None and all(turn.arc.goes_before(holder) for holder in turn.in_the_way)
         return turn if only_lower else None  # no equal loses by it: it starts in a gap, or overrides
 
-    def _plans_of(self, group: Group[ArcEntry], now_s: float) -> GroupPlans:
+    def _forget_outdated(self) -> None:
         if self._planned != self._state.version:
             self._plans.clear()
             self._planned = self._state.version
-        plans = self._plans.get(group)
-        if plans is None:
-            order = self.order(group.arcs)
-            plans = self._plans[group] = GroupPlans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
-        return plans
 
     def _in_turn(self, turn: Turn, group: Group[ArcEntry], now_s: float) -> bool:
         """Return whether the turn would be right also if equals took turns.
@@ -175,7 +165,12 @@ class WholeGroupPlanner:
 
     def start_s(self, arc: ArcEntry, now_s: float) -> float:
         """Return when the RCs of a queued ARC will begin to settle, as of the present decision."""
-        return self._plans_of(self._state.groups.of[arc], now_s).now.start_s(arc)
+        self._forget_outdated()
+        group = self._state.groups.of[arc]
+        if group not in self._plans:
+            order = self.order(group.arcs)
+            self._plans[group] = GroupPlans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
+        return self._plans[group].now.start_s(arc)
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the queued ARCs of its group that come before a queued one, in order."""

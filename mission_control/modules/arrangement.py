@@ -12,7 +12,8 @@ import msgspec
 
 from backbone.errors import Refusal
 from backbone.mission.arranged import CLASS, Arranged, UnitFault, UnitsQuestion
-from backbone.naming import Subsystem, address
+from backbone.naming import Subsystem, address, did_you_mean
+from backbone.quality import OutputQuality, Quality
 from mission_control.modules.choice import CLASS_PATH as CHOICE
 from mission_control.modules.choice import ChoiceOrder, choice_faults
 from mission_control.modules.graph import OUTSIDE, Graph, GraphRefused, Member, WiringFault
@@ -64,7 +65,13 @@ class NoRounds(WiringFault):
     """A unit never has a round; ``modules`` are all that it has."""
 
 
-def arranged(units: Sequence[UnitOrder], given: Mapping[str, GivenKey]) -> dict[str, UnitParameters]:
+class NoQuality(WiringFault):
+    """A key cannot have the quality that is declared for it; the port is the key."""
+
+
+def arranged(
+    units: Sequence[UnitOrder], given: Mapping[str, GivenKey], qualities: Mapping[str, Quality] | None = None
+) -> dict[str, UnitParameters]:
     """Return unit → parameters of the component that runs it.
 
     What another unit takes is published, and what no other module takes, if it is a message: it is there for others. So
@@ -83,10 +90,12 @@ def arranged(units: Sequence[UnitOrder], given: Mapping[str, GivenKey]) -> dict[
         raise GraphRefused(found)
     units = [_with_choices(unit, kinds, members[unit.name]) for unit in units]
     graph = Graph(members, {key: type_name(kind) for key, kind in given_kinds.items()})
-    if found := [*_no_messages(graph, kinds), *_no_rounds(graph, units)]:
+    qualities = qualities or {}
+    if found := [*_no_messages(graph, kinds), *_no_rounds(graph, units), *_no_qualities(qualities, kinds, given)]:
         raise GraphRefused(found)
     final = _final(units, members, kinds)
-    return {unit.name: _parameters(unit, graph, given, final) for unit in units}
+    parameters = {unit.name: _parameters(unit, graph, given, final) for unit in units}
+    return {unit: _with_qualities(one, qualities) for unit, one in parameters.items()}
 
 
 def _member(order: ModuleOrder, kinds: dict[str, object]) -> Member:
@@ -135,6 +144,23 @@ def _parameters(unit: UnitOrder, graph: Graph, given: Mapping[str, GivenKey], fi
     )
 
 
+def _with_qualities(unit: UnitParameters, qualities: Mapping[str, Quality]) -> UnitParameters:
+    own = {*unit.published, *unit.sources}
+    return msgspec.structs.replace(unit, qualities={key: one for key, one in qualities.items() if key in own})
+
+
+def _no_qualities(
+    qualities: Mapping[str, Quality], kinds: Mapping[str, object], given: Mapping[str, GivenKey]
+) -> Iterator[WiringFault]:
+    for key, quality in qualities.items():
+        if key not in kinds:
+            detail = f"a quality is declared for {key}, which no module produces{did_you_mean(key, kinds)}"
+            yield NoQuality((), key, detail, "Name the key of an output, or of a <given>")
+        elif key in given and quality != OutputQuality(deadline_s=quality.deadline_s).quality:
+            detail = f"{key} comes from {given[key].source.address}, which sends it in its own quality"
+            yield NoQuality((), key, detail, "Declare nothing but a deadline for what is given from outside")
+
+
 def _no_messages(graph: Graph, kinds: Mapping[str, object]) -> Iterator[WiringFault]:
     """Yield what cannot go from one unit to another, at the module that takes it."""
     for one in graph.connections:
@@ -165,12 +191,13 @@ def judged(question: UnitsQuestion) -> Arranged:
             remedy = "Give the unit a frequency or an input, and a thread of its own if it needs one"
             found.append(UnitFault(str(error), remedy, unit=str(declared["name"])))
     given = {key: msgspec.convert(one, GivenKey) for key, one in question.given.items()}
+    qualities = {key: msgspec.convert(one, OutputQuality).quality for key, one in question.qualities.items()}
     found += [fault for unit in units for order in unit.modules for fault in _of_class(order)]
     found += [fault for key, one in given.items() for fault in _of_given(key, one)]
     if found:
         return Arranged(faults=tuple(found))
     try:
-        parameters = arranged(units, given)
+        parameters = arranged(units, given, qualities)
     except GraphRefused as refused:
         return Arranged(faults=tuple(_of_graph(fault, units) for fault in refused.faults))
     return Arranged({unit: msgspec.to_builtins(one) for unit, one in parameters.items()})
@@ -195,6 +222,8 @@ def _of_given(key: str, declared: GivenKey) -> Iterator[UnitFault]:
 
 def _of_graph(fault: WiringFault, units: Sequence[UnitOrder]) -> UnitFault:
     about, *_ = (*fault.modules, "")
+    if isinstance(fault, NoQuality):
+        return UnitFault(fault.detail, fault.remedy, quality=fault.port)
     if isinstance(fault, NoRounds):
         unit = next(unit.name for unit in units if [one.name for one in unit.modules] == list(fault.modules))
         return UnitFault(fault.detail, fault.remedy, unit=unit)

@@ -9,6 +9,7 @@ from typing import Annotated, TypeGuard
 import msgspec
 
 from backbone.keys import Conversation
+from backbone.quality import Quality
 from backbone.ranges import Values
 from backbone.reading_anew import WrongClass
 from backbone.wire import Message
@@ -99,12 +100,14 @@ class UnitParameters(Running, frozen=True, forbid_unknown_fields=True, kw_only=T
         modules: What it runs.
         sources: Key → where its values come from, for what the unit does not produce itself.
         published: Keys of the outputs that others get.
+        qualities: Key of these or of a source → how its values travel, where it is not as for all outputs.
         chosen: Key → chosen source, where it is another than the first one of a ``SourceChoice``; settable.
     """
 
     modules: list[ModuleOrder]
     sources: dict[str, Source] = {}
     published: list[str] = []
+    qualities: dict[str, Quality] = {}
     chosen: dict[str, str] = {}
 
 

@@ -32,6 +32,7 @@ from mission_control.modules.graph import Graph
 from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, is_message, output_address
 from mission_control.modules.os_threads import ThreadPlace
 from mission_control.modules.ports import kinds_of_ports, type_name
+from mission_control.modules.unit_deadlines import UnitDeadlines
 from mission_control.modules.unit_exchanges import UnitExchanges
 from mission_control.modules.unit_schedule import Trigger
 from mission_control.modules.unit_thread import LoopPublisher, UnitThread
@@ -81,14 +82,23 @@ class UnitComponent(Component[UnitParameters]):
         self._place: ThreadPlace | None = None
         self._exchanges = UnitExchanges(self, self._modules, self._graph, lambda: self._unit, self._exchanged)
         self._missed, self._report_again_s = 0, -math.inf
+        self._misses_text = ""
+        self._deadlines = self._new_deadlines()
 
     def _new_unit(self) -> ExecutionUnit:
         trigger = Trigger(self.parameters.frequency_hz, self.parameters.on_input)
         return ExecutionUnit(self.name, self._graph, self._modules, trigger, self.clock.now_s())
 
+    def _new_deadlines(self) -> UnitDeadlines:
+        return UnitDeadlines(self, self._into, self._tell)
+
     async def connect(self) -> None:
         """Have the thread, if it is to have one, and listen to the sources."""
         self._unit = self._new_unit()
+        qualities = self.parameters.qualities
+        for key in self._published.keys() & qualities.keys():
+            self.bus.declare_quality(output_address(self.address, key), Conversation.OUTPUTS, qualities[key])
+        self._deadlines = self._new_deadlines()
         if self.parameters.own_thread:
             self._thread = UnitThread(self._unit, self.clock, self._publish)
             self._place = await self._thread.place(self.parameters.nice, self.parameters.cpus)
@@ -99,6 +109,7 @@ class UnitComponent(Component[UnitParameters]):
 
     async def serve(self) -> None:
         """Have the rounds of the frequency; those of inputs begin when these arrive."""
+        self.start_task(self._deadlines.watch(), "deadlines")
         if self._thread is not None:
             await self._thread.keep()
         while self._unit.due_s < math.inf:
@@ -159,7 +170,7 @@ class UnitComponent(Component[UnitParameters]):
             for module, one in told.modules.items()
             for name in one.__struct_fields__
         }
-        return {**own, **missed, **times, **self._thread_statistics()}
+        return {**own, **missed, **times, **self._thread_statistics(), **self._deadlines.statistics()}
 
     def _thread_statistics(self) -> dict[str, float]:
         place, thread = self._place, self._thread
@@ -173,6 +184,7 @@ class UnitComponent(Component[UnitParameters]):
 
     def _listener(self, key: str) -> Callable[[Envelope[Message]], None]:
         def heard(envelope: Envelope[Message]) -> None:
+            self._deadlines.met(key)
             if self._thread is not None:
                 self._thread.put(key, envelope.body)
             elif self._unit.put(key, envelope.body):
@@ -198,7 +210,12 @@ class UnitComponent(Component[UnitParameters]):
             self._missed, self._report_again_s = missed, now_s + REPORT_EVERY_S
             ticks = [f"{told.missed} rounds missed, the latest {told.most_late_s:.3f} s late"] if told.missed else []
             values = [f"{count} values of {key} came too early" for key, count in told.overwritten.items()]
-            self.report("; ".join([*ticks, *values, *filter(None, [self._thread_text()])]))
+            self._misses_text = "; ".join([*ticks, *values])
+            self._tell()
+
+    def _tell(self) -> None:
+        """Report what is late or missed, and where the thread is."""
+        self.report("; ".join(filter(None, [self._deadlines.text, self._misses_text, self._thread_text()])))
 
     def _thread_text(self) -> str:
         given = self.parameters

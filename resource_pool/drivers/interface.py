@@ -46,6 +46,7 @@ class DriverSite:
         tell: Publishes one line to the mission's log.
         fail: Ends the RC because of this bug or fault; its creator restarts it, and it opens the device again.
         folder: Folder of the mission on this machine, for results that are computed only once; None: no folder.
+        remark: Shows one line beside the RC's state until the next one; empty: nothing.
     """
 
     resource: str
@@ -55,6 +56,7 @@ class DriverSite:
     tell: Callable[[str], None]
     fail: Callable[[BaseException], None]
     folder: Path | None = None
+    remark: Callable[[str], None] = lambda _line: None
 
     def options(self, kind: type[Options]) -> Options:
         """Return the driver's own options from the mission file.
@@ -161,6 +163,14 @@ class FramegrabberDriver(Protocol):
 
     async def close(self) -> None:
         """Close the device. When: once, last."""
+
+
+@runtime_checkable
+class YieldingDriver(Protocol):
+    """A framegrabber's driver that delivers fewer pictures while its host is busy; it says so by ``site.remark``."""
+
+    def allowed_hz(self) -> float:
+        """Return how many pictures a second it delivers at most now."""
 
 
 class RobotProtocol(Protocol):

@@ -2,7 +2,8 @@
 
 It draws only the cameras of robots that transmit on the tuned frequency, and only while it is tuned. A thread of its
 own draws and owns the renderer; on a virtual clock the loop draws, which takes no time. In both cases the driver
-delivers the picture of a frame ``capture_delay_s`` after the frame's time, or as soon afterwards as it is drawn.
+delivers the picture of a frame ``capture_delay_s`` after the frame's time, or as soon afterwards as it is drawn. Where
+the processors are full it draws fewer pictures, see ``picture_pace``.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import asyncio
 import functools
 import importlib
 import math
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -26,6 +28,7 @@ from backbone.keys import Conversation
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
+from resource_pool.drivers.picture_pace import PicturePace
 from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.drivers.world_messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, prepare, probe, probe_once
@@ -61,13 +64,18 @@ class SimulatedFramegrabber:
         self._is_drawing = self._is_new = False
         self._taking: set[asyncio.Task[None]] = set()
         self._next_s = -math.inf
-        self._pause_s = 1.0 / site.parameters.frame_rate_hz
+        self._pace = PicturePace(site.parameters.frame_rate_hz)
         self._delay_s = site.options(GrabberOptions).capture_delay_s
 
     def adjust(self, site: DriverSite) -> None:
         """Apply the new rate and delay from the next picture on."""
         self._delay_s = site.options(GrabberOptions).capture_delay_s
-        self._pause_s = 1.0 / site.parameters.frame_rate_hz
+        self._pace.ask(site.parameters.frame_rate_hz)
+        self._site.remark(self._pace.remark())
+
+    def allowed_hz(self) -> float:
+        """Return how many pictures a second are drawn at most; see ``YieldingDriver.allowed_hz``."""
+        return self._pace.allowed_hz
 
     async def open(self) -> None:
         """Fetch the world's model and open the renderer, or the painter if OpenGL is missing."""
@@ -80,7 +88,7 @@ class SimulatedFramegrabber:
         if support is not None and support.missing_packages:
             self._site.tell(support.summary)
         self._world = self._site.bus.subscribe(
-            world_of(self._site), Conversation.TELEMETRY, WorldState, self._world_moved, latest=True
+            world_of(self._site), Conversation.BODIES, WorldState, self._world_moved, latest=True
         )
 
     def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
@@ -105,8 +113,9 @@ class SimulatedFramegrabber:
         state = envelope.body
         if self._deliver is None or self._is_drawing or state.at_s < self._next_s - EARLY_S:
             return
-        in_time = state.at_s < self._next_s + self._pause_s
-        self._next_s = (self._next_s if in_time else state.at_s) + self._pause_s
+        pause_s = 1.0 / self._pace.allowed_hz
+        in_time = state.at_s < self._next_s + pause_s
+        self._next_s = (self._next_s if in_time else state.at_s) + pause_s
         self._is_drawing = True
         tuned = _Tuned(self._frequency, self._deliver, self._is_new)
         self._is_new = False
@@ -121,14 +130,24 @@ class SimulatedFramegrabber:
 
     async def _take(self, state: WorldState, tuned: _Tuned) -> None:
         assert self._studio is not None  # noqa: S101  open before the first state can arrive
-        run = asyncio.get_running_loop().run_in_executor
+        run, clock = asyncio.get_running_loop().run_in_executor, self._site.clock
+        began_s = clock.now_s()
         try:
-            picture = await run(self._thread, self._studio.take, state, tuned.frequency, tuned.is_new)
+            picture, took_s = await run(self._thread, self._studio.take, state, tuned.frequency, tuned.is_new)
         finally:
             self._is_drawing = False
-        await self._site.clock.sleep_until_s(state.at_s + self._delay_s)
+        due_s = state.at_s + self._delay_s
+        await clock.sleep_until_s(due_s)
         if self._deliver is tuned.deliver:
+            self._keep_pace(max(due_s, began_s + took_s * clock.rate))
             tuned.deliver(picture)
+
+    def _keep_pace(self, due_s: float) -> None:
+        """Compare the time of a delivery with the earliest possible one: due, and drawn without a wait."""
+        clock = self._site.clock
+        now_s = clock.now_s()
+        if self._pace.delivered((now_s - due_s) / clock.rate, now_s / clock.rate):
+            self._site.remark(self._pace.remark())
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,8 +171,12 @@ class _Studio:
         self._world = world
         self._receivers: dict[str, Any] = {}
 
-    def take(self, state: WorldState, frequency: str, is_new: bool) -> Picture:
-        """Return the picture of this frequency's receiver for this state of the world."""
+    def take(self, state: WorldState, frequency: str, is_new: bool) -> tuple[Picture, float]:
+        """Return the picture of this frequency's receiver for this state of the world, and its processor time."""
+        began_s = time.thread_time()
+        return self._received(state, frequency, is_new), time.thread_time() - began_s
+
+    def _received(self, state: WorldState, frequency: str, is_new: bool) -> Picture:
         receiver = self._receivers.get(frequency)
         if receiver is None:
             receiver = self._video_link.Receiver(self._world.seed, frequency, self._world.air)

@@ -87,7 +87,7 @@ class WorldModel(Message, frozen=True):
 
 
 class WorldState(Message, frozen=True):
-    """State of the world, published once a frame as telemetry.
+    """State of the world, published once a frame.
 
     Attributes:
         frame: Number of the frame.

@@ -19,6 +19,7 @@ from backbone.mission.shipped_types import shipped_types
 from .kit_reference import kit_reference
 from .mission_reference import reference_text
 from .page_types import CONSOLE, DESIGNER, declarations
+from .quality_reference import quality_reference
 
 TOP = Path(__file__).parents[2]
 ROOM, PAGE = Path("backbone/mission"), Path("ui_console/web/page")
@@ -40,6 +41,7 @@ MADE_FILES: dict[Path, Callable[[str], str]] = {
     ROOM / XSD: lambda _old: xsd_text(),
     Path("docs/reference/mission-file.md"): reference_text,
     Path("docs/reference/module-kit.md"): kit_reference,
+    Path("docs/reference/messages.md"): quality_reference,
     PAGE / "messages.d.ts": lambda _old: declarations(CONSOLE),
     PAGE / "design_messages.d.ts": lambda _old: declarations(DESIGNER),
 }

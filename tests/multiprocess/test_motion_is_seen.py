@@ -67,7 +67,7 @@ async def observed(mission: RunningMission) -> AsyncIterator[tuple[Bus, Seen]]:
     async with mission.bus() as bus:
         bus.subscribe("mission_control/*", Conversation.EVENTS, MotionSeen, seen.motion)
         bus.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda heard: seen.robots.append(heard.body.robot))
-        bus.subscribe("resource_pool/world", Conversation.TELEMETRY, WorldState, world_moved, latest=True)
+        bus.subscribe("resource_pool/world", Conversation.BODIES, WorldState, world_moved, latest=True)
         yield bus, seen
 
 

@@ -20,7 +20,8 @@ from running_mission import BIN, RunningMission, mission_up
 
 from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.command_line.message_lines import short_key
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import Conversation
+from backbone.quality import NEVER_DROPPED
 from backbone.recording.reader import Recorded, Recording
 from ui_console.model.driving import DriveWish
 

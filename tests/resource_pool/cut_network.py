@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from backbone.bus.local_bus import Answered, Listening, LocalNetwork
+from backbone.bus.local_bus import Answered, LocalNetwork
+from backbone.bus.neighbor_declarations import Listening
 from backbone.errors import NoResponder
 from backbone.wire import Envelope
 

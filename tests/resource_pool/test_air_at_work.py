@@ -126,7 +126,7 @@ def test_after_a_world_was_away_its_robots_still_do_what_they_are_told(local_mis
             await here.send(radio, 1, radio_link.encode_transmitter_on("video1"))
             states: list[WorldState] = []
             here.pool.voice("ear").subscribe(
-                world.address, Conversation.TELEMETRY, WorldState, lambda heard: states.append(heard.body)
+                world.address, Conversation.BODIES, WorldState, lambda heard: states.append(heard.body)
             )
             for number in range(10):
                 if number == 4:

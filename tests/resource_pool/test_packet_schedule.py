@@ -12,7 +12,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from backbone.scheduling.requests import Usage
-from backbone.scheduling.response_time import admissible, stream, worst_response_us
+from backbone.scheduling.response_time import admissible, worst_response_us
+from backbone.scheduling.streams import stream
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
 
 PERIODS_MS = st.sampled_from([10, 20, 25, 40, 50, 80, 100])

@@ -228,7 +228,7 @@ async def driven(mission: Any, driver: str, bits_per_s: float) -> tuple[list[OnA
         for _ in range(20):
             await drive(pool, 0.25, *arcs)
             places.append((await pool.pose("scout1"), await pool.pose("scout2")))
-        return pool.radio_driver.heard, places
+        return [*pool.radio_driver.heard], places
 
 
 def test_replies_within_the_declared_time_change_neither_packets_nor_motion(local_mission: Any) -> None:

@@ -24,11 +24,21 @@ WORLD = WorldDescription(
 )
 
 
+class LateClock(VirtualClock):
+    """A virtual clock of a machine on which each sleeper wakes too late by this time."""
+
+    late_s = 0.0
+
+    async def sleep_until_s(self, at_s: float) -> None:
+        await super().sleep_until_s(at_s + self.late_s)
+
+
 class Studio:
     """A world that is played by hand, and a driver that looks at it."""
 
     def __init__(self, rate_hz: float = 30.0) -> None:
-        self.network, self.clock = LocalNetwork(), VirtualClock()
+        self.network, self.clock = LocalNetwork(), LateClock()
+        self.remarks: list[str] = []
         self.world = World(WORLD)
         self.bus: LocalBus = self.network.join("resource_pool/world", self.clock)
         self.bus.serve("resource_pool/world", AskWorld, self._answer)
@@ -36,7 +46,9 @@ class Studio:
         self.failed = asyncio.Event()
         parameters = SimpleNamespace(world="world", camera="paint", frame_rate_hz=rate_hz, options={})
         self.ear = self.network.join("resource_pool/grabber", self.clock)
-        site = DriverSite("grabber", self.ear, self.clock, parameters, lambda what: None, self._fail)
+        site = DriverSite(
+            "grabber", self.ear, self.clock, parameters, lambda what: None, self._fail, remark=self.remarks.append
+        )
         self.driver = SimulatedFramegrabber(site)
 
     def _fail(self, bug: BaseException) -> None:
@@ -48,9 +60,7 @@ class Studio:
 
     def show(self, frame: int, transmitting: dict[str, str], state: bytes | None = None) -> None:
         drawn = self.world.state().tobytes() if state is None else state
-        self.bus.publish(
-            "resource_pool/world", Conversation.TELEMETRY, WorldState(frame, frame / 30, drawn, transmitting)
-        )
+        self.bus.publish("resource_pool/world", Conversation.BODIES, WorldState(frame, frame / 30, drawn, transmitting))
 
     async def close(self) -> None:
         await self.driver.close()
@@ -129,6 +139,34 @@ def test_on_a_virtual_clock_each_picture_comes_one_capture_delay_after_its_frame
     assert [round(captured_s * 30, 6) for captured_s, _, _ in seen] == list(range(1, 41, 2))
     assert all(at_s == pytest.approx(captured_s + GrabberOptions().capture_delay_s) for captured_s, at_s, _ in seen)
     assert run_virtual(watch()) == seen
+
+
+def test_on_a_full_processor_it_draws_fewer_pictures_says_so_and_draws_all_again_when_there_is_time() -> None:
+    async def watch() -> tuple[int, int, list[str]]:
+        studio = Studio(rate_hz=15.0)
+        await studio.driver.open()
+        pictures, deliver = collector()
+        studio.driver.tune("video", deliver)
+        frame, counts = 0, []
+        for late_s, seconds in ((0.0, 10), (0.02, 20), (0.0, 90)):
+            studio.clock.late_s = late_s
+            before = pictures.qsize()
+            for _frame in range(30 * seconds):
+                frame += 1
+                await studio.clock.sleep_s(1 / 30)
+                studio.show(frame, {"scout1": "video"})
+            counts.append(pictures.qsize() - before)
+        assert not studio.bugs
+        assert studio.driver.allowed_hz() == 15.0
+        await studio.close()
+        return counts[0], counts[1], studio.remarks
+
+    in_time, late, remarks = run_virtual(watch())
+    assert in_time == pytest.approx(150, abs=2)
+    assert late < 100
+    assert remarks[0].startswith("10 of 15 pictures a second")
+    assert "1 of 15 pictures a second: control goes first on a full processor" in remarks
+    assert remarks[-1] == ""
 
 
 async def test_it_can_be_closed_before_it_was_opened_and_twice() -> None:

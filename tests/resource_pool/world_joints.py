@@ -19,7 +19,7 @@ async def joints(pool: Pool, *names: str) -> list[float]:
     ear = pool.voice_of("ui_console/joints")
     known = await ear.ask(WORLD, AskWorld(), WorldModel, within_s=5)
     states: list[bytes] = []
-    hearing = ear.subscribe(WORLD, Conversation.TELEMETRY, WorldState, lambda heard: states.append(heard.body.state))
+    hearing = ear.subscribe(WORLD, Conversation.BODIES, WorldState, lambda heard: states.append(heard.body.state))
     await pool.clock.sleep_s(0.1)
     hearing.close()
     model = mujoco.MjModel.from_xml_string(known.mjcf)

@@ -6,16 +6,16 @@ from collections.abc import Set
 from typing import NamedTuple
 
 from backbone.errors import Refusal
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import COPIED, Conversation
 from backbone.naming import did_you_mean
+from backbone.quality import NEVER_DROPPED
 from ui_console.model.key_shown import KeyOrder
 from ui_console.web.protocol import ListKeys, ViewKey
 
 LIST_STREAM = "/keys"
 """Streams of a page's outbox beside those of robots, whose names have no slash."""
-COPIES = frozenset({Conversation.TOLD})
 """Copies are shown at the keys of what they copy."""
-NO_MESSAGES = COPIES | {Conversation.ALIVE}
+NO_MESSAGES = COPIED | {Conversation.ALIVE}
 """Tokens of a mission that is up are no messages; a recording has one for each rise and fall."""
 
 

@@ -16,6 +16,7 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.launch import Launch
+from backbone.keys import COPIED
 from backbone.recording.playback import Playback
 from backbone.recording.reader import Recording
 from backbone.waiting import first_to_end
@@ -23,7 +24,6 @@ from ui_console.model.playback import PlaybackView
 from ui_console.session.recorded_play import NOT_NOW, RecordedPlay
 from ui_console.web.hub import WebHub
 from ui_console.web.key_ears import RecordingEar
-from ui_console.web.key_sight import COPIES
 from ui_console.web.key_watch import KeyWatch
 from ui_console.web.login import ProtocolViolation, Welcome
 from ui_console.web.operator import Operator
@@ -53,7 +53,7 @@ class RecordedHub(WebHub):
         super().__init__(launch, network.join(launch.address, playback), playback, join)
         ear = RecordingEar(reopened, playback, self.observer.start_task)
         self.keys = KeyWatch(ear, playback, lambda: self.clients, self.observer.start_task)
-        self.hidden = COPIES
+        self.hidden = COPIED
 
     async def run(self) -> None:
         """Hear it, and keep the pages fresh; until cancelled.

@@ -11,13 +11,18 @@ from backbone.mission.declaration.values import (
     Conversation,
     Flag,
     Frequency,
+    MessageBytes,
     Name,
     Names,
     Nice,
     OnInput,
     Processors,
+    Seconds,
     SourceAddress,
+    Urgency,
 )
+from backbone.quality import Urgency as UrgencyWord
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES
 
 
 class InputElement(Declared):
@@ -107,8 +112,39 @@ class GivenElement(Declared):
     )
 
 
+class QualityElement(Declared):
+    """How the values of one key travel between units, where it is not as for all outputs.
+
+    An output that a unit publishes has all of it. What is given from outside has a deadline only, because another
+    component sends it.
+    """
+
+    key: Name = Field(description="The key of an output, or one that is given from outside.")
+    deadline_s: Seconds = Field(
+        default=0.0,
+        description="A unit that takes the key from elsewhere says so when no value comes for so long, and when it "
+        "comes again; 0: never.",
+    )
+    reliable: Flag = Field(
+        default=False,
+        description="Whether a full queue is waited for, up to a second, instead of dropping the value there.",
+    )
+    urgency: Urgency = Field(
+        default=UrgencyWord.NORMAL, description="The queue in which values wait: urgent, normal, low or lowest."
+    )
+    express: Flag = Field(
+        default=False,
+        description="Whether each value leaves at once, for single small ones; of a burst more are dropped then.",
+    )
+    most_bytes: MessageBytes = Field(
+        default=MAX_LARGE_MESSAGE_BYTES,
+        description="A longer value is refused; beyond 8388608 bytes values stay on their host.",
+    )
+
+
 class ModulesElement(Declared):
     """The execution units with their modules, and what comes to them from outside."""
 
     given: tuple[GivenElement, ...] = ()
+    quality: tuple[QualityElement, ...] = ()
     unit: tuple[UnitElement, ...] = ()

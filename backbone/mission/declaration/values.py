@@ -18,6 +18,8 @@ from pydantic import BeforeValidator, Field, JsonValue
 from backbone.component_database.messages import Multiplicity as MultiplicityWord
 from backbone.keys import Conversation as ConversationWord
 from backbone.naming import Subsystem as SubsystemWord
+from backbone.quality import Urgency as UrgencyWord
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES
 
 T = TypeVar("T")
 
@@ -140,6 +142,7 @@ Processors = Annotated[
 Subsystem = Annotated[SubsystemWord, Field(json_schema_extra=_kind("subsystem"))]
 Multiplicity = Annotated[MultiplicityWord, Field(json_schema_extra=_kind("multiplicity"))]
 Conversation = Annotated[ConversationWord, Field(json_schema_extra=_kind("conversation"))]
+Urgency = Annotated[UrgencyWord, Field(json_schema_extra=_kind("urgency"))]
 OnInput = Annotated[Literal["any", "all", "none"], Field(json_schema_extra=_kind("on-input"))]
 Shape = Annotated[Literal["pioneer", "person", "carrier"], Field(json_schema_extra=_kind("shape"))]
 FurnitureShape = Annotated[Literal["box", "table"], Field(json_schema_extra=_kind("furniture-shape"))]
@@ -147,6 +150,9 @@ FurnitureShape = Annotated[Literal["box", "table"], Field(json_schema_extra=_kin
 Priority = Annotated[int, Field(ge=LEAST_WHOLE, le=MOST_WHOLE, json_schema_extra=_kind("priority")), _WHOLE_TEXT]
 Nice = Annotated[int, Field(ge=-20, le=19, json_schema_extra=_kind("nice")), _WHOLE_TEXT]
 Seed = Annotated[int, Field(ge=0, le=MOST_WHOLE, json_schema_extra=_kind("seed")), _WHOLE_TEXT]
+MessageBytes = Annotated[
+    int, Field(ge=1, le=MAX_LARGE_MESSAGE_BYTES, json_schema_extra=_kind("message-bytes")), _WHOLE_TEXT
+]
 Port = Annotated[int, Field(ge=1, le=65535, json_schema_extra=_kind("port")), _WHOLE_TEXT]
 
 Capacity = Annotated[float, Field(gt=0, le=1, json_schema_extra=_kind("capacity")), _DECIMAL_TEXT]

@@ -16,6 +16,7 @@ from backbone.scheduling.entries import CONNECTED, HOLDING, INSTANT_S, ArcEntry
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.plan import meeting
 from backbone.scheduling.planner import Slot
+from backbone.scheduling.preemption import left_over
 from backbone.scheduling.priority import higher, rank
 from backbone.scheduling.requests import RequestState
 
@@ -64,7 +65,7 @@ class Blockers:
             In the order in which to remove them; none if only RCs settle or come free.
         """
         held, rivals = self._holders_in_the_way(arc, now_s), self._rivals(arc)
-        left = {*self._table.left_over(arc, [], [*held, *(one for one in rivals if one.touches & arc.touches)])}
+        left = {*left_over(self._table, arc, [], [*held, *(one for one in rivals if one.touches & arc.touches)])}
         found = [one for one in dict.fromkeys([*held, *rivals]) if one in left or self._held_back_by(one, arc)]
         if self._is_planned_whole(arc) and self._table.usable(arc) and self._in_turns and len(found) <= FEWEST_OF:
             group = [one for one in self._state.group_of(arc) if one.holds or one is arc or one in rivals]
@@ -104,7 +105,7 @@ class Blockers:
 
     def _holders_in_the_way(self, arc: ArcEntry, now_s: float) -> list[ArcEntry]:
         """Return the holders of its RCs that it cannot displace now."""
-        return [holder for holder in self._state.holders(arc) if self._stays(holder, arc, now_s)]
+        return [holder for holder in self._table.holders(arc) if self._stays(holder, arc, now_s)]
 
     def _stays(self, holder: ArcEntry, arc: ArcEntry, now_s: float) -> bool:
         if not self._in_turns and not rank(holder.path, arc.path):

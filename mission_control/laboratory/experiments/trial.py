@@ -137,7 +137,7 @@ class _Trial:
         consoles = {"operator": SimulatedOperator}
         async with mission_in_one_process(bare, trace=self._decided, consoles=consoles) as running:
             running.bus.subscribe(
-                address(Subsystem.RESOURCE_POOL, WORLD), Conversation.TELEMETRY, WorldState, self._world_moved
+                address(Subsystem.RESOURCE_POOL, WORLD), Conversation.BODIES, WorldState, self._world_moved
             )
             running.bus.subscribe(f"{Subsystem.MISSION_CONTROL}/*", Conversation.EVENTS, MotionSeen, self._motion_seen)
             await self._frame_number(CLAIMS_FROM_FRAME)

@@ -17,7 +17,8 @@ from collections.abc import Callable, Iterable
 from contextvars import Context
 
 from backbone.bus.interface import Clock, LinkListener
-from backbone.bus.local_bus import Answered, Declaration, Listening, LocalBus, LocalNetwork, Watching
+from backbone.bus.local_bus import Answered, LocalBus, LocalNetwork
+from backbone.bus.neighbor_declarations import Declaration, Listening, Watching
 from backbone.errors import NoResponder
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.simulated_processes import SimulatedProcess, current_process

@@ -17,7 +17,8 @@ from collections import Counter
 from collections.abc import Callable
 
 from backbone.addresses import PLACER
-from backbone.bus.local_bus import Answered, Listening, LocalNetwork, Watching
+from backbone.bus.local_bus import Answered, LocalNetwork
+from backbone.bus.neighbor_declarations import Listening, Watching
 from backbone.errors import NoResponder
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.faults import Fates, MessageFault

@@ -168,10 +168,11 @@ async def test_pictures_leave_the_network_and_are_neither_old_nor_doubled(folder
         (Conversation.VIEWS, LARGE_BYTES, True),
         (Conversation.OUTPUTS, LARGE_BYTES, True),
         (Conversation.OUTPUTS, LARGE_BYTES // 2, False),
+        (Conversation.BODIES, 10, True),
         (Conversation.EVENTS, LARGE_BYTES, False),
     ],
 )
-async def test_only_large_values_of_large_conversations_have_a_board(
+async def test_only_large_values_of_large_conversations_and_all_bodies_have_a_board(
     folder: Path, conversation: Conversation, size: int, is_near: bool
 ) -> None:
     async with host(folder) as near:
@@ -207,7 +208,7 @@ async def test_without_a_listener_a_picture_is_not_even_written(
         sender = near.join(SERVER)
         sent: list[int] = []
         await until_near(network, sending(sender, sent))
-        monkeypatch.setattr("backbone.bus.zenoh_bus.write", lambda *_: pytest.fail("written for nobody"))
+        monkeypatch.setattr("backbone.bus.zenoh_outlets.write", lambda *_: pytest.fail("written for nobody"))
         sending(sender, sent)()
         assert sender.statistics().published == len(sent)
 

@@ -241,3 +241,51 @@ def test_the_copies_of_a_burst_arrive_in_order_although_the_bus_closes_at_once(o
         assert [number for number in numbers if number] == [*range(1, 601)]
 
     on_bus(law)
+
+
+def test_who_overhears_without_loss_gets_all_of_a_burst_and_copies_too(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, other, listener = net.join(SERVER), net.join(THIRD), net.join(ASKER)
+        frames, told = list[tuple[str, int]](), list[int]()
+        came = asyncio.Event()
+
+        def seen(key: str, raw: bytes) -> None:
+            frames.append((key, Reader(Picture).read(raw).body.number))
+            came.set()
+
+        def copied(_key: str, raw: bytes) -> None:
+            for copies in Reader(Told).read(raw).body.copies:
+                told.extend(Reader(News).read(one).body.number for one in copies.messages)
+            came.set()
+
+        subscribed = [
+            listener.overhear(Conversation.TOLD, copied, 1, SERVER, lossless=True),
+            listener.overhear(Conversation.FRAMES, seen, 1, lossless=True),
+        ]
+        for one in (source, other):
+            await until_known(listener, one)
+        for number in range(200):
+            source.publish("resource_pool/a", Conversation.FRAMES, Picture(number, bytes(76_800)))
+            source.publish(SERVER, Conversation.EVENTS, News(number))
+            other.publish("resource_pool/b/c", Conversation.FRAMES, Picture(number, b""))
+
+        async def all_came() -> None:
+            while len(frames) < 400 or len(told) < 200:
+                came.clear()
+                await came.wait()
+
+        await within(all_came(), "all")
+        for of in ("resource_pool/a", "resource_pool/b/c"):
+            of_one = [number for key, number in frames if key == f"scout/conformance/{of}/frames"]
+            assert of_one == list(range(200))
+        assert told == list(range(200))
+        assert [one.dropped for one in subscribed] == [0, 0]
+        for one in subscribed:
+            one.close()
+
+    on_bus(law)
+
+
+class Picture(Message, frozen=True):
+    number: int
+    pixels: bytes

@@ -151,3 +151,67 @@ def test_publishing_to_nobody_and_on_a_closed_bus_does_nothing(on_bus: Runner) -
         assert bus.statistics().published == 1
 
     on_bus(law)
+
+
+class Picture(Message, frozen=True):
+    number: int
+    pixels: bytes
+
+
+def test_a_lossless_listener_gets_every_picture_of_a_burst_in_order(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        sender, keen, idle = net.join(SERVER), net.join(ASKER), net.join(THIRD)
+        every, also, newest = Heard(), Heard(), Heard()
+        keen.subscribe(SERVER, Conversation.FRAMES, Picture, every, lossless=True)
+        keen.subscribe("*/*", Conversation.FRAMES, Picture, also, lossless=True)
+        idle.subscribe(SERVER, Conversation.FRAMES, Picture, newest, latest=True)
+        for listener in (keen, idle):
+            await until_known(listener, sender)
+        for number in range(200):
+            sender.publish(SERVER, Conversation.FRAMES, Picture(number, bytes(76_800)))
+        for heard in (every, also):
+            await heard.until_count(200)
+            assert heard.numbers() == list(range(200))
+        await newest.until(lambda heard: heard[-1].body.number > 0, "a newer picture")
+        assert SERVER + "/frames" not in keen.dropped()
+
+    on_bus(law)
+
+
+def test_a_lossless_listener_gets_what_is_sent_once_and_repeated_things_too_and_nothing_after_its_close(
+    on_bus: Runner,
+) -> None:
+    async def law(net: Net) -> None:
+        sender, keen = net.join(SERVER), net.join(ASKER)
+        heard = Heard()
+        subscriptions = [
+            keen.subscribe(SERVER, conversation, News, heard, lossless=True)
+            for conversation in (Conversation.EVENTS, Conversation.READINGS)
+        ]
+        await until_known(keen, sender)
+        for conversation in (Conversation.EVENTS, Conversation.READINGS, Conversation.TELEMETRY):
+            sender.publish(SERVER, conversation, News(1))
+        await heard.until_count(2)
+        for one in subscriptions:
+            one.close()
+        await until_known(keen, sender)
+        sender.publish(SERVER, Conversation.EVENTS, News(2))
+        sender.publish(SERVER, Conversation.READINGS, News(2))
+        await until_known(sender, keen)
+        assert heard.numbers() == [1, 1]
+
+    on_bus(law)
+
+
+def test_what_a_listener_of_the_newest_did_not_get_is_counted_by_key(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        sender, listener = net.join(SERVER), net.join(ASKER)
+        newest = Heard()
+        listener.subscribe(SERVER, Conversation.STATUS, News, newest, latest=True)
+        await until_known(listener, sender)
+        for number in range(100):
+            sender.publish(SERVER, Conversation.STATUS, News(number))
+        await newest.until(lambda heard: bool(heard) and heard[-1].body.number == 99, "the newest")
+        assert listener.dropped().get(f"{SERVER}/status", 0) == 100 - len(newest.all)
+
+    on_bus(law)

@@ -18,6 +18,7 @@ from backbone.bus.clock import (
     EndOfVirtualTime,
     MissionClock,
     NothingLeftToHappen,
+    PunctualClock,
     VirtualClock,
     VirtualLoop,
     run_virtual,
@@ -251,3 +252,19 @@ def test_work_for_a_thread_is_done_by_the_virtual_loop_in_order_and_takes_no_tim
             await asyncio.get_running_loop().run_in_executor(None, divmod, 1, 0)
 
     run_virtual(main())
+
+
+@given(wait_s=st.floats(0.0, 3600.0), rate=st.sampled_from([0.1, 1.0, 10.0]))
+def test_a_punctual_clock_returns_in_time_although_the_system_wakes_it_late(wait_s: float, rate: float) -> None:
+    now_s = [100.0]
+
+    async def sleep(duration_s: float) -> None:
+        now_s[0] += duration_s * (1 + 1 / 200)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("backbone.bus.clock.time.monotonic", lambda: now_s[0])
+        patched.setattr("backbone.bus.clock.asyncio.sleep", sleep)
+        waiting = PunctualClock(100.0, rate).sleep_until_s(wait_s * rate)
+        with pytest.raises(StopIteration):
+            waiting.send(None)
+    assert 100.0 + wait_s - 1e-9 <= now_s[0] <= 100.0 + wait_s + 0.001

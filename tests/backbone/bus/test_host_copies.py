@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import resource
+import socket
 import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -12,10 +15,8 @@ from pathlib import Path
 import pytest
 
 from backbone.bus import host_copies
-from backbone.bus.host_copies import MOST_WAITING_BYTES, HostCopies
-from backbone.bus.inbox import GATHER_S
-from backbone.keys import Conversation
-from backbone.recording.host_ear import HostEar
+from backbone.bus.host_copies import MISSION_SOCKET, MOST_WAITING_BYTES, HostCopies
+from backbone.recording.host_ear import LOOK_EACH_S, EarTaken, HostEar
 
 KEY = "scout/night/resource_pool/scout1/frames"
 WITHIN_S = 10.0
@@ -37,8 +38,8 @@ def fail(bug: BaseException) -> None:
 
 
 @asynccontextmanager
-async def listening(folder: Path, heard: Heard, *, pictures_only: bool = False) -> AsyncIterator[HostEar]:
-    ear = HostEar(folder, pictures_only=pictures_only)
+async def listening(folder: Path, heard: Heard, *, is_of_mission: bool = True) -> AsyncIterator[HostEar]:
+    ear = HostEar(folder, is_of_mission=is_of_mission)
     await ear.open(heard.take, fail)
     try:
         yield ear
@@ -90,37 +91,84 @@ async def test_a_recorder_that_begins_late_or_again_gets_what_is_sent_from_then_
 ) -> None:
     monkeypatch.setattr(host_copies, "LOOK_EACH_S", 0.02)
     copies, heard = HostCopies(folder), Heard()
-    assert not copies.wants(Conversation.LOG)
+    assert not copies.find_recorder()
     copies.send(KEY, b"too early")
     for again in range(2):
         async with listening(folder, heard):
-            await until(lambda: copies.wants(Conversation.LOG), "it found the recorder")
+            await until(copies.find_recorder, "it found the recorder")
             copies.send(KEY, b"%d" % again)
             await until(lambda n=again: len(heard) == n + 1, "it came")  # type: ignore[misc]
 
         def is_lost() -> bool:
             copies.send(KEY, b"to nobody")
-            return not copies.wants(Conversation.LOG)
+            return not copies.find_recorder()
 
         await until(is_lost, "it noticed that the recorder is gone")
     assert heard == [(KEY, b"0"), (KEY, b"1")]
     copies.close()
 
 
-async def test_of_a_host_whose_recorder_wants_pictures_only_pictures_are_copied(folder: Path) -> None:
-    async with listening(folder, Heard(), pictures_only=True):
+async def test_a_process_knows_whether_its_copies_reach_the_recorder_of_the_mission(folder: Path) -> None:
+    async with listening(folder, Heard(), is_of_mission=False):
+        of_host = HostCopies(folder)
+        assert of_host.find_recorder()
+        assert not of_host.reach_mission
+        async with listening(folder, Heard()):
+            of_mission = HostCopies(folder)
+            assert of_mission.reach_mission
+            of_mission.close()
+            assert not of_mission.find_recorder()
+            of_mission.close()
+        of_host.close()
+
+
+async def test_a_second_recorder_of_a_host_is_refused_and_the_first_goes_on(folder: Path) -> None:
+    heard = Heard()
+    async with listening(folder, heard):
+        with pytest.raises(EarTaken):
+            await HostEar(folder, is_of_mission=True).open(heard.take, fail)
         copies = HostCopies(folder)
-        wanted = {conversation for conversation in Conversation if copies.wants(conversation)}
-        assert wanted == {Conversation.FRAMES, Conversation.VIEWS}
+        copies.send(KEY, b"sense")
+        await until(lambda: heard == [(KEY, b"sense")], "it came")
         copies.close()
-        assert not copies.wants(Conversation.FRAMES)
+
+
+async def test_the_socket_of_a_killed_recorder_is_taken_over(folder: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(str(folder / MISSION_SOCKET))
+    heard = Heard()
+    async with listening(folder, heard):
+        copies = HostCopies(folder)
+        copies.send(KEY, b"sense")
+        await until(lambda: bool(heard), "it came")
         copies.close()
+
+
+async def test_that_no_file_can_be_opened_is_told_once_and_what_waited_is_heard_later(folder: Path) -> None:
+    heard, told = Heard(), list[str]()
+    async with listening(folder, heard) as ear:
+        ear.on_lack = told.append
+        copies, second = HostCopies(folder), HostCopies(folder)
+        copies.send(KEY, b"first")
+        second.send(KEY, b"second")
+        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(map(int, os.listdir("/proc/self/fd"))), limits[1]))
+        try:
+            await asyncio.sleep(4 * LOOK_EACH_S)
+            assert not heard
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+        [line] = told
+        assert "ulimit" in line
+        await until(lambda: len(heard) == 2, "both came")
+        copies.close()
+        second.close()
 
 
 async def test_nonsense_on_the_socket_ends_that_connection_alone(folder: Path) -> None:
     heard = Heard()
     async with listening(folder, heard):
-        _reader, writer = await asyncio.open_unix_connection(folder / "all.sock")
+        _reader, writer = await asyncio.open_unix_connection(folder / MISSION_SOCKET)
         writer.write(b"\xff" * 100)
         assert await _reader.read() == b""
         writer.close()
@@ -132,7 +180,7 @@ async def test_nonsense_on_the_socket_ends_that_connection_alone(folder: Path) -
 
 async def test_a_recorder_is_woken_for_many_copies_together(folder: Path) -> None:
     loop, heard_s = asyncio.get_running_loop(), list[float]()
-    ear = HostEar(folder, pictures_only=False)
+    ear = HostEar(folder, is_of_mission=True)
     await ear.open(lambda _key, _raw: heard_s.append(loop.time()), fail)
     copies, began_s, count = HostCopies(folder), loop.time(), 100
     for _ in range(count):
@@ -140,6 +188,6 @@ async def test_a_recorder_is_woken_for_many_copies_together(folder: Path) -> Non
         await asyncio.sleep(0.003)
     await until(lambda: len(heard_s) == count, "all came")
     wakings = 1 + sum(after - before > 0.0015 for before, after in pairwise(heard_s))
-    assert wakings <= 2 + (loop.time() - began_s) / GATHER_S
+    assert wakings <= 2 + (loop.time() - began_s) / LOOK_EACH_S
     copies.close()
     await ear.close()

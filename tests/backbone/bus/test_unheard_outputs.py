@@ -10,7 +10,7 @@ import pytest
 import pytest_asyncio
 from free_ports import free_endpoint
 
-from backbone.bus import zenoh_bus, zenoh_outlets
+from backbone.bus import zenoh_outlets
 from backbone.bus.clock import MissionClock
 from backbone.bus.shared_bus import SharedBus, SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
@@ -30,14 +30,14 @@ class Ball(Message, frozen=True):
 def encoded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Return the numbers of the balls that were encoded."""
     numbers: list[int] = []
-    write = zenoh_bus.write
+    write = zenoh_outlets.write
 
     def counting(envelope: Envelope[Message], *limit: int) -> bytes:
         if isinstance(envelope.body, Ball):
             numbers.append(envelope.body.number)
         return write(envelope, *limit)
 
-    monkeypatch.setattr(zenoh_bus, "write", counting)
+    monkeypatch.setattr(zenoh_outlets, "write", counting)
     monkeypatch.setattr(zenoh_outlets, "KNOWN_AFTER_S", 0.0)
     return numbers
 

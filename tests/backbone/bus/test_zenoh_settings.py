@@ -1,12 +1,16 @@
-"""Settings of clients and hubs: authentication only where there is a secret, and other hubs are dialed for ever."""
+"""Settings of clients and hubs: authentication only where there is a secret, other hubs dialed for ever, and leases."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from backbone.bus.zenoh_settings import client_settings, hub_settings
+from backbone.authentication import socket_endpoint
+from backbone.bus.zenoh_settings import HOST_LEASE_MS, LINK_LEASE_MS, client_settings, hub_settings
+from backbone.creator.messages import RestartPolicy
+from backbone.creator.silence import SHOWN_AFTER_S
 
 
 def test_a_client_proves_a_secret_only_if_it_has_one() -> None:
@@ -36,3 +40,19 @@ def test_nothing_is_looked_for_on_the_network() -> None:
         scouting: Any = settings["scouting"]
         assert not scouting["multicast"]["enabled"]
         assert not scouting["gossip"]["enabled"]
+
+
+def lease_ms(settings: Any) -> int:
+    link = settings["transport"]["link"]["tx"]
+    return int(link["lease"])
+
+
+def test_a_link_that_can_be_cut_is_given_up_soon_and_one_that_cannot_is_kept_alive_rarely() -> None:
+    socket, port = socket_endpoint(Path("/run")), "tcp/192.0.2.7:7447"
+    assert lease_ms(client_settings(socket)) == lease_ms(hub_settings([socket], [], "")) == HOST_LEASE_MS
+    of_several_hosts = [client_settings(port), hub_settings([socket, port], [], ""), hub_settings([socket], [port], "")]
+    assert {lease_ms(settings) for settings in of_several_hosts} == {LINK_LEASE_MS}
+
+
+def test_a_hung_process_is_replaced_before_its_link_is_given_up() -> None:
+    assert RestartPolicy().hung_after_s + SHOWN_AFTER_S < HOST_LEASE_MS / 1000

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.command_line.key_facts import KeyFacts, with_facts
 from backbone.command_line.message_lines import (
     LONGEST_BODY,
     TrafficTable,
@@ -53,4 +54,5 @@ def test_all_traffic_is_counted_once_and_the_busiest_key_is_first(
     assert sum(one["bytes_per_s"] for one in rows) * lasted_s == pytest.approx(sum(size for _name, size in heard))
     assert sum(one["messages_per_s"] for one in rows) * lasted_s == pytest.approx(len(heard))
     assert rows == sorted(rows, key=lambda one: -one["bytes_per_s"])
-    assert len(traffic_lines(rows)) == len({name for name, _size in heard})
+    shown = with_facts(rows, KeyFacts(), "night")
+    assert len(traffic_lines(shown)) == len({name for name, _size in heard})

@@ -516,6 +516,7 @@ def test_state_says_who_and_how_it_is() -> None:
         assert stage.states[-1] == state
         count = len(stage.states)
         stage.walker.report("climbs")
+        stage.walker.changed()  # as after news that its state does not show
         await stage.clock.sleep_s(0.1)
         assert len(stage.states) == count, "no news was published"
         stage.walker.end("enough")

@@ -17,9 +17,9 @@ from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.keys import Conversation
 from backbone.launcher.names_keeper import LIST_AGAIN_S, NamesKeeper
 from backbone.naming import Subsystem
+from backbone.rc_manager.messages import AskSchedule
 from backbone.run_files import RunFile
 from backbone.run_names import MissionNames
 from backbone.scheduling.views import RcView, Schedule
@@ -51,14 +51,21 @@ def test_the_file_follows_what_comes_and_goes(local_mission: Any, beside: Callab
             assert stat.S_IMODE((directory / run_names.FILE_NAME).stat().st_mode) == 0o600
             launch = Launch(MISSION, Subsystem.MISSION_CONTROL, "watch1", "watch", "x:Y", "base", "", 0.0, 1.0)
             watcher: Component[Any] = Component(launch, network.join(launch.address, clock), clock)
+            rc = RcView("scout1", "scout", "up", False, 1.0, [], 0, [], is_robot=True)
+            asked: list[float] = []
+
+            async def answer(_asked: Any) -> Schedule:
+                asked.append(clock.now_s())
+                return Schedule(1.0, [rc], [], [])
+
+            manager.serve(RC_MANAGER, AskSchedule, answer)
             async with beside(watcher):
-                rc = RcView("scout1", "scout", "up", False, 1.0, [], 0, [], is_robot=True)
-                manager.publish(RC_MANAGER, Conversation.SCHEDULE, Schedule(1.0, [rc], [], []))
                 await clock.sleep_s(2.0)
                 assert {"watch1", "scout1"} <= set(written().all)
                 assert (written().robots, written().behaviors) == (["scout1"], ["watch1"])
             await clock.sleep_s(LIST_AGAIN_S + 2.0)
             assert written().behaviors == []
+            assert len(asked) <= 4, "the RC manager is asked after components came and went, and now and then"
             await end_tasks(keeping)
             await asyncio.gather(bus.close(), manager.close())
 

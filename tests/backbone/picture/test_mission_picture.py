@@ -191,8 +191,13 @@ def test_without_a_nameserver_there_is_no_first_picture() -> None:
             tuple(process(f"scout{number}") for number in range(2, 309)),
             "the list is incomplete: running and not registered yet: 307 components (scout10, scout100",
         ),
+        (
+            Components(LISTED, True, 9.5),
+            (process("scout1"), *(ProcessState(process(f"arc{n}").spawn, 0, 0, "") for n in range(6))),
+            "the list is incomplete: still being started: 6 components (arc0, arc1, arc2, arc3, arc4, arc5)",
+        ),
     ],
-    ids=["hub began a moment ago", "many unknown", "one that hangs", "do not come back", "come back too late"],
+    ids=["hub began a moment ago", "many unknown", "one that hangs", "do not come back", "come back too late", "start"],
 )
 def test_a_list_that_is_not_whole_says_so(listing: Components, processes: tuple[ProcessState, ...], says: str) -> None:
     picture = looked(listing, processes)

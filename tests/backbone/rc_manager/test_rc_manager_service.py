@@ -26,7 +26,7 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.placer.messages import Start
 from backbone.rc_manager.messages import (
-    BEAT_EVERY_S,
+    BEAT_WITHIN_S,
     AskRc,
     AskRequest,
     AskSchedule,
@@ -133,7 +133,7 @@ class PlainArc(Component[Any]):
         while True:
             if self.beats:
                 self.bus.publish(self.address, Conversation.BEAT, Beat(self.name))
-            await self.clock.sleep_s(BEAT_EVERY_S)
+            await self.clock.sleep_s(BEAT_WITHIN_S)
 
     async def ask_for(self, request: SchedulingRequest) -> Scheduled:
         self.request = request
@@ -556,6 +556,30 @@ def test_why_names_the_blocker_and_a_changed_priority_plans_anew(pool: Any) -> N
             assert two.is_open
 
     run_virtual(main())
+
+
+@pytest.mark.parametrize(("arcs", "most"), [(2, 160), (40, 40)])
+def test_the_more_arcs_there_are_the_longer_a_schedule_for_people_waits(pool: Any, arcs: int, most: int) -> None:
+    async def main() -> tuple[list[Schedule], Schedule]:
+        async with pool() as here, here.beside(here.manager()):
+            heard: list[Schedule] = []
+            for number in range(arcs):
+                arc = await here.arc(f"arc{number}")
+                await arc.ask_for(request(arc.name, "left"))
+            await here.clock.sleep_s(1.0)
+            ear = here.network.join("ui_console/ear", here.clock)
+            ear.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, lambda heard_of: heard.append(heard_of.body))
+            for change in range(160):
+                await ear.ask(RC_MANAGER, SetPriority("owner-arc0", change % 7 + 1), Done, within_s=1)
+                await here.clock.sleep_s(0.02)
+            await here.clock.sleep_s(0.5)
+            newest = await ear.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=1)
+            await ear.close()
+            return heard, newest
+
+    heard, newest = run_virtual(main())
+    assert most / 2 <= len(heard) <= most + 5
+    assert [one.priority for one in heard[-1].requests] == [one.priority for one in newest.requests]
 
 
 def test_every_decision_is_in_the_trace(pool: Any) -> None:

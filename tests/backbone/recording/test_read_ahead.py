@@ -123,6 +123,44 @@ def test_a_chunk_that_takes_five_milliseconds_delays_no_message():
     assert max(late_s) < 1e-6
 
 
+def test_a_machine_that_is_slow_for_a_while_decodes_in_longer_gaps_only():
+    ahead = ReadAhead(Recording(recording_of([(0.1, LARGEST)] * 40)), CLASSES, 0.0)
+    for _message in range(MOST_AHEAD_BYTES // LARGEST // 2):
+        ahead.decode_one()
+    assert ahead.has_time(GAP_S)
+    ahead.took(2 * GAP_S)
+    assert not ahead.has_time(GAP_S)
+    assert ahead.has_time(5 * GAP_S)
+    for _message in range(100):
+        ahead.took(GAP_S / 10)
+    assert ahead.has_time(GAP_S)
+
+
+def test_a_component_is_served_in_a_gap_and_at_the_end_at_the_latest():
+    """To serve one starts threads; the messages of one instant go before."""
+    addresses = [f"resource_pool/scout{number}" for number in range(3)]
+    file = recorded(
+        Said(at_s, address, Conversation.LOG, StoryEvent(at_s, address, "", "", "", LogLevel.INFO))
+        for at_s, address in zip([1.0, 1.0, 3.0], addresses, strict=True)
+    )
+    log: list[tuple[str, float]] = []
+
+    async def play() -> None:
+        clock = VirtualClock()
+        bus = LocalNetwork("night").join("backbone/replay", clock)
+        player = Player(bus, clock, Recording(file), CLASSES, since_s=0.0)
+        player.catch_up()
+        player.begin()
+        serve, bus.serve = bus.serve, lambda address, *how: log.append((address, clock.now_s())) or serve(address, *how)
+        bus.pass_on = lambda address, *_said: log.append(("said", clock.now_s()))
+        await player.run()
+        await bus.close()
+
+    run_virtual(play())
+    said = [("said", 1.0), ("said", 1.0), ("said", 3.0)]
+    assert log == [*said[:2], (addresses[0], 1.0), (addresses[1], 1.0), said[2], (addresses[2], 3.0)]
+
+
 def test_messages_before_a_damage_are_played():
     file = recording_of([(0.1, LARGEST)] * 40)
     named = [found.start() for found in re.finditer(b"zstd", file.getvalue())]  # once in each chunk, once in the index

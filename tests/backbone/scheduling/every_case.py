@@ -7,7 +7,7 @@ import math
 import random
 from collections.abc import Iterator, Sequence
 
-from backbone.scheduling.response_time import Stream, utilization
+from backbone.scheduling.streams import Stream, utilization
 
 PERIODS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 12)
 LONGEST_CYCLE = 60  # ticks after which the streams are in step again

@@ -34,7 +34,7 @@ from backbone.scheduling.events import (
     Wanted,
 )
 from backbone.scheduling.packet_times import PacketTimes
-from backbone.scheduling.priority import by_precedence
+from backbone.scheduling.precedence import by_precedence
 from backbone.scheduling.requests import CapacityExceeded, MeasuredPackets, RcUse, Usage
 from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.scheduling.shares import Shares

@@ -14,13 +14,38 @@ from types import CodeType, FrameType
 from typing import NamedTuple
 
 import pytest
-from simulated_switches import Bench, ask, manager, unit
+from simulated_switches import Bench, ask, load, manager, sharable, unit
 
 import backbone.scheduling
-from backbone.scheduling.events import ConnectArc, Event, Instruction, RevokeArc, WakeAt, Woken
+from backbone.scheduling.events import (
+    CapacityChanged,
+    ConnectArc,
+    Departed,
+    Event,
+    Extended,
+    Freed,
+    Idled,
+    Instruction,
+    Opened,
+    OpenFailed,
+    PriorityChanged,
+    RcCameBack,
+    RcWentDown,
+    Record,
+    RevokeArc,
+    RuntimeChanged,
+    WakeAt,
+    Wanted,
+    Woken,
+)
+from backbone.scheduling.master_schedule import EXACT_UP_TO
+from backbone.scheduling.requests import RcUse
 
 ROOM = Path(backbone.scheduling.__file__).parent
 RUN_S = 5.0
+MOST_RETURNS = 8
+
+Uses = dict[str, RcUse]
 
 
 class Step(NamedTuple):
@@ -59,40 +84,145 @@ def walk(decide: Callable[[], object]) -> list[Step]:
     return steps
 
 
-def a_granted_request() -> list[Step]:
-    """An ARC asks for an RC that no ARC holds."""
-    bench = Bench(manager(), unit("v"))
-    return decided(bench, ask("a", "v", run_s=RUN_S), 0.0, ConnectArc)
+class Kind(NamedTuple):
+    """The kind of the RCs and of the planner.
+
+    Attributes:
+        uses: What the ARCs ask for.
+        exact_up_to: Groups of at most this size are planned whole.
+    """
+
+    uses: Uses
+    exact_up_to: int
+
+    def bench(self) -> Bench:
+        """Return a bench with an RC of either kind."""
+        return Bench(manager(exact_up_to=self.exact_up_to), unit("u", 0.1, 0.1), sharable("s", 1.0, 0.1, 0.1))
+
+    def running(self, *arcs: str) -> Bench:
+        """Return a bench on which the first of these ARCs runs, and the others wait for the end of its slice."""
+        bench = self.bench()
+        for arc in arcs:
+            bench.tell(ask(arc, self.uses, run_s=RUN_S))
+        return bench.run(1.0)
+
+    @property
+    def rc(self) -> str:
+        """The first RC that the ARCs ask for."""
+        return next(iter(self.uses))
 
 
-def a_request_that_waits() -> list[Step]:
-    """An ARC asks for an RC that an equal holds: it gets the next slice."""
-    bench = Bench(manager(), unit("v"))
-    bench.tell(ask("a", "v", run_s=RUN_S))
-    bench.run(1.0)
-    return decided(bench, ask("b", "v", run_s=RUN_S), 1.0, WakeAt)
+Happens = tuple[Bench, Event, type[Instruction]]
+"""A bench just before the event, the event, and the kind of instruction that must come of it."""
 
 
-def an_ended_slice() -> list[Step]:
-    """A slice ends for whose end an equal waits."""
-    bench = Bench(manager(), unit("v"))
-    bench.tell(ask("a", "v", run_s=RUN_S))
-    bench.tell(ask("b", "v", run_s=RUN_S))
-    bench.run(1.0)
-    return decided(bench, Woken(), RUN_S, RevokeArc)
+def granted(kind: Kind) -> Happens:
+    return kind.bench(), ask("a", kind.uses), ConnectArc
 
 
-def decided(bench: Bench, event: Event, now_s: float, outcome: type[Instruction]) -> list[Step]:
-    """Return the functions that the event passes; the decision is of this kind."""
+def waits(kind: Kind) -> Happens:
+    return kind.running("a"), ask("b", kind.uses), WakeAt
+
+
+def preempts(kind: Kind) -> Happens:
+    return kind.running("a"), ask("b", kind.uses, priority=3), RevokeArc
+
+
+def waits_for_a_dead_rc(kind: Kind) -> Happens:
+    bench = kind.bench()
+    bench.tell(RcWentDown(kind.rc))
+    return bench, ask("a", kind.uses), Record
+
+
+def slice_ends(kind: Kind) -> Happens:
+    bench = kind.running("a", "b", "c")
+    bench.now_s = RUN_S + 0.1
+    return bench, Woken(), RevokeArc
+
+
+def idles(kind: Kind) -> Happens:
+    return kind.running("a", "b"), Idled("a"), RevokeArc
+
+
+def departs(kind: Kind) -> Happens:
+    return kind.running("a", "b"), Departed("a"), RevokeArc
+
+
+def wants_again(kind: Kind) -> Happens:
+    bench = kind.running("a")
+    bench.tell(Idled("a"))
+    return bench.run(2.0), Wanted("a"), ConnectArc
+
+
+def is_free(kind: Kind) -> Happens:
+    bench = kind.running("a", "b")
+    bench.tell(Departed("a"))
+    return bench, Freed("a"), ConnectArc
+
+
+def is_connected(kind: Kind) -> Happens:
+    bench = kind.bench()
+    bench.tell(ask("a", kind.uses))
+    bench.tell(ask("b", kind.uses))
+    return bench, Opened("a"), WakeAt
+
+
+def cannot_be_connected(kind: Kind) -> Happens:
+    bench, _, _ = is_connected(kind)
+    return bench, OpenFailed("a", kind.rc), Record
+
+
+def rc_is_lost(kind: Kind) -> Happens:
+    return kind.running("a", "b"), RcWentDown(kind.rc), RevokeArc
+
+
+def rc_is_back(kind: Kind) -> Happens:
+    bench = kind.running("a", "b")
+    bench.tell(RcWentDown(kind.rc))
+    return bench.run(1.5), RcCameBack(kind.rc, 0), ConnectArc
+
+
+def priority_changes(kind: Kind) -> Happens:
+    return kind.running("a", "b"), PriorityChanged("owner-b", 3), RevokeArc
+
+
+def run_time_changes(kind: Kind) -> Happens:
+    return kind.running("a", "b"), RuntimeChanged("b", 3.0, 3.0), Record
+
+
+def is_extended(kind: Kind) -> Happens:
+    bench = kind.bench()
+    bench.tell(ask("a", kind.uses, run_s=RUN_S, most_s=20.0))
+    bench.tell(ask("b", kind.uses))
+    return bench.run(1.0), Extended("a", 8.0), WakeAt
+
+
+def capacity_falls(kind: Kind) -> Happens:
+    bench = kind.bench()
+    for arc in "abc":
+        bench.tell(ask(arc, {"s": load(0.3)}))
+    return bench.run(1.0), CapacityChanged("s", 0.7), RevokeArc
+
+
+EVENTS: list[Callable[[Kind], Happens]] = [
+    *(granted, waits, preempts, waits_for_a_dead_rc, slice_ends, idles, departs, wants_again, is_free, is_connected),
+    *(cannot_be_connected, rc_is_lost, rc_is_back, priority_changes, run_time_changes, is_extended, capacity_falls),
+]
+USES: dict[str, Uses] = {
+    "unit": {"u": RcUse()},
+    "sharable": {"s": load(0.6)},
+    "both": {"s": load(0.6), "u": RcUse()},
+}
+
+
+@pytest.mark.parametrize("exact_up_to", [EXACT_UP_TO, 0], ids=["whole group", "large group"])
+@pytest.mark.parametrize("uses", USES.values(), ids=USES)
+@pytest.mark.parametrize("event", EVENTS, ids=lambda event: event.__name__)
+def test_a_reader_seldom_goes_back(event: Callable[[Kind], Happens], uses: Uses, exact_up_to: int) -> None:
+    bench, happens, outcome = event(Kind(uses, exact_up_to))
     instructions: list[Instruction] = []
-    steps = walk(lambda: instructions.extend(bench.manager.handle(event, now_s)))
+    steps = walk(lambda: instructions.extend(bench.manager.handle(happens, bench.now_s)))
     assert any(isinstance(one, outcome) for one in instructions), instructions
-    return steps
-
-
-@pytest.mark.parametrize(("event", "most"), [(a_granted_request, 8), (a_request_that_waits, 4), (an_ended_slice, 14)])
-def test_a_reader_seldom_goes_back(event: Callable[[], list[Step]], most: int) -> None:
-    steps = event()
     returns = sum(step.is_return for step in steps)
     told = "\n".join(f"{'back to' if step.is_return else '':8}{step.file:22}{step.function}" for step in steps)
-    assert returns <= most, f"{len(steps)} functions, {returns} returns:\n{told}"
+    assert returns <= MOST_RETURNS, f"{len(steps)} functions, {returns} returns:\n{told}"

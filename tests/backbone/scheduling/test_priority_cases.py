@@ -10,7 +10,8 @@ from pathlib import Path as File
 import pytest
 from test_priority_order import Tree, higher_by_walking_up, path
 
-from backbone.scheduling.priority import Path, by_precedence, higher
+from backbone.scheduling.precedence import by_precedence
+from backbone.scheduling.priority import Path, higher
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import PathNode
 

@@ -5,7 +5,8 @@ from itertools import pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from backbone.scheduling.priority import by_precedence, higher
+from backbone.scheduling.precedence import by_precedence
+from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import PathNode
 

@@ -6,7 +6,8 @@ from trace_checker import admissible as independently_admissible
 from trace_checker.admission import Stream as CheckedStream
 
 from backbone.scheduling.requests import Usage
-from backbone.scheduling.response_time import Stream, admissible, stream, utilization, worst_response_us
+from backbone.scheduling.response_time import admissible, worst_response_us
+from backbone.scheduling.streams import Stream, stream, utilization
 
 
 @st.composite

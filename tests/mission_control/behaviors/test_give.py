@@ -54,7 +54,7 @@ async def joints(running: RunningMission, *names: str) -> Callable[[], list[floa
     model = mujoco.MjModel.from_xml_string(known.mjcf)
     data = mujoco.MjData(model)
     states: list[bytes] = []
-    running.bus.subscribe(WORLD, Conversation.TELEMETRY, WorldState, lambda heard: states.append(heard.body.state))
+    running.bus.subscribe(WORLD, Conversation.BODIES, WorldState, lambda heard: states.append(heard.body.state))
 
     def positions() -> list[float]:
         if not states:

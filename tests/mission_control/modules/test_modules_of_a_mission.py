@@ -82,6 +82,31 @@ def test_a_choice_is_described_as_a_module(tmp_path: Path) -> None:
     assert (choice["name"], choice["parameters"]["sources"]) == ("choose-twice", ["by-two", "number"])
 
 
+def test_a_quality_is_described_at_the_unit_that_publishes_the_key_and_at_those_that_take_it(tmp_path: Path) -> None:
+    declared = '<quality key="twice" deadline-s="0.5" reliable="true" urgency="low" express="true" most-bytes="1000"/>'
+    late = '<quality key="number" deadline-s="2"/>'
+    early, then = read(tmp_path, mission(declared, late, unit("early", DOUBLER), unit("late", SUMMING))).units
+    twice = {
+        "reliable": True,
+        "urgency": "low",
+        "express": True,
+        "most_bytes": 1000,
+        "most_bytes_on_host": 1000,
+        "deadline_s": 0.5,
+    }
+    assert then.parameters["qualities"] == {"twice": twice}
+    number = {
+        **twice,
+        "reliable": False,
+        "urgency": "normal",
+        "express": False,
+        "most_bytes": 8 * 1024**2,
+        "most_bytes_on_host": 64 * 1024**2,
+        "deadline_s": 2.0,
+    }
+    assert early.parameters["qualities"] == {"twice": twice, "number": number}
+
+
 def test_who_must_not_import_anything_reads_the_file_without_connections() -> None:
     classes: dict[str, ClassFacts] = {}
     described = read_mission_bytes(mission(unit("early", DOUBLER)).encode(), "m.xml", classes)
@@ -128,6 +153,22 @@ HOST = '<hosts><host name="base" address="127.0.0.1"/></hosts>'
         (
             mission(unit("one", SIDE_BY_SIDE, '<choose key="by-two" from="number"/>')),
             ["6:9 choose-by-two produces by-two, and so does doubler"],
+        ),
+        (
+            mission('<quality key="twise" deadline-s="1"/>', unit("one", DOUBLER)),
+            ["4:10 a quality is declared for twise, which no module produces (did you mean 'twice'?)"],
+        ),
+        (
+            mission('<quality key="number" deadline-s="1" reliable="true"/>', unit("one", DOUBLER)),
+            ["4:10 number comes from ui_console/tester, which sends it in its own quality"],
+        ),
+        (
+            mission('<quality key="twice" deadline-s="-1" urgency="now" most-bytes="1e9"/>', unit("one", DOUBLER)),
+            ["4:22 deadline-s='-1'", "4:38 urgency='now'", "4:52 most-bytes='1e9'"],
+        ),
+        (
+            mission('<quality key="twice"/>', '<quality key="twice" deadline-s="1"/>', unit("one", DOUBLER)),
+            ["5:10 a second quality of 'twice'; the first is in line 4"],
         ),
         (
             mission(unit("one", DOUBLER, attributes=' cpus="0"')),

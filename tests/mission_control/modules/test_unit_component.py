@@ -14,13 +14,23 @@ from sample_modules import Number
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
-from backbone.bus.local_bus import LocalNetwork
+from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.component import WrongParameter
 from backbone.component.launch import Launch
-from backbone.component.messages import AskStatistics, ComponentState, SetParameter, Statistics
+from backbone.component.messages import (
+    DEADLINES_MISSED,
+    AskStatistics,
+    ComponentState,
+    LogLevel,
+    SetParameter,
+    Statistics,
+    StoryEvent,
+)
+from backbone.deadlines import FIRST_S
 from backbone.debug_views import ListViews, Views
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
+from backbone.quality import QUALITY, OutputQuality, Urgency
 from backbone.wire import Message
 from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
 from mission_control.modules.execution_unit import NeverRuns
@@ -137,6 +147,62 @@ class Passing(Module):
 
     def update(self, inputs: Inputs) -> Outputs:
         return self.Outputs(inputs.number)
+
+
+@pytest.mark.parametrize("own_thread", [False, True])
+def test_a_missed_deadline_is_told_once_and_so_is_its_end(local_mission: Any, beside: Any, own_thread: bool) -> None:
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        told: list[str] = []
+        bus.subscribe(
+            "mission_control/*",
+            Conversation.LOG,
+            StoryEvent,
+            lambda one: told.append(f"{one.body.level} {one.body.what}"),
+        )
+
+        async def numbers(count: int, each_s: float) -> None:
+            for value in range(count):
+                bus.publish(TESTER, Conversation.EVENTS, Number(float(value)))
+                await VirtualClock().sleep_s(each_s)
+
+        await numbers(50, 0.2)
+        assert told == [], "in time"
+        await VirtualClock().sleep_s(30.0)
+        late = f"no number from {TESTER}"
+        assert told == [f"{LogLevel.WARNING} no value from {TESTER} within 0.25 s"]
+        assert started["first"].feedback.startswith(late)
+        await numbers(10, 0.2)
+        assert [one.split(" ", 1)[1] for one in told[1:]] == ["comes again, 29.950 s late"]
+        assert late not in started["first"].feedback
+        values = (await bus.ask("mission_control/first", AskStatistics(), Statistics, within_s=1.0)).values
+        assert values[f"{DEADLINES_MISSED}{TESTER}/events"] == 1
+
+    deadline = {"number": OutputQuality(deadline_s=0.25).quality}
+    play(local_mission, beside, arranged(orders(ARRANGEMENTS[1], own_thread), NUMBERS, deadline), scene)
+
+
+def test_a_source_that_never_speaks_is_told_when_a_mission_could_be_up(local_mission: Any, beside: Any) -> None:
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        told: list[StoryEvent] = []
+        bus.subscribe("mission_control/rest", Conversation.LOG, StoryEvent, lambda one: told.append(one.body))
+        await VirtualClock().sleep_s(FIRST_S - 0.5)
+        assert told == []
+        await VirtualClock().sleep_s(60.0)
+        assert [one.what for one in told] == ["no value from mission_control/first/twice within 0.25 s"]
+
+    deadline = {"twice": OutputQuality(deadline_s=0.25).quality}
+    play(local_mission, beside, arranged(orders(ARRANGEMENTS[1]), NUMBERS, deadline), scene)
+
+
+def test_an_output_is_sent_in_its_quality(local_mission: Any, beside: Any) -> None:
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        sender = started["first"].bus
+        assert isinstance(sender, LocalBus)
+        assert sender.quality("mission_control/first/twice", Conversation.OUTPUTS) == urgent["twice"]
+        assert sender.quality("mission_control/first/else", Conversation.OUTPUTS) == QUALITY[Conversation.OUTPUTS]
+
+    urgent = {"twice": OutputQuality(urgency=Urgency.URGENT, reliable=True).quality}
+    play(local_mission, beside, arranged(orders(ARRANGEMENTS[1]), NUMBERS, urgent), scene)
 
 
 @pytest.mark.parametrize("own_thread", [False, True])

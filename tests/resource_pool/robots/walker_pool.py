@@ -80,7 +80,7 @@ async def watch_trunk(bus: Bus) -> Trunk:
         mujoco.mj_kinematics(model, data)
         trunk.see(data)
 
-    bus.subscribe(WORLD, Conversation.TELEMETRY, WorldState, see)
+    bus.subscribe(WORLD, Conversation.BODIES, WorldState, see)
     return trunk
 
 

@@ -9,7 +9,8 @@ import pytest
 from bus_speaker import LOGGED, PICTURES, SPEAKER, event, speaker
 from web_stage import LOW, Browser, Stage
 
-from backbone.keys import NEVER_DROPPED, Conversation
+from backbone.keys import COPIED, Conversation
+from backbone.quality import NEVER_DROPPED
 from backbone.recording.hearing import to_overhear
 from ui_console.web.key_sight import KeySight, NoSuchKey, where_heard
 from ui_console.web.protocol import ListKeys, ViewKey
@@ -159,7 +160,7 @@ async def test_thousands_of_views_of_keys_that_nobody_speaks_at_leave_one_and_th
     await wait_nothing_heard(stage)
 
 
-@pytest.mark.parametrize("conversation", sorted(set(Conversation) - {Conversation.ALIVE, Conversation.TOLD}))
+@pytest.mark.parametrize("conversation", sorted(set(Conversation) - {Conversation.ALIVE, *COPIED}))
 def test_only_one_component_makes_copies_for_a_view(conversation: Conversation) -> None:
     heard, of = where_heard(f"resource_pool/scout1/{conversation}", "resource_pool/radio")
     assert heard in to_overhear((f"resource_pool/scout1/{conversation}",))

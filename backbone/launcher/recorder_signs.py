@@ -1,0 +1,54 @@
+"""Signs of life of a recorder to the process that started it: lines on its standard output, which show nothing else.
+
+A recorder gives one after a flush. If its event loop, its disc or its process hangs, none comes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+EACH_S = 1.0  # chosen: named within seconds, and a line each second costs nothing
+LATE_S = 1.5  # chosen: half of a second more, for a busy machine
+MOST_LATE = 2  # chosen: a watcher that stood still itself finds one line late, and the next in time
+
+
+class RecorderSigns:
+    """Gives them. Never blocks, and does nothing when nobody reads them any more."""
+
+    def __init__(self) -> None:
+        self._number, self._next_s = sys.stdout.fileno(), 0.0
+        os.set_blocking(self._number, False)
+
+    def give(self) -> None:
+        """Give a sign, if the last one is ``EACH_S`` ago."""
+        now_s = time.monotonic()
+        if now_s >= self._next_s:
+            self._next_s = now_s + EACH_S
+            with suppress(BlockingIOError, BrokenPipeError):
+                os.write(self._number, b"\n")
+
+
+async def watch(signs: asyncio.StreamReader, silent: Callable[[bool], None]) -> None:
+    """Call ``silent(True)`` when no signs come any more, and ``silent(False)`` when they come again; return at the end.
+
+    The first sign is awaited without limit: a process that begins is watched by who began it.
+    """
+    late = 0
+    line = await signs.readline()
+    while line:
+        try:
+            async with asyncio.timeout(LATE_S):
+                line = await signs.readline()
+        except TimeoutError:
+            late += 1
+            if late == MOST_LATE:
+                silent(True)
+            continue
+        if late >= MOST_LATE:
+            silent(False)
+        late = 0

@@ -1,0 +1,64 @@
+"""The deadlines of a unit's sources: a value that does not come in time is told once, and so is its return."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from backbone.component.component import Component
+from backbone.component.messages import DEADLINES_MISSED, LogLevel
+from backbone.deadlines import Deadlines
+from backbone.ranges import LONGEST_MENTION
+from mission_control.modules.orders import UnitParameters
+
+
+class UnitDeadlines:
+    """Watches the deadlines of one unit; made when it begins to listen.
+
+    Args:
+        component: Runs the unit.
+        keys: Those whose values the unit takes from elsewhere.
+        changed: Called when ``text`` has changed.
+    """
+
+    def __init__(
+        self,
+        component: Component[UnitParameters],
+        keys: Collection[str],
+        changed: Callable[[], None],
+    ) -> None:
+        self._component, self._changed = component, changed
+        self._sources, qualities = component.parameters.sources, component.parameters.qualities
+        self._within_s = {key: qualities[key].deadline_s for key in keys if key in qualities}
+        self._within_s = {key: within_s for key, within_s in self._within_s.items() if within_s}
+        self._deadlines = Deadlines(self._within_s, component.clock.now_s())
+
+    @property
+    def text(self) -> str:
+        """What is late at present; empty: nothing."""
+        late = [f"no {key} from {self._sources[key].address}" for key in self._deadlines.late]
+        return ", ".join(late)
+
+    def met(self, key: str) -> None:
+        """Record that a value came."""
+        late_s = self._deadlines.came(key, self._component.clock.now_s())
+        if late_s is not None:
+            self._component.publish_event(key, f"comes again, {late_s:.3f} s late", LogLevel.NOTICE)
+            self._changed()
+
+    async def watch(self) -> None:
+        """Tell what is late, as soon as it is; return if there are no deadlines."""
+        while self._within_s:
+            now_s = self._component.clock.now_s()
+            for key in self._deadlines.newly_missed(now_s):
+                told = f"no value from {self._sources[key].address} within {self._within_s[key]:g} s"
+                self._component.publish_event(key, told, LogLevel.WARNING)
+                self._changed()
+            look_again_s = now_s + min(self._within_s.values())  # for those that are late now and come again
+            await self._component.clock.sleep_until_s(min(self._deadlines.next_s, look_again_s))
+
+    def statistics(self) -> dict[str, float]:
+        """Return how often each deadline was missed, by the key on the bus."""
+        return {
+            f"{DEADLINES_MISSED}{self._sources[key].address}/{self._sources[key].conversation}"[:LONGEST_MENTION]: count
+            for key, count in self._deadlines.missed.items()
+        }
