@@ -17,11 +17,10 @@ import pytest
 import selection
 from hypothesis import settings
 
+from backbone.bus import zenoh_threads
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Clock
 from backbone.bus.local_bus import LocalNetwork
-from backbone.command_line import mission_console
-from backbone.component import process
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.nameserver.service import Nameserver
@@ -56,8 +55,7 @@ def _own_threads_of_zenoh() -> Iterator[None]:
     hub's process waits for itself.
     """
     with pytest.MonkeyPatch.context() as patch:
-        for module in (mission_console, process):
-            patch.setattr(module, "few_threads", lambda: None)
+        patch.setattr(zenoh_threads, "few_threads", lambda: None)
         yield
 
 

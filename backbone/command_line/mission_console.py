@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.live import Live
 
 from backbone.addresses import LAUNCHER, RC_MANAGER
+from backbone.bus import zenoh_threads
 from backbone.bus.interface import Bus, Clock
-from backbone.bus.zenoh_threads import few_threads
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
@@ -159,7 +159,7 @@ async def bring_up_on_console(
     description: MissionDescription, options: UpOptions, *, live: bool, verdict: VerdictPipe | None = None
 ) -> int:
     """Run the mission, tell a person about it, and return the exit code."""
-    few_threads()
+    zenoh_threads.few_threads()
     console = Console(file=sys.stdout if live else sys.stderr, markup=False, emoji=False)
     observer = ConsoleObserver(console, live=live, verdict=verdict)
     observer.tell(f"mission {description.name} comes up")

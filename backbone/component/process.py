@@ -12,9 +12,9 @@ from collections.abc import Callable, Coroutine, Iterable
 
 import uvloop
 
+from backbone.bus import zenoh_threads
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
-from backbone.bus.zenoh_threads import few_threads
 from backbone.component.component import AnyComponent, Component
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
@@ -68,7 +68,7 @@ def run_to_end(launch: Launch, begin: Callable[[], Coroutine[object, None, None]
         begin: Called before the loop exists.
     """
     faulthandler.enable()
-    few_threads()
+    zenoh_threads.few_threads()
     component_log = ComponentLog(launch.name, launch.run_directory)
     component_log.install()
     try:
