@@ -165,6 +165,8 @@ class BehaviorExchanges:
             return False
         if one is going.new and going.course.new_works:
             going.course.end(ExchangePhase.PROVED, one.clock.now_s())
+        if one is going.old and not going.course.new_works:
+            going.course.fail(one.clock.now_s(), "the old one finished before it was ready")
         return bool(one.gate.is_open)
 
     # ------------------------------------------------------------------ the exchange

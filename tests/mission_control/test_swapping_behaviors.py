@@ -22,6 +22,8 @@ from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
 from backbone.placer.messages import ReviseStart
 from backbone.reading_anew import WrongClass
+from mission_control.behavior import Behavior
+from mission_control.messages import BehaviorStatus
 from resource_pool.commands import Drive
 
 AT = "mission_control/turner"
@@ -285,6 +287,24 @@ def test_its_end_during_an_exchange_is_its_end(stage: Stage, play: Play) -> None
         with pytest.raises(Exception, match="turner"):
             await swapping
         assert stage.arc.released
+
+    play(scene)
+
+
+def test_one_that_finishes_while_the_new_one_warms_has_finished(stage: Stage, play: Play) -> None:
+    async def scene() -> None:
+        await stage.arc.grant()
+        stage.edit(ACT, f"    def is_ready(self):\n        return self.clock.now_s() > 3.0\n\n{ACT}")
+        swapping = asyncio.create_task(stage.swap(ready_s=30.0, speed_rad_s=2.0))
+        await stage.sleep(1.0)
+        turner = stage.placer.components["turner"]
+        assert isinstance(turner, Behavior)
+        turner.finish(BehaviorStatus.SUCCESS)
+        swapped = await swapping
+        assert (swapped.is_proved, swapped.cause) == (False, "the old one finished before it was ready")
+        await stage.sleep(4.0)
+        assert (set(stage.speeds()), bool(stage.arc.released)) == ({1.0}, True)
+        assert turner.status is BehaviorStatus.SUCCESS
 
     play(scene)
 
