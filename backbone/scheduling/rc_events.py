@@ -66,9 +66,9 @@ class RcEvents:
         self._trace.introduce_rc(rc)
 
     def capacity_changed(self, name: str, capacity: float) -> None:
-        """Set the RC's capacity; revoke the last holders in order until the rest fits."""
+        """Set the capacity of a sharable RC; revoke the last holders in order until the rest fits."""
         rc = self._state.rcs.get(name)
-        if rc is None or rc.capacity == capacity or not 0 <= capacity <= 1:
+        if rc is None or not rc.sharable or rc.capacity == capacity or not 0 <= capacity <= 1:
             return
         self._state.set_capacity(rc, capacity)
         if self._trace.has_introduced(name):

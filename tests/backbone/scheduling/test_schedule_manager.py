@@ -437,6 +437,17 @@ def test_a_capacity_that_cannot_be_changes_nothing(capacity):
     assert bench.answers.schedule(1.0).rcs[0].capacity == 1.0
 
 
+@pytest.mark.parametrize("capacity", [0.0, 0.5])
+def test_a_unit_rc_has_no_capacity_that_could_change(capacity):
+    bench = Bench(manager(), unit("v"))
+    for arc in "abc":
+        bench.tell(ask(arc, "v"))
+    bench.at(1.0, CapacityChanged("v", capacity))
+    bench.run(2.0)
+    assert [bench.runs(arc) for arc in "abc"] == [[(0.0, None)], [], []]
+    assert bench.verdict() == []
+
+
 def test_a_request_for_nothing_is_refused():
     with pytest.raises(SchedulingRefusal):
         manager().choose(wish("a"))
