@@ -49,7 +49,7 @@ REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
 
 
 @dataclass(slots=True)
-class _Exchange:
+class _BehaviorExchange:
     asked: SwapClass
     old: Implementation
     new: Implementation
@@ -69,7 +69,7 @@ class BehaviorExchanges:
         """The implementation in charge."""
         self._load = load
         self._lives: dict[Implementation, asyncio.Task[None]] = {}
-        self._exchange: _Exchange | None = None
+        self._exchange: _BehaviorExchange | None = None
         self._is_busy = False
         self._news = asyncio.Event()
         self._copying: set[asyncio.Task[None]] = set()
@@ -204,13 +204,13 @@ class BehaviorExchanges:
         self._tell(f"{asked.class_path} warms beside {class_path_of(old)}{by}")
         rules = ExchangeRules(asked.prove_s, asked.ready_within_s)
         course = ExchangeCourse(rules, self._changed, old.clock.now_s())
-        going = self._exchange = _Exchange(asked, old, new, course)
+        going = self._exchange = _BehaviorExchange(asked, old, new, course)
         self._begin(new, _survived(new.run()))
         await self._until_over(going)
         remark = await (self._proved(going) if course.phase is ExchangePhase.PROVED else self._returned(going, anew))
         return course.answer(old.clock.now_s(), remark)
 
-    async def _until_over(self, going: _Exchange) -> None:
+    async def _until_over(self, going: _BehaviorExchange) -> None:
         course, clock = going.course, going.old.clock
         while not course.is_over:
             is_warm = course.phase is ExchangePhase.WARMING and going.new.has_begun
@@ -221,7 +221,7 @@ class BehaviorExchanges:
                 left_s = max(0.0, course.due_s - clock.now_s())
                 await clock.sleep_s(min(LOOK_EVERY_S * clock.rate, left_s))
 
-    async def _take_over(self, going: _Exchange) -> None:
+    async def _take_over(self, going: _BehaviorExchange) -> None:
         """Give the new one the charge, between two commands."""
         old, new, course = going.old, going.new, going.course
         old.gate.shut()
@@ -246,7 +246,7 @@ class BehaviorExchanges:
         elif going.course.is_over and beside in self._lives:
             self._lives[beside].cancel()
 
-    async def _returned(self, going: _Exchange, anew: ReadAnew[type[Implementation]]) -> str:
+    async def _returned(self, going: _BehaviorExchange, anew: ReadAnew[type[Implementation]]) -> str:
         anew.undo()
         await self._forget(going.new)
         old, new = class_path_of(going.old), going.asked.class_path
@@ -255,7 +255,7 @@ class BehaviorExchanges:
         is_same = old.partition(":")[0] == new.partition(":")[0]
         return f"a new start of {going.old.launch.name} reads the file as it is now" if is_same else ""
 
-    async def _proved(self, going: _Exchange) -> str:
+    async def _proved(self, going: _BehaviorExchange) -> str:
         await self._forget(going.old)
         going.course.rounds = going.new.gate.commands
         after = f": {going.course.cause}" if going.course.cause else ""

@@ -72,7 +72,7 @@ class RcOfDrivers(Protocol):
 
 
 @dataclass(slots=True)
-class _Exchange:
+class _DriverExchange:
     asked: SwapClass
     slot: DriverSlot
     old: object
@@ -89,7 +89,7 @@ class DriverExchanges:
 
     def __init__(self, rc: RcOfDrivers) -> None:
         self._rc = rc
-        self._going: _Exchange | None = None
+        self._going: _DriverExchange | None = None
         self._is_busy = False
         self._news = asyncio.Event()
 
@@ -124,7 +124,7 @@ class DriverExchanges:
             going.slot.shut()
         return going.back
 
-    def _put_back(self, going: _Exchange) -> None:
+    def _put_back(self, going: _DriverExchange) -> None:
         going.slot.works, going.slot.is_tried = going.old, False
         going.slot.open_gate()
         going.back.set()
@@ -178,7 +178,7 @@ class DriverExchanges:
             anew.undo()
         return going.course.answer(self._now_s(), remark)
 
-    async def _over(self, going: _Exchange) -> str:
+    async def _over(self, going: _DriverExchange) -> str:
         """Return what an operator should know when one of the two is there alone."""
         while not going.course.is_over:
             self._news.clear()
@@ -186,7 +186,7 @@ class DriverExchanges:
             going.course.let_pass(self._now_s())
         return await (self._proved(going) if going.course.phase is ExchangePhase.PROVED else self._returned(going))
 
-    def _made(self, asked: SwapClass, slot: DriverSlot, kind: Callable[[DriverSite], object]) -> _Exchange:
+    def _made(self, asked: SwapClass, slot: DriverSlot, kind: Callable[[DriverSite], object]) -> _DriverExchange:
         """Return the exchange with the new driver, not open yet."""
         old, rc = slot.works, self._rc
         if missing := methods_of(old) - methods_of(kind):
@@ -213,9 +213,9 @@ class DriverExchanges:
         rules = ExchangeRules(asked.prove_s, asked.ready_within_s)
         course = ExchangeCourse(rules, self._news.set, self._now_s())
         both_open = all(getattr(one, "opens_beside", False) for one in (old, new))
-        return _Exchange(asked, slot, old, new, parameters, course, both_open or not hasattr(new, "open"))
+        return _DriverExchange(asked, slot, old, new, parameters, course, both_open or not hasattr(new, "open"))
 
-    async def _opened(self, going: _Exchange) -> None:
+    async def _opened(self, going: _DriverExchange) -> None:
         """Open the new driver; if the device allows one only, close the old one first."""
         if not hasattr(going.new, "open"):
             return
@@ -234,7 +234,7 @@ class DriverExchanges:
         except UNPROVED as error:
             going.course.fail(self._now_s(), complaint(error))
 
-    async def _taken_over(self, going: _Exchange) -> None:
+    async def _taken_over(self, going: _DriverExchange) -> None:
         """Let the new one work, between two calls."""
         going.slot.shut()
         await going.slot.wait_quiet()
@@ -250,7 +250,7 @@ class DriverExchanges:
         going.slot.open_gate()
         self._tell(f"{going.asked.class_path} works, and has to prove itself", LogLevel.INFO)
 
-    async def _brought_up(self, going: _Exchange) -> None:
+    async def _brought_up(self, going: _DriverExchange) -> None:
         """Have the RC repeat what stands; a fault in it is one of the driver that works."""
         if going.course.switched_s is None:
             return
@@ -260,7 +260,7 @@ class DriverExchanges:
             if going.slot.works is going.old:
                 self._rc.fail(fault)
 
-    async def _returned(self, going: _Exchange) -> str:
+    async def _returned(self, going: _DriverExchange) -> str:
         if not going.is_beside:
             await self._close(going.new)
             try:
@@ -279,7 +279,7 @@ class DriverExchanges:
         is_same = old.partition(":")[0] == new.partition(":")[0]
         return f"a new start of {self._rc.name} reads the file as it is now" if is_same else ""
 
-    async def _proved(self, going: _Exchange) -> str:
+    async def _proved(self, going: _DriverExchange) -> str:
         going.slot.is_tried, going.course.rounds = False, going.slot.calls
         self._rc.has_driver(going.parameters)
         if going.is_beside:

@@ -15,7 +15,15 @@ from collections.abc import Callable
 
 from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Overhearer, Reply
 from backbone.bus.lossless import MOST_KEPT_BYTES
-from backbone.bus.neighbor_declarations import Declaration, Declaring, Listening, Overheard, Serving, Watching, matches
+from backbone.bus.neighbor_declarations import (
+    Declaring,
+    Listening,
+    NeighborDeclaration,
+    Overheard,
+    Serving,
+    Watching,
+    matches,
+)
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
 from backbone.quality import NEVER_DROPPED
@@ -41,7 +49,7 @@ class LocalNetwork:
         self.mission = mission
         self.servers: dict[str, Serving] = {}
         self.listeners: dict[Conversation, list[Listening]] = defaultdict(list)
-        self.tokens: dict[str, list[Declaration]] = {}
+        self.tokens: dict[str, list[NeighborDeclaration]] = {}
         self.watchers: list[Watching] = []
         self.overhearers: list[Overheard] = []
 
@@ -153,7 +161,7 @@ class Neighbor(Declaring):
         overhearers.append(overheard)
         return overheard
 
-    def declare_to_neighbors(self, address: str) -> Declaration:
+    def declare_to_neighbors(self, address: str) -> NeighborDeclaration:
         """Raise a token in this process."""
         tokens = self.network.tokens.setdefault(address, [])
 
@@ -162,7 +170,7 @@ class Neighbor(Declaring):
             if not tokens:
                 self._tell_watchers(address, alive=False)
 
-        token = Declaration(self, fall)
+        token = NeighborDeclaration(self, fall)
         tokens.append(token)
         if len(tokens) == 1:
             self._tell_watchers(address, alive=True)
@@ -263,7 +271,7 @@ class LocalBus(Neighbor):
         """Return whether a component hears this conversation of its own address."""
         return self.is_overheard_by_neighbors(conversation)
 
-    def declare_alive(self, address: str) -> Declaration:
+    def declare_alive(self, address: str) -> NeighborDeclaration:
         """Raise a liveliness token; see ``Bus.declare_alive``."""
         self.require_open()
         _check(self.mission, address)
@@ -275,10 +283,10 @@ class LocalBus(Neighbor):
         _check(self.mission, address)
         return self.watch_neighbors(address, listener)
 
-    def watch_link(self, listener: LinkListener) -> Declaration:
+    def watch_link(self, listener: LinkListener) -> NeighborDeclaration:
         """Report the link, which is always up inside one process."""
         self.require_open()
-        watching = Declaration(self, lambda: None)
+        watching = NeighborDeclaration(self, lambda: None)
 
         def hand_over() -> None:
             if not watching.closed:

@@ -21,10 +21,10 @@ class Declaring(BusBase):
         declared: Those that stand.
     """
 
-    declared: list[Declaration]
+    declared: list[NeighborDeclaration]
 
 
-class Declaration:
+class NeighborDeclaration:
     """A declaration of one bus.
 
     Args:
@@ -43,7 +43,7 @@ class Declaration:
             self._take_back()
 
 
-class Serving(Declaration):
+class Serving(NeighborDeclaration):
     """A declaration that answers at an address."""
 
     def __init__(self, owner: Declaring, take_back: TakeBack, accepts: Accepts, answer: Answer) -> None:
@@ -51,7 +51,7 @@ class Serving(Declaration):
         self.kinds, self.answer = kinds_of(accepts), answer
 
 
-class Listening(Declaration):
+class Listening(NeighborDeclaration):
     """A declaration that subscribes to a conversation."""
 
     def __init__(
@@ -95,7 +95,7 @@ class Listening(Declaration):
             self.owner.unreadable += 1
 
 
-class Overheard(Declaration):
+class Overheard(NeighborDeclaration):
     """A declaration that subscribes to a conversation of one component or of all, as bytes."""
 
     def __init__(
@@ -134,7 +134,7 @@ class Overheard(Declaration):
             self.owner.call("", self._listener, name, raw)
 
 
-class Watching(Declaration):
+class Watching(NeighborDeclaration):
     """A declaration that watches tokens."""
 
     def __init__(self, owner: Declaring, take_back: TakeBack, pattern: str, listener: LifeListener) -> None:

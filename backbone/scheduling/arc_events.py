@@ -19,7 +19,7 @@ import msgspec
 
 from backbone.scheduling.alternatives import can_be_planned
 from backbone.scheduling.damping import Damping
-from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry, Decision
+from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry, OpenDecision
 from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.packet_times import PacketTimes
@@ -44,7 +44,7 @@ class ArcEvents:
 
     def __init__(
         self,
-        decision: Decision,
+        decision: OpenDecision,
         transitions: Transitions,
         schedule: MasterSchedule,
         tree: PriorityTree,

@@ -9,13 +9,13 @@ import math
 from dataclasses import replace
 
 from backbone.scheduling.arc_events import ArcEvents
-from backbone.scheduling.entries import Decision
+from backbone.scheduling.entries import OpenDecision
 from backbone.scheduling.events import RevokeArc, WakeAt
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.priority import rank
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.rules import SchedulingRules
-from backbone.scheduling.slice_ends import SliceEnds
+from backbone.scheduling.slice_ends import SliceExpiry
 from backbone.scheduling.transitions import Transitions
 
 
@@ -28,11 +28,11 @@ class Closing:
 
     def __init__(
         self,
-        decision: Decision,
+        decision: OpenDecision,
         transitions: Transitions,
         schedule: MasterSchedule,
         arcs: ArcEvents,
-        ends: SliceEnds,
+        ends: SliceExpiry,
         priorities: PriorityEvents,
         rules: SchedulingRules,
     ) -> None:

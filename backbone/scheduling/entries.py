@@ -23,7 +23,7 @@ CONNECTED = frozenset({RequestState.CONNECTING, RequestState.RUNNING})
 
 
 @dataclass(slots=True)
-class Decision:
+class OpenDecision:
     """The decision that is being made.
 
     Attributes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from backbone.scheduling.entries import Decision
+from backbone.scheduling.entries import OpenDecision
 from backbone.scheduling.events import RenewLeases
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.preemption import overloading
@@ -22,7 +22,7 @@ class PriorityEvents:
 
     def __init__(
         self,
-        decision: Decision,
+        decision: OpenDecision,
         transitions: Transitions,
         schedule: MasterSchedule,
         tree: PriorityTree,

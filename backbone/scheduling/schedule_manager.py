@@ -14,7 +14,7 @@ from typing import assert_never
 from backbone.scheduling.alternatives import choose
 from backbone.scheduling.arc_events import ArcEvents
 from backbone.scheduling.closing import Closing
-from backbone.scheduling.entries import CONNECTED, Decision
+from backbone.scheduling.entries import CONNECTED, OpenDecision
 from backbone.scheduling.events import (
     Adopted,
     CapacityChanged,
@@ -47,7 +47,7 @@ from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
 from backbone.scheduling.requests import Lease, NotMovable, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
-from backbone.scheduling.slice_ends import SliceEnds
+from backbone.scheduling.slice_ends import SliceExpiry
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.switch import Switching
 from backbone.scheduling.trace_writer import TraceWriter
@@ -97,9 +97,9 @@ class ScheduleManager:
             planner=planner,
         )
         self.tree = PriorityTree(mission, mission_priority)
-        decision, schedule = Decision(), self.master_schedule
+        decision, schedule = OpenDecision(), self.master_schedule
         self._decision = decision
-        self._ends = ends = SliceEnds(self._state)
+        self._ends = ends = SliceExpiry(self._state)
         self._trace = TraceWriter(decision, goes_on=goes_on)
         self._transitions = Transitions(decision, schedule, ends, self._trace, rules, tolerance_s=tolerance_s)
         self._priorities = PriorityEvents(decision, self._transitions, schedule, self.tree, rules)

@@ -12,7 +12,7 @@ from backbone.scheduling.requests import RequestState
 from backbone.scheduling.state import ScheduleState
 
 
-class SliceEnds:
+class SliceExpiry:
     """The ends of the slices of running ARCs, first end first."""
 
     def __init__(self, state: ScheduleState) -> None:

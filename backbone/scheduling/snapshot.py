@@ -21,7 +21,7 @@ from backbone.scheduling.arc_events import ArcEvents
 from backbone.scheduling.closing import Closing
 from backbone.scheduling.compatibility import Compatibility
 from backbone.scheduling.damping import Damping
-from backbone.scheduling.entries import Afterwards, ArcEntry, Decision, RcEntry
+from backbone.scheduling.entries import Afterwards, ArcEntry, OpenDecision, RcEntry
 from backbone.scheduling.events import Requested
 from backbone.scheduling.fairness import EqualTime, Turns
 from backbone.scheduling.first_in_line import FirstInLine
@@ -34,7 +34,7 @@ from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
-from backbone.scheduling.slice_ends import SliceEnds
+from backbone.scheduling.slice_ends import SliceExpiry
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.streams import Stream
 from backbone.scheduling.switch import Switching
@@ -59,7 +59,19 @@ _OBJECTS: dict[str, type[Any]] = {
             Transitions,
         ),
         *(TraceWriter, PriorityTree, PriorityEvents, ArcEvents, RcEvents, Damping, PacketTimes, Compatibility),
-        *(Transitions, Switching, Closing, SliceEnds, Turns, EqualTime, Groups, Group, Decision, ArcEntry, RcEntry),
+        *(
+            Transitions,
+            Switching,
+            Closing,
+            SliceExpiry,
+            Turns,
+            EqualTime,
+            Groups,
+            Group,
+            OpenDecision,
+            ArcEntry,
+            RcEntry,
+        ),
     )
 }
 _VALUES: dict[str, type[Any]] = {
@@ -74,7 +86,7 @@ _CACHES = {
     "WholeGroupPlanner": {"_plans"},
     "Compatibility": {"_usable", "_admitted"},
     "TraceWriter": {"_story"},
-    "Decision": {"instructions", "ended"},
+    "OpenDecision": {"instructions", "ended"},
 }
 """Class → attributes that begin empty: what is computed again, and what only people read."""
 _CONTAINERS: dict[str, type[Any]] = {kind.__name__: kind for kind in (list, dict, set, deque)}

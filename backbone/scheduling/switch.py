@@ -8,7 +8,7 @@ Rules of this file (numbers as in docs and ``why``):
 
 from __future__ import annotations
 
-from backbone.scheduling.entries import CONNECTED, ArcEntry, Decision
+from backbone.scheduling.entries import CONNECTED, ArcEntry, OpenDecision
 from backbone.scheduling.events import ConnectArc, RenewLeases
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.planner import Turn, in_order_of_revocation
@@ -20,7 +20,7 @@ from backbone.scheduling.transitions import Transitions
 class Switching:
     """Carries turns out: instructions to the loop, and the states of the ARCs."""
 
-    def __init__(self, decision: Decision, transitions: Transitions, schedule: MasterSchedule) -> None:
+    def __init__(self, decision: OpenDecision, transitions: Transitions, schedule: MasterSchedule) -> None:
         self._decision = decision
         self._transitions = transitions
         self._schedule = schedule

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Iterable
 
-from backbone.scheduling.entries import ArcEntry, Decision, RcEntry
+from backbone.scheduling.entries import ArcEntry, OpenDecision, RcEntry
 from backbone.scheduling.events import Record
 from backbone.scheduling.priority import CONSOLE, Path
 from backbone.scheduling.priority_tree import carried
@@ -22,7 +22,7 @@ STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a
 class TraceWriter:
     """Adds each line to the decision's instructions, and keeps the last ones."""
 
-    def __init__(self, decision: Decision, *, goes_on: bool = False) -> None:
+    def __init__(self, decision: OpenDecision, *, goes_on: bool = False) -> None:
         """Begin with nothing introduced.
 
         Args:

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backbone.scheduling.entries import Afterwards, ArcEntry, Decision
+from backbone.scheduling.entries import Afterwards, ArcEntry, OpenDecision
 from backbone.scheduling.events import Record, RevokeArc
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.rules import SchedulingRules
-from backbone.scheduling.slice_ends import SliceEnds
+from backbone.scheduling.slice_ends import SliceExpiry
 from backbone.scheduling.trace import VERSION
 from backbone.scheduling.trace_writer import TraceWriter
 
@@ -48,9 +48,9 @@ class Transitions:
 
     def __init__(
         self,
-        decision: Decision,
+        decision: OpenDecision,
         schedule: MasterSchedule,
-        ends: SliceEnds,
+        ends: SliceExpiry,
         trace: TraceWriter,
         rules: SchedulingRules,
         *,

@@ -18,7 +18,7 @@ from contextvars import Context
 
 from backbone.bus.interface import Clock, LinkListener
 from backbone.bus.local_bus import Answered, LocalBus, LocalNetwork
-from backbone.bus.neighbor_declarations import Declaration, Listening, Watching
+from backbone.bus.neighbor_declarations import Listening, NeighborDeclaration, Watching
 from backbone.errors import NoResponder
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.simulated_processes import SimulatedProcess, current_process
@@ -135,7 +135,7 @@ class LinkedBus(LocalBus):
         super().__init__(network, source, clock)
         self.link = link
 
-    def declare_to_neighbors(self, address: str) -> Declaration:
+    def declare_to_neighbors(self, address: str) -> NeighborDeclaration:
         """Raise a token; behind a cut link another token of this address may stand."""
         tokens = self.network.tokens.setdefault(address, [])
         self.link.shown[address] = None
@@ -144,12 +144,12 @@ class LinkedBus(LocalBus):
             tokens.remove(token)
             self._tell_watchers(address, alive=False)
 
-        token = Declaration(self, fall)
+        token = NeighborDeclaration(self, fall)
         tokens.append(token)
         self._tell_watchers(address, alive=True)
         return token
 
-    def watch_link(self, listener: LinkListener) -> Declaration:
+    def watch_link(self, listener: LinkListener) -> NeighborDeclaration:
         """Report the process's link; see ``Bus.watch_link``."""
         self.require_open()
 
@@ -157,7 +157,7 @@ class LinkedBus(LocalBus):
             if not watching.closed:
                 self.call("", listener, up)
 
-        watching = Declaration(self, lambda: self.link.listeners.remove(hand_over))
+        watching = NeighborDeclaration(self, lambda: self.link.listeners.remove(hand_over))
         self.link.listeners.append(hand_over)
         asyncio.get_running_loop().call_soon(hand_over, self.link.is_up)
         return watching
@@ -369,11 +369,11 @@ class LinkedNetwork(LocalNetwork):
         elif not link.process.is_dead:
             tell()
 
-    def _link_of(self, declared: Declaration) -> Link | None:
+    def _link_of(self, declared: NeighborDeclaration) -> Link | None:
         return self.links.get(_bus(declared).link.process)
 
 
-def _bus(declared: Declaration) -> LinkedBus:
+def _bus(declared: NeighborDeclaration) -> LinkedBus:
     bus = declared.owner
     assert isinstance(bus, LinkedBus)  # noqa: S101  ``join`` returns no other class
     return bus
