@@ -17,6 +17,11 @@ EXAMPLES = sorted((PROJECT / "docs" / "examples").glob("*.xml"))
 MISSIONS = [path for path in (PROJECT / "mission.xml", *EXAMPLES) if "<world" in path.read_text()]
 
 
+@pytest.fixture(autouse=True)
+def _classes_beside_a_mission_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(PROJECT / "docs" / "examples")
+
+
 def world_of(mission: Path) -> World:
     [component] = read_mission(mission).components
     return World(msgspec.convert(component.parameters["world"], WorldDescription))
