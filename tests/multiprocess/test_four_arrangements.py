@@ -87,7 +87,7 @@ def only_modules(text: str) -> str:
 
 def reliable(text: str) -> str:
     """Return a mission whose modules' values are never dropped, as repeated ones are where a queue is full."""
-    rows = "".join(f'<quality key="{key}" reliable="true"/>' for key in ("picture", *KEYS))
+    rows = "".join(f'<quality key="{key}" reliable="true"/>' for key in KEYS)
     return text.replace("<modules>", f"<modules>{rows}")
 
 
