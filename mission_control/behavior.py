@@ -19,10 +19,10 @@ from typing import Any, ClassVar, Generic, Self, TypeVar
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.class_path import load_class
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
-from backbone.component.process import load_class
 from backbone.debug_views import ListViews, LookAt
 from backbone.exchange import SwapClass
 from backbone.launcher.messages import BranchTaken, TakeBranch

@@ -24,7 +24,7 @@ from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.command_line.comparing import print_comparison
 from backbone.command_line.message_lines import message_line
 from backbone.command_line.recording_work import opened
-from backbone.component.process import load_class
+from backbone.component.class_path import load_class
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.preconditions import refuse_if_up
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal

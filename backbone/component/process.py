@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import faulthandler
-import importlib
 import logging
 import re
 import signal
@@ -15,7 +14,8 @@ import uvloop
 from backbone.bus import zenoh_threads
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
-from backbone.component.component import AnyComponent, Component
+from backbone.component.class_path import load_class
+from backbone.component.component import AnyComponent
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
@@ -25,29 +25,6 @@ from backbone.waiting import end_tasks
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
 _REFUSED = "%s ended, refused [%s]: %s (remedy: %s)"
 _REFUSED_LINE = re.compile(r" (\S+) ended, refused \[([^]]+)\]: (.*) \(remedy: (.*)\)$")
-
-
-class WrongClassPath(Refusal):
-    """The class path names no component class."""
-
-    code = "component.class"
-    remedy = "Write the class as package.module:Class, importable on the component's host."
-
-
-def load_class(class_path: str) -> type[AnyComponent]:
-    """Return the component class at ``package.module:Class``.
-
-    Raises:
-        WrongClassPath: No component class has this path.
-    """
-    module_name, _, class_name = class_path.partition(":")
-    try:
-        found = getattr(importlib.import_module(module_name), class_name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise WrongClassPath(f"{class_path}: {error}", class_path=class_path) from error
-    if not (isinstance(found, type) and issubclass(found, Component)):
-        raise WrongClassPath(f"{class_path} is no Component", class_path=class_path)
-    return found
 
 
 def run_process(launch: Launch) -> int:

@@ -20,6 +20,7 @@ from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.shared_bus import SharedSession
+from backbone.component.class_path import load_class
 from backbone.component.component import AnyComponent, Component
 from backbone.component.launch import Launch
 from backbone.component.membership import (
@@ -37,7 +38,7 @@ from backbone.component.membership import (
     ProcessQuestion,
     process_address,
 )
-from backbone.component.process import exit_code_of, load_class, run_to_end, run_with_heartbeat
+from backbone.component.process import exit_code_of, run_to_end, run_with_heartbeat
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message, UnknownMessage
 

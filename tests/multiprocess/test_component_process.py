@@ -18,9 +18,10 @@ from plain_component import Stumble
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
+from backbone.component.class_path import WrongClassPath, load_class
 from backbone.component.launch import Launch
 from backbone.component.messages import AskState, ComponentState, LifeState, Stop, Stopping
-from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED, WrongClassPath, load_class
+from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
 from backbone.naming import Subsystem

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from backbone.component.process import load_class
+from backbone.component.class_path import load_class
 from backbone.mission.model import MissionDescription
 from scout_model.description import WorldDescription
 

@@ -13,8 +13,8 @@ import msgspec
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, Clock
+from backbone.component.class_path import load_class
 from backbone.component.launch import Launch
-from backbone.component.process import load_class
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem

@@ -14,10 +14,11 @@ from contextvars import ContextVar
 
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus, Clock
+from backbone.component.class_path import load_class
 from backbone.component.component import AnyComponent
 from backbone.component.heartbeat import Vitals
 from backbone.component.launch import Launch
-from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED, load_class
+from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED
 from backbone.component.shared_process import SharedProcess
 from backbone.creator.service import Creator
 from backbone.errors import BackboneError, HubUnreachable, Refusal

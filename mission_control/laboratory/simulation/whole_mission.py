@@ -21,10 +21,10 @@ from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.component.class_path import load_class
 from backbone.component.component import AnyComponent, Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, Statistics
-from backbone.component.process import load_class
 from backbone.component_database.messages import ComponentType, UnknownType
 from backbone.component_database.service import ComponentDatabase
 from backbone.dependency_database.service import DependencyDatabase

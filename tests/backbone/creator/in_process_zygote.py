@@ -11,10 +11,11 @@ import msgspec
 
 from backbone.bus.clock import VirtualClock
 from backbone.bus.local_bus import LocalNetwork
+from backbone.component.class_path import load_class
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Stop
-from backbone.component.process import EXIT_BUG, EXIT_REFUSED, load_class
+from backbone.component.process import EXIT_BUG, EXIT_REFUSED
 from backbone.component.shared_process import SharedProcess
 from backbone.creator.zygote import NoProcess
 from backbone.errors import Refusal

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from recorded_missions import CLASSES, record_mission
 
-from backbone.component.process import load_class
+from backbone.component.class_path import load_class
 from backbone.mission.reader import read_mission
 from backbone.recording.comparison import KeyComparison, compared
 from backbone.recording.reader import Recording

@@ -13,7 +13,7 @@ from behaviors_at_work import example
 from recorded_missions import CLASSES, record_mission
 
 from backbone.command_line.replaying import run_without
-from backbone.component.process import load_class
+from backbone.component.class_path import load_class
 from backbone.launcher.endings import ExitCode
 from backbone.recording.comparison import compared
 from backbone.recording.reader import Recorded, Recording

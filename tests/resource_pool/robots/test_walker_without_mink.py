@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from backbone.component.process import load_class
+from backbone.component.class_path import load_class
 from backbone.mission.class_probe import facts_of
 from resource_pool.robots.walker.extra import NoMink
 

@@ -1,0 +1,31 @@
+"""Class paths: the class of a component at ``package.module:Class``."""
+
+from __future__ import annotations
+
+import importlib
+
+from backbone.component.component import AnyComponent, Component
+from backbone.errors import Refusal
+
+
+class WrongClassPath(Refusal):
+    """The class path names no component class."""
+
+    code = "component.class"
+    remedy = "Write the class as package.module:Class, importable on the component's host."
+
+
+def load_class(class_path: str) -> type[AnyComponent]:
+    """Return the component class at ``package.module:Class``.
+
+    Raises:
+        WrongClassPath: No component class has this path.
+    """
+    module_name, _, class_name = class_path.partition(":")
+    try:
+        found = getattr(importlib.import_module(module_name), class_name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise WrongClassPath(f"{class_path}: {error}", class_path=class_path) from error
+    if not (isinstance(found, type) and issubclass(found, Component)):
+        raise WrongClassPath(f"{class_path} is no Component", class_path=class_path)
+    return found
