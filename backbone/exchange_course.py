@@ -6,7 +6,7 @@ Modules, behaviors and drivers are exchanged by the same rules:
   work, and the old one is kept. Afterwards one of the two is there alone.
 * Whatever fails in the new part ends the exchange in favor of the old one. What the old one does wrong is a bug as
   without an exchange.
-* Each phase has an end, whatever happens.
+* Each phase has an end at a time.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class ExchangeCourse:
 
     @property
     def due_s(self) -> float:
-        """Time at which the present phase is over, whatever happens."""
+        """Time at which the present phase is over at the latest."""
         if self.switched_s is None:
             return self.began_s + self._rules.ready_within_s
         return self.switched_s + self._rules.prove_s

@@ -8,7 +8,7 @@ Rules of this file:
   name, path, ARC and epochs stay those of the component.
 * The new one takes charge when no command of the old one is under way. The old one hands over the attributes that both
   classes name in ``hands_over``.
-* Whatever fails in the new one gives the charge back at once; then it ends as if it were killed.
+* Any failure of the new one gives the charge back at once; then it ends as if it were killed.
 """
 
 from __future__ import annotations

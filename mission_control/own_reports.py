@@ -66,7 +66,7 @@ class OwnReports:
 
     @property
     def has_reader(self) -> bool:
-        """True: somebody gets the reports."""
+        """True: a parent or a console gets the reports."""
         return self.keeper is not None or self._parent is not None
 
     def send(self) -> None:

@@ -4,7 +4,7 @@ The recorder listens in the mission's folder on its host, which only the mission
 counted rather than waited for. Each copy is a header, its key and the bytes of its envelope.
 
 The recorder of the mission has another socket than the recorder of one of its other hosts: a process whose copies go to
-the first needs to tell nobody else, see ``zenoh_far_copies``.
+the first needs no further copy, see ``zenoh_far_copies``.
 """
 
 from __future__ import annotations

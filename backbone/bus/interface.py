@@ -175,10 +175,10 @@ class Bus(Protocol):
         *,
         lossless: bool = False,
     ) -> Overhearing:
-        """Call ``listener(key, bytes)``, in the event loop, with each publication of a conversation, whoever sends it.
+        """Call ``listener(key, bytes)``, in the event loop, with each publication of a conversation, by any sender.
 
         The bytes are not read, so messages of unknown classes and malformed ones come too. Of conversations that are
-        ``NEVER_DROPPED``, and of questions, overhear the copies in ``Conversation.TOLD``: then nobody waits for this
+        ``NEVER_DROPPED``, and of questions, overhear the copies in ``Conversation.TOLD``: then no sender waits for this
         process, even if it hangs.
 
         Args:

@@ -88,7 +88,7 @@ class Outlet:
         Of values that come repeatedly and have no listener, not even the bytes are made: the next one follows soon.
 
         Raises:
-            OversizedMessage: The message is longer than its quality admits; nobody gets it.
+            OversizedMessage: The message is longer than its quality admits; no listener gets it.
         """
         if self.board is not None:
             self._send_large(self.board, envelope, apart, now_s)

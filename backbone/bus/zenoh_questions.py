@@ -32,7 +32,7 @@ from backbone.keys import ROOT, Conversation
 from backbone.quality import QUALITY
 from backbone.waiting import settle
 
-MOST_WAYS = 64  # chosen: each way is a declaration at the hub; whoever is asked beyond them is asked by queries
+MOST_WAYS = 64  # chosen: each way is a declaration at the hub; components beyond them are asked by queries
 STILL_COME_S = (
     0.1  # measured: one in a hundred reports of an owner's end overtakes the owner's last answer, by milliseconds
 )
@@ -234,7 +234,7 @@ class Query:
         self._query.reply_err(payload)
 
     def drop(self) -> None:
-        """End the query; without an answer the asker is told that there is none."""
+        """End the query; without an answer the asker gets ``NoResponder``."""
         self._query.drop()  # type: ignore[no-untyped-call]
 
 

@@ -1,6 +1,6 @@
 """KeptComponents: the components of a process keeper, and who waits for their starts and ends.
 
-Rule of this file: whoever waits gets an outcome, or waits on because the component is started again.
+Rule of this file: each waiting caller gets an outcome, or waits on because the component is started again.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class KeptComponents(dict[str, Kept]):
         return start_failed(name, how, self.launch_of(name))
 
     def failure(self, name: str) -> StartFailed | None:
-        """Return why a component that nobody waited for did not start."""
+        """Return why a component did not start whose start no caller awaited."""
         return self._failures.get(name)
 
 

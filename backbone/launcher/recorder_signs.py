@@ -18,7 +18,7 @@ MOST_LATE = 2  # chosen: a watcher that stood still itself finds one line late, 
 
 
 class RecorderSigns:
-    """Gives them. Never blocks, and does nothing when nobody reads them any more."""
+    """Gives them. Never blocks, and does nothing when no process reads them any more."""
 
     def __init__(self) -> None:
         self._number, self._next_s = sys.stdout.fileno(), 0.0

@@ -23,7 +23,7 @@ from backbone.creator.messages import Spawn
 
 MOST_PACKS = 64  # chosen: more than any host's processors here; beyond, components may as well have their own processes
 MEMBERS_MOST = 64  # chosen: twice what the missions here have; a hang or a kill of the process ends no more
-_PREFIX = "packed--"  # chosen: legal, and nobody would write it
+_PREFIX = "packed--"  # chosen: legal, and unlike any name in a mission file
 _LONGEST = 56  # chosen: the longest legal name less the number of a part
 WANTS_PACK = f"{_PREFIX}0"
 """Process of a packed component that has no host yet."""

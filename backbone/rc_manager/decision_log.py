@@ -1,6 +1,6 @@
 """Decision log: tells what the schedule manager decides on, and what it decides.
 
-Each line goes to the trace file, into the shares of time, into the RC manager's story, and to whoever listens. For
+Each line goes to the trace file, into the shares of time, into the RC manager's story, and to listeners. For
 recorders each event is published before its decision: from a snapshot and the events after it a replay decides again.
 """
 

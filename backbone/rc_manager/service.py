@@ -180,7 +180,7 @@ class RcManager(Component[RcManagerParameters]):
             loops.create_task(self._hardware.keep_comparing())
 
     def parameters_changed(self) -> None:
-        """Refuse: whoever waits was promised a place by the rules as they are.
+        """Refuse: a waiting ARC has a place by the rules as they are.
 
         Raises:
             FixedRules: Always.
@@ -250,7 +250,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _tell_paths(self, node: str) -> None:
         """Tell the ARCs at and below the node by which path they ask now: a later RC manager must hear of it."""
-        with contextlib.suppress(UnknownRequest):  # nobody asks there yet
+        with contextlib.suppress(UnknownRequest):  # it has no request yet
             for one in self.answers.attributes(node).requests:
                 self.start_task(self._tell_path(one.arc, one.path), f"path of {one.arc}")
 
@@ -297,7 +297,7 @@ class RcManager(Component[RcManagerParameters]):
                 assert_never(instruction)
 
     def _switch(self, arc: str, work: Callable[[], Coroutine[object, None, None]]) -> None:
-        """Run the work after whatever is still under way for this ARC was ended."""
+        """Run the work after the work that is still under way for this ARC was ended."""
         before = self._switches.get(arc)
 
         async def in_turn() -> None:

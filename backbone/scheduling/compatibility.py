@@ -35,7 +35,7 @@ class Compatibility:
         Args:
             users: RC → the active ARCs that use it.
             admission: Test of the demand that a sharable RC can serve.
-            roomy: RC → known answer of ``has_room_for_all``; whoever changes ``users`` drops it.
+            roomy: RC → known answer of ``has_room_for_all``; a change of ``users`` drops it.
         """
         self._rcs = rcs
         self._users = users

@@ -1,6 +1,6 @@
 """Slice ends: when the slices end for whose end an ARC waits (rule 5).
 
-Rule of this file: a slice ends only if an ARC waits for one of its RCs. Otherwise nobody needs to look.
+Rule of this file: a slice ends only if an ARC waits for one of its RCs. Otherwise its end is not watched.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Run modules without a mission, each in a process of its own: connected by name and type over a hub of their own.
 
 The same modules that ``run`` runs in one process. The processes are forked from the script, so the script's own classes
-are there in each of them; they end with the script, whatever ends it.
+are there in each of them; they end with the script, also if it is killed.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class UnitThread:
         produced: Called in the event loop with the time of each round and what its modules produced.
 
     Attributes:
-        lost: Rounds whose outputs nobody got, because too many waited for the event loop.
+        lost: Rounds whose outputs were dropped, because too many waited for the event loop.
     """
 
     def __init__(self, unit: ExecutionUnit, clock: Clock, produced: Callable[[float, list[Produced]], None]) -> None:
@@ -95,7 +95,7 @@ class UnitThread:
         self._virtual_news.set()
 
     async def keep(self) -> None:
-        """Have all rounds, until cancelled; the round that then runs ends by itself, and nobody gets its outputs."""
+        """Have all rounds, until cancelled; the round that then runs ends by itself, and its outputs are dropped."""
         try:
             if self._pool is None:
                 await self._live_virtually()
