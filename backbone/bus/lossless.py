@@ -2,7 +2,8 @@
 
 A sender numbers the messages of each stream, keeps them until the listener acknowledges them, and has few of them under
 way at a time. So the messages are dropped where a queue is full, as all repeated ones are, and are sent again. A
-sender never waits for a listener that hangs. What it does not take in time waits at the sender, up to a number of bytes.
+sender never waits for a listener that hangs: what the listener does not take in time waits at the sender, up to a
+number of bytes.
 """
 
 from __future__ import annotations
