@@ -117,6 +117,10 @@ class GatedBus:
         if self.is_open:
             self.bus.publish(address, conversation, message)
 
+    def declare_publisher(self, address: str, conversation: Conversation) -> None:
+        """Declare the publisher of a key; see ``Bus.declare_publisher``."""
+        self.bus.declare_publisher(address, conversation)
+
     def declare_quality(self, address: str, conversation: Conversation, quality: Quality) -> None:
         """Send the messages of a key in another quality; see ``Bus.declare_quality``."""
         self.bus.declare_quality(address, conversation, quality)

@@ -116,6 +116,9 @@ class Bus(Protocol):
     def declare_quality(self, address: str, conversation: Conversation, quality: Quality) -> None:
         """Send the messages of this key in another quality than its conversation's; before the first of them."""
 
+    def declare_publisher(self, address: str, conversation: Conversation) -> None:
+        """Declare at once what the first message of this key declares: that takes milliseconds. For some dozens."""
+
     def dropped(self) -> dict[str, int]:
         """Return the number of messages that came for listeners of this bus and were not handed to them.
 

@@ -233,6 +233,9 @@ class LocalBus(Neighbor):
         if conversation in NEVER_DROPPED:
             self.tell(address, conversation, envelope)
 
+    def declare_publisher(self, address: str, conversation: Conversation) -> None:
+        """Do nothing: inside one process nothing is declared; see ``Bus.declare_publisher``."""
+
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender; see ``Bus.pass_on``."""
         if not self.closed:

@@ -247,6 +247,11 @@ class ZenohBus(InboxBus):
                 stream.send(outlet.key, raw)
             send_copies(copiers(self.copies, self.far, conversation), outlet.key, raw)
 
+    def declare_publisher(self, address: str, conversation: Conversation) -> None:
+        """Declare the publisher of a key; see ``Bus.declare_publisher``."""
+        if not self._outlets.is_full:
+            self._outlet(address, conversation)
+
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether another process hears this conversation of its own address; 0.5 µs."""
         if self.lossless.to(self.source, conversation):

@@ -170,6 +170,11 @@ class Outlets:
         self._outlets.move_to_end((address, conversation))
         return outlet
 
+    @property
+    def is_full(self) -> bool:
+        """Whether one more takes the place of another."""
+        return len(self._outlets) >= MOST_PUBLISHERS
+
     def close(self) -> None:
         """Withdraw all."""
         for outlet in self._outlets.values():

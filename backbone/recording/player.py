@@ -6,6 +6,7 @@ gave; tokens of liveliness rise and fall. Nothing can be commanded.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial, reduce
 from operator import or_
@@ -16,13 +17,14 @@ from backbone.keys import COPIED, Conversation, address_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
 from backbone.recording.checkpoints import Checkpoints
 from backbone.recording.hearing import is_meant
+from backbone.recording.presence import Presence
 from backbone.recording.read_ahead import ReadAhead, Ready
 from backbone.recording.reader import Recorded, Recording
 from backbone.recording.recorded_mission import RecordedMission
 from backbone.recording.revival import message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message
 
-SERVE_GAP_S = 0.005  # chosen: a component is served in a millisecond or two; seconds of the machine
+TAKE_GAP_S = 0.005  # measured: the first message of a class takes so long, others a tenth; seconds of the machine
 _PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, *COPIED}
 
 
@@ -59,8 +61,8 @@ class Player:
         self._ahead = ReadAhead(recording, classes, since_s)
         self._accepts = reduce(or_, classes.values())
         self._tokens: dict[str, Subscription] = {}
-        self._served: dict[str, Subscription] = {}
-        self._to_serve: dict[str, None] = {}
+        self._known_keys: list[str] = []
+        self._untaken: deque[Ready] = deque()  # played, and taken by the mission in a gap, or before it answers
         self.ends: Callable[[], None] = lambda: None
         """Called when a person orders the mission to end."""
         self.rests: Callable[[float], None] = lambda _gap_s: None
@@ -76,12 +78,18 @@ class Player:
         """
         self._mission = self._checkpoints.mission_at(self._recording, self._since_s)
         self._mission.rate = self._clock.rate
+        self._known_keys = [one.key for one in self._recording.contents().counts if one.key]
         self._ahead.fill()
 
     def begin(self) -> None:
-        """Answer questions, and say what a newcomer must know. When: after ``catch_up``."""
-        for address in dict.fromkeys((NAMESERVER, LAUNCHER, *self._mission.speakers)):
-            self._serve(address)
+        """Answer questions, and say what a newcomer must know. When: after ``catch_up``.
+
+        Whatever takes milliseconds is declared here, because later a message may be due.
+        """
+        for address in dict.fromkeys((NAMESERVER, LAUNCHER, *map(address_of, self._known_keys))):
+            self._bus.serve(address, self._accepts, partial(self._answer, address))
+        for key in filter(self._is_published, dict.fromkeys(self._known_keys)):
+            self._bus.declare_publisher(address_of(key), Conversation(key.rpartition("/")[2]))
         for address in self._mission.present:
             self._tokens[address] = self._bus.declare_alive(address)
         self._bus.watch_alive("*/*", lambda address, alive: None if alive else self._mission.gone(address))
@@ -89,6 +97,7 @@ class Player:
 
     def say_again(self) -> None:
         """Publish the newest message of each key that tells a state."""
+        self._take_all()
         for message in self._mission.newest():
             said = message_as_sent(self._classes, message)
             if said is not None:
@@ -104,7 +113,7 @@ class Player:
             await self._wait_until_due(following.message)
             self._ahead.pop()
             self._play(following)
-        self._serve_all()
+        self._take_all()
 
     async def _wait_until_due(self, message: Recorded) -> None:
         clock, now_s = self._clock, self._clock.now_s()
@@ -113,57 +122,52 @@ class Player:
             self._ahead.took((clock.now_s() - now_s) / clock.rate)
             await clock.sleep_s(0.0)
             now_s = clock.now_s()
-        while self._to_serve and message.at_s - now_s > SERVE_GAP_S * clock.rate:
-            self._serve(next(iter(self._to_serve)))
+        while self._untaken and message.at_s - now_s > TAKE_GAP_S * clock.rate:
+            self._take_one()
             now_s = clock.now_s()
         self.rests((message.at_s - now_s) / clock.rate)
         if self._next_step is None:
             await clock.sleep_until_s(message.at_s)
-        elif self._is_published(message):
-            self._serve_all()
+        elif self._is_published(message.key):
+            self._take_all()
             await self._next_step(message)
 
     def _play(self, following: Ready) -> None:
         message, said = following.message, following.said
-        address = address_of(message.key)
-        if said is not None and self._is_published(message):
+        if said is not None and self._is_published(message.key):
             self._publish(message, said)
             self.played += 1
-        self._mission.take_said(message, said)
-        if address not in self._served:
-            self._to_serve[address] = None  # in a gap: it starts threads, and the next message may be due
-        if message.key.endswith(f"/{Conversation.ALIVE}"):
-            self._serve(address)
-            self._token_changed(address)
+        if isinstance(said, Presence) and message.key.endswith(f"/{Conversation.ALIVE}"):
+            self._token_changed(address_of(message.key), is_up=said.alive)
+        self._untaken.append(following)
 
-    def _is_published(self, message: Recorded) -> bool:
-        is_wanted = not self._keys or is_meant(message.key, self._keys)
-        return is_wanted and message.key.rpartition("/")[2] in _PUBLISHED
+    def _is_published(self, key: str) -> bool:
+        is_wanted = not self._keys or is_meant(key, self._keys)
+        return is_wanted and key.rpartition("/")[2] in _PUBLISHED
 
     def _publish(self, message: Recorded, said: Message) -> None:
         envelope = Envelope(WIRE_VERSION, message.source, message.sequence, message.stamp_s, message.cause, said)
         self._bus.pass_on(address_of(message.key), Conversation(message.key.rpartition("/")[2]), envelope)
 
-    def _token_changed(self, address: str) -> None:
-        if address in self._mission.present and address not in self._tokens:
+    def _token_changed(self, address: str, *, is_up: bool) -> None:
+        if is_up and address not in self._tokens:
             self._tokens[address] = self._bus.declare_alive(address)
-        elif address not in self._mission.present and address in self._tokens:
+        elif not is_up and address in self._tokens:
             self._tokens.pop(address).close()
-            self._served.pop(address).close()
 
-    def _serve_all(self) -> None:
-        for address in tuple(self._to_serve):
-            self._serve(address)
+    def _take_one(self) -> None:
+        taken = self._untaken.popleft()
+        self._mission.take_said(taken.message, taken.said)
 
-    def _serve(self, address: str) -> None:
-        self._to_serve.pop(address, None)
-        if address not in self._served:
-            self._served[address] = self._bus.serve(address, self._accepts, partial(self._answer, address))
+    def _take_all(self) -> None:
+        while self._untaken:
+            self._take_one()
 
     async def _answer(self, address: str, asked: Envelope[Message]) -> Message:
         if isinstance(asked.body, EndMission) and address == LAUNCHER:
             self.ends()
             return MissionEnding("", 0.0)
+        self._take_all()
         if self._next_step is None:
             self._mission.now_s = max(self._mission.now_s, self._clock.now_s())
         return self._mission.answer(address, asked.body)

@@ -15,13 +15,16 @@ from hypothesis import strategies as st
 from mcap.stream_reader import breakup_chunk
 from small_recordings import CLASSES, SCOUT, Said, recorded
 
+from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.messages import LogLevel, StoryEvent
-from backbone.keys import Conversation
+from backbone.keys import Conversation, address_of
 from backbone.recording.player import Player
 from backbone.recording.read_ahead import GAP_S, MOST_AHEAD_BYTES, ReadAhead
-from backbone.recording.reader import NoRecording, Recording
+from backbone.recording.reader import NoRecording, Recorded, Recording
+from backbone.recording.recorded_mission import RecordedMission
+from backbone.wire import Message
 
 LARGEST = 200_000
 gaps_s = st.sampled_from([0.0, GAP_S / 8, 3 * GAP_S, 0.5])
@@ -136,29 +139,48 @@ def test_a_machine_that_is_slow_for_a_while_decodes_in_longer_gaps_only():
     assert ahead.has_time(GAP_S)
 
 
-def test_a_component_is_served_in_a_gap_and_at_the_end_at_the_latest():
-    """To serve one starts threads; the messages of one instant go before."""
+def test_what_takes_long_is_done_before_the_first_message_or_in_a_gap():
+    """A component is served, a publisher declared, a message taken; the messages of one instant go before."""
     addresses = [f"resource_pool/scout{number}" for number in range(3)]
     file = recorded(
         Said(at_s, address, Conversation.LOG, StoryEvent(at_s, address, "", "", "", LogLevel.INFO))
         for at_s, address in zip([1.0, 1.0, 3.0], addresses, strict=True)
     )
-    log: list[tuple[str, float]] = []
+    log: list[tuple[str, str, float]] = []
 
     async def play() -> None:
         clock = VirtualClock()
         bus = LocalNetwork("night").join("backbone/replay", clock)
         player = Player(bus, clock, Recording(file), CLASSES, since_s=0.0)
+        serve = bus.serve
+        bus.serve = lambda address, *how: log.append(("served", address, clock.now_s())) or serve(address, *how)
+        bus.declare_publisher = lambda address, _said: log.append(("declared", address, clock.now_s()))
+        bus.pass_on = lambda address, *_said: log.append(("said", address, clock.now_s()))
         player.catch_up()
         player.begin()
-        serve, bus.serve = bus.serve, lambda address, *how: log.append((address, clock.now_s())) or serve(address, *how)
-        bus.pass_on = lambda address, *_said: log.append(("said", clock.now_s()))
         await player.run()
         await bus.close()
 
-    run_virtual(play())
-    said = [("said", 1.0), ("said", 1.0), ("said", 3.0)]
-    assert log == [*said[:2], (addresses[0], 1.0), (addresses[1], 1.0), said[2], (addresses[2], 3.0)]
+    def take(_mission: RecordedMission, message: Recorded, _said: Message | None) -> None:
+        log.append(("taken", address_of(message.key), asyncio.get_running_loop().time()))
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(RecordedMission, "take_said", take)
+        run_virtual(play())
+    first, second, third = addresses
+    begun = len(log) - 6
+    assert log[:begun] == [
+        *(("served", address, 0.0) for address in (NAMESERVER, LAUNCHER, *addresses)),
+        *(("declared", address, 0.0) for address in addresses),
+    ]
+    assert log[begun:] == [
+        ("said", first, 1.0),
+        ("said", second, 1.0),
+        ("taken", first, 1.0),
+        ("taken", second, 1.0),
+        ("said", third, 3.0),
+        ("taken", third, 3.0),
+    ]
 
 
 def test_messages_before_a_damage_are_played():
