@@ -15,7 +15,11 @@ class TooLate:
     """No answer came in time."""
 
 
-Came = bytes | type[TooLate] | None
+class NotHere:
+    """Nobody got the question: no component has the inbox any more."""
+
+
+Came = bytes | type[TooLate] | type[NotHere] | None
 """The bytes of an answer; None: there is none, because the component is gone or a bug ended its answer."""
 
 

@@ -32,16 +32,17 @@ class Declaration:
                 self._entity.undeclare()
 
 
-class Both:
-    """Two zenoh entities that are withdrawn together."""
+class Together:
+    """Entities that are withdrawn together; None: it was not needed."""
 
-    def __init__(self, first: Any, second: Any) -> None:
-        self._first, self._second = first, second
+    def __init__(self, *entities: Any) -> None:
+        self._entities = entities
 
     def undeclare(self) -> None:
-        """Withdraw both."""
-        self._first.undeclare()
-        self._second.undeclare()
+        """Withdraw all."""
+        for entity in self._entities:
+            if entity is not None:
+                entity.undeclare()
 
 
 class FirstReply:

@@ -18,6 +18,7 @@ from typing import Any, cast
 
 from backbone.bus.host_boards import boards_for
 from backbone.bus.host_copies import copies_for
+from backbone.bus.host_lines import lines_for
 from backbone.bus.interface import (
     Answer,
     Clock,
@@ -44,7 +45,7 @@ class SharedSession:
 
     Args:
         secret: Secret of the mission; empty: the hub asks for none.
-        directory: Folder of the mission's files on this host; empty: none, and no recorder or blackboard of this host.
+        directory: Folder of the mission's files on this host; empty: none, and no socket or blackboard of this host.
 
     Raises:
         HubUnreachable: No hub listens at the endpoint.
@@ -55,22 +56,23 @@ class SharedSession:
         self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
         self._copies, self._far = copies_for(directory), cast("FarCopies | None", None)
+        self._lines = lines_for(directory)
         self._directory, self._members = directory, set[str]()
 
     def join(self, source: str, clock: Clock) -> SharedBus:
         """Return a new member's bus. Close it before the session."""
         bus = SharedBus(self._neighbors, source, clock, self._session)
         self._far = self._far or FarCopies(self._session, bus.mission, source)
-        bus.copies, bus.far, bus.members = self._copies, self._far, self._members
+        bus.copies, bus.far, bus.ways.lines, bus.members = self._copies, self._far, self._lines, self._members
         self._members.add(source)
         bus.boards = boards_for(self._directory, self._members)
         return bus
 
     async def close(self) -> None:
         """Close the session; return when its threads have ended."""
-        for copies in (self._copies, self._far):
-            if copies is not None:
-                copies.close()
+        for sockets in (self._copies, self._far, self._lines):
+            if sockets is not None:
+                sockets.close()
         await close_session(self._session)
 
 

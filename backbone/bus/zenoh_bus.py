@@ -18,11 +18,12 @@ from typing import Any, cast
 
 import zenoh
 
-from backbone.bus.answers import Came, TooLate, read_answer
+from backbone.bus.answers import Came, NotHere, TooLate, read_answer
 from backbone.bus.bus_base import quoted
-from backbone.bus.declared import Both, Declaration, FirstReply
+from backbone.bus.declared import Declaration, FirstReply, Together
 from backbone.bus.host_boards import HostBoards
-from backbone.bus.host_copies import HostCopies
+from backbone.bus.host_copies import HostCopies, copies_for
+from backbone.bus.host_lines import LineQuestion, lines_for
 from backbone.bus.inbox import (
     EachSample,
     InboxBus,
@@ -47,7 +48,7 @@ from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, 
 from backbone.bus.near_listening import NearListening
 from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
-from backbone.bus.zenoh_questions import DirectQuestion, Query, Ways, new_inbox, query
+from backbone.bus.zenoh_questions import Asked, DirectQuestion, Query, Ways, new_inbox, query
 from backbone.bus.zenoh_sessions import (
     client_config,
     close_session,
@@ -102,7 +103,7 @@ class ZenohBus(InboxBus):
     ) -> None:
         super().__init__(mission, source, clock)
         self.copies: HostCopies | None = None
-        """For the recorder of this host; settable. A bus with a session of its own closes them."""
+        """For the recorder of this host; see ``use_host``."""
         self.far = None if shared else FarCopies(session, mission, source)
         """For the recorder of the mission where it has no socket; settable. Same."""
         self.boards: HostBoards | None = None
@@ -136,6 +137,14 @@ class ZenohBus(InboxBus):
         session = await open_when_up(config)
         return cls(mission, source, clock, session, is_hub=is_hub(config))
 
+    def use_host(self, directory: str) -> None:
+        """Use the sockets between processes of this host. When: before the first question.
+
+        Args:
+            directory: Folder of the mission's files on this host; empty: none, and only the hub is used.
+        """
+        self.copies, self.ways.lines = copies_for(directory), lines_for(directory)
+
     # ------------------------------------------------------------------ questions
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""
@@ -143,20 +152,27 @@ class ZenohBus(InboxBus):
         answered = self.open_question()
         self.asked += 1
         try:
-            payload, way = write(self.envelope(question)), self.ways.way_to(address)
-            if way is not None:
+            payload, came = write(self.envelope(question)), cast("Came", NotHere)
+            if (way := self.ways.way_to(address)) is not None:
                 came = await self.ways.ask(way, payload, answered, within_s)
-            else:
-                with self.ways.querying(address):
-                    got = await query(self, self._session, asked_key, payload, answered, within_s)
-                came = self._came_of(address, got)
         finally:
             self.end_question(answered)
+        if came is NotHere:
+            came = await self._query(address, asked_key, payload, within_s)
         try:
             return read_answer(came, address, question, reply, within_s)
         except MalformedMessage:
             self.unreadable += 1
             raise
+
+    async def _query(self, address: str, asked_key: str, payload: bytes, within_s: float) -> Came:
+        answered = self.open_question()
+        try:
+            with self.ways.querying(address):
+                got = await query(self, self._session, asked_key, payload, answered, within_s)
+        finally:
+            self.end_question(answered)
+        return self._came_of(address, got)
 
     def _came_of(self, address: str, got: zenoh.Reply | None) -> Came:
         if got is None:
@@ -173,9 +189,11 @@ class ZenohBus(InboxBus):
         self.require_open()
         reader = reader_of(accepts)
         own, inbox = key(self._mission, address, Conversation.ASK), new_inbox(self._mission, address)
+        lines = self.ways.lines
+        host = lines.name if lines is not None else ""
 
         def asked(came: zenoh.Query) -> None:
-            self.start(self._answer(reader, answer, Query(came, own, inbox)))
+            self.start(self._answer(reader, answer, Query(came, own, inbox, host)))
 
         def asked_directly(sample: zenoh.Sample) -> None:
             if (question := DirectQuestion.of(self._session, self._mission, sample)) is None:
@@ -183,11 +201,15 @@ class ZenohBus(InboxBus):
             else:
                 self.start(self._answer(reader, answer, question))
 
-        direct = self._session.declare_subscriber(inbox, lambda sample: self.push(asked_directly, sample))
-        queries = self._session.declare_queryable(own, lambda came: self.push(asked, came))
-        return self._declare(Both(direct, queries))
+        def asked_on_line(question: LineQuestion) -> None:
+            self.start(self._answer(reader, answer, question))
 
-    async def _answer(self, reader: Reader[Message], answer: Answer, asked: Query | DirectQuestion) -> None:
+        direct = self._session.declare_subscriber(inbox, lambda sample: self.push(asked_directly, sample))
+        near = lines.serve(inbox, asked_on_line) if lines is not None else None
+        queries = self._session.declare_queryable(own, lambda came: self.push(asked, came))
+        return self._declare(Together(direct, near, queries))
+
+    async def _answer(self, reader: Reader[Message], answer: Answer, asked: Asked) -> None:
         try:
             question = reader.read(bytes_of(asked.payload))
             envelope = await self.reply_to(question, answer)
@@ -410,9 +432,9 @@ class ZenohBus(InboxBus):
         self.lossless.close()
         if not self._shared:
             self._outlets.close_boards()
-            for copies in (self.far, self.copies):
-                if copies is not None:
-                    copies.close()
+            for sockets in (self.far, self.copies, self.ways.lines):
+                if sockets is not None:
+                    sockets.close()
             await close_session(self._session)
             return
         self._outlets.close()

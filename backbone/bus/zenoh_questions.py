@@ -2,7 +2,8 @@
 
 A query costs a third message and an entry in the hub's table of open queries. So the answer to a query names the inbox
 of the component that gave it. From the third question on the asker publishes its questions there, and the answers are
-published to the inbox of the asker.
+published to the inbox of the asker. On one host questions and answers go by a line between the two processes instead,
+see ``host_lines``.
 
 * An inbox belongs to one life of one component. A component that begins anew has another one, and is found by a query.
 * The hub reports whether an inbox has its owner. When it loses the owner, open questions end without an answer, as
@@ -20,12 +21,14 @@ import struct
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, cast
 
 import zenoh
 
 from backbone.bus.answers import Came, TooLate
 from backbone.bus.declared import FirstReply
+from backbone.bus.host_lines import HostLines, LineQuestion, LineWay
 from backbone.bus.inbox import InboxBus
 from backbone.bus.zenoh_outlets import on_the_wire
 from backbone.keys import ROOT, Conversation
@@ -38,24 +41,62 @@ STILL_COME_S = (
 )
 _NUMBER = struct.Struct("<Q")
 _ANSWERED, _UNANSWERED = b"\1", b"\0"
+_ON_HOST = "\n"  # between the name of an inbox and that of its process's socket
 _EXPRESS = on_the_wire(QUALITY[Conversation.ASK])
 
 log = logging.getLogger(__name__)
 
 
-class DirectWay:
-    """The way to the inbox of one life of a component.
+class OpenQuestions:
+    """The questions of one bus whose answers come by publication.
 
     Args:
+        answers: Key of the inbox for answers.
+    """
+
+    def __init__(self, answers: str) -> None:
+        self.answers = answers
+        self._waiting: dict[int, asyncio.Future[Came]] = {}
+        self._number = 0
+
+    def add(self, answered: asyncio.Future[Came]) -> int:
+        """Return the number of a further question."""
+        self._number += 1
+        self._waiting[self._number] = answered
+        return self._number
+
+    def remove(self, number: int) -> None:
+        """Wait for this answer no more."""
+        del self._waiting[number]
+
+    def arrived(self, sample: zenoh.Sample) -> None:
+        """Take an answer."""
+        attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
+        if len(attached) != _NUMBER.size + 1:
+            return
+        if (answered := self._waiting.get(_NUMBER.unpack_from(attached)[0])) is not None:
+            settle(answered, sample.payload.to_bytes() if attached.endswith(_ANSWERED) else None)
+
+
+class DirectWay:
+    """The way to the inbox of one life of a component, through the hub.
+
+    Args:
+        open_questions: Of the bus, by number.
         lost: Called when the inbox has lost its owner.
     """
 
     def __init__(
-        self, bus: InboxBus, publisher: zenoh.Publisher, inbox: str, lost: Callable[[DirectWay], None]
+        self,
+        bus: InboxBus,
+        publisher: zenoh.Publisher,
+        inbox: str,
+        open_questions: OpenQuestions,
+        lost: Callable[[Way], None],
     ) -> None:
-        self.inbox, self.publisher, self._lost = inbox, publisher, lost
-        self.waiting: dict[int, asyncio.Future[Came]] = {}
-        """Number → open question."""
+        self.inbox, self._publisher, self._open, self._lost = inbox, publisher, open_questions, lost
+        self.waiting: list[asyncio.Future[Came]] = []
+        """Open questions to this inbox."""
         self.is_open = False
         """Whether the hub knows the owner of the inbox."""
 
@@ -64,16 +105,32 @@ class DirectWay:
 
         self._listener = publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
 
+    async def ask(self, payload: bytes, answered: asyncio.Future[Came]) -> Came:
+        """Return what came of a question."""
+        number = self._open.add(answered)
+        self.waiting.append(answered)
+        try:
+            self._publisher.put(payload, attachment=_NUMBER.pack(number) + self._open.answers.encode())
+            return await answered
+        finally:
+            self._open.remove(number)
+            self.waiting.remove(answered)
+
     def close(self) -> None:
-        """Withdraw it. Questions that wait still do."""
+        """Withdraw it. Questions that wait still do, as long as their answers can have been sent before."""
         self.is_open = False
         self._listener.undeclare()  # type: ignore[no-untyped-call]
-        self.publisher.undeclare()  # type: ignore[no-untyped-call]
+        self._publisher.undeclare()  # type: ignore[no-untyped-call]
+        for answered in self.waiting:
+            asyncio.get_running_loop().call_later(STILL_COME_S, settle, answered, None)
 
     def _changed(self, has_owner: bool) -> None:
         was_open, self.is_open = self.is_open, has_owner
         if was_open and not has_owner:
             self._lost(self)
+
+
+Way = DirectWay | LineWay
 
 
 class Ways:
@@ -87,34 +144,28 @@ class Ways:
     def __init__(self, bus: InboxBus, session: zenoh.Session, mission: str, own: str, *, only_elsewhere: bool) -> None:
         self._bus, self._session, self._mission = bus, session, mission
         self._destination = zenoh.Locality.REMOTE if only_elsewhere else zenoh.Locality.ANY
-        self.answers = new_inbox_key(mission, own, "answers")
-        """Key of the inbox for answers."""
+        self.questions = OpenQuestions(new_inbox_key(mission, own, "answers"))
+        self.lines: HostLines | None = None
+        """To other processes of this host; settable."""
         self._subscriber: zenoh.Subscriber[None] | None = None
-        self._number = 0
         self._querying = Counter[str]()
-        self._answered_by: OrderedDict[str, str] = OrderedDict()  # address → inbox of who answered the last query
-        self._ways: dict[str, DirectWay] = {}
-        self._open: dict[int, DirectWay] = {}
+        self._answered_by: OrderedDict[str, bytes] = OrderedDict()  # address → who answered the last query
+        self._ways: dict[str, Way] = {}
 
-    def way_to(self, address: str) -> DirectWay | None:
+    def way_to(self, address: str) -> Way | None:
         """Return the way to this component, if there is one now."""
         way = self._ways.get(address)
         if way is None or not way.is_open or self._querying[address]:
             return None
         return way
 
-    async def ask(self, way: DirectWay, payload: bytes, answered: asyncio.Future[Came], within_s: float) -> Came:
+    async def ask(self, way: Way, payload: bytes, answered: asyncio.Future[Came], within_s: float) -> Came:
         """Return what came of the question; None, too, if the bus is closed meanwhile."""
-        self._number += 1
-        number = self._number
-        self._open[number], way.waiting[number] = way, answered
         late = asyncio.get_running_loop().call_later(max(0.0, within_s), settle, answered, TooLate)
         try:
-            way.publisher.put(payload, attachment=_NUMBER.pack(number) + self.answers.encode())
-            return await answered
+            return await way.ask(payload, answered)
         finally:
             late.cancel()
-            del self._open[number], way.waiting[number]
 
     @contextmanager
     def querying(self, address: str) -> Iterator[None]:
@@ -129,17 +180,17 @@ class Ways:
 
     def answered(self, address: str, attached: zenoh.ZBytes | None) -> None:
         """Note who answered a query to this address; the second answer of one life makes a way to it."""
-        inbox = b"" if attached is None or len(attached) > LONGEST_KEY else attached.to_bytes()
-        name = inbox.decode(errors="replace")
-        if not is_inbox(name, self._mission, "asked", address):
+        called = b"" if attached is None or len(attached) > LONGEST_KEY else attached.to_bytes()
+        inbox, _line, host = called.decode(errors="replace").partition(_ON_HOST)
+        if not is_inbox(inbox, self._mission, "asked", address):
             return
         way = self._ways.get(address)
-        if way is not None and way.inbox == name:
+        if way is not None and way.inbox == inbox:
             return
-        if self._answered_by.pop(address, "") == name:
-            self._make_way(address, name)
+        if self._answered_by.pop(address, b"") == called:
+            self._make_way(address, inbox, host)
             return
-        self._answered_by[address] = name
+        self._answered_by[address] = called
         while len(self._answered_by) > MOST_WAYS:
             self._answered_by.popitem(last=False)
 
@@ -151,36 +202,26 @@ class Ways:
             self._subscriber.undeclare()  # type: ignore[no-untyped-call]
             self._subscriber = None
 
-    def _make_way(self, address: str, inbox: str) -> None:
-        if self._subscriber is None:
-            self._subscriber = self._session.declare_subscriber(
-                self.answers, lambda sample: self._bus.push(self._arrived, sample)
-            )
+    def _make_way(self, address: str, inbox: str, host: str) -> None:
         if (former := self._ways.pop(address, None)) is not None:
-            self._leave(former)
+            former.close()
         if len(self._ways) >= MOST_WAYS:
             return
+        lost = partial(self._lost, address)
+        near = self.lines.way(host, inbox, lost) if self.lines is not None and host else None
+        self._ways[address] = near or self._far_way(inbox, lost)
+
+    def _far_way(self, inbox: str, lost: Callable[[Way], None]) -> DirectWay:
+        if self._subscriber is None:
+            self._subscriber = self._session.declare_subscriber(
+                self.questions.answers, lambda sample: self._bus.push(self.questions.arrived, sample)
+            )
         publisher = self._session.declare_publisher(inbox, allowed_destination=self._destination, **_EXPRESS)
-        self._ways[address] = DirectWay(self._bus, publisher, inbox, lambda way: self._lost(address, way))
+        return DirectWay(self._bus, publisher, inbox, self.questions, lost)
 
-    def _lost(self, address: str, way: DirectWay) -> None:
+    def _lost(self, address: str, way: Way) -> None:
         if self._ways.get(address) is way:
-            del self._ways[address]
-            self._leave(way)
-
-    def _leave(self, way: DirectWay) -> None:
-        """Close a way whose inbox has no owner; its questions end when their answers can have arrived."""
-        way.close()
-        for answered in way.waiting.values():
-            asyncio.get_running_loop().call_later(STILL_COME_S, settle, answered, None)
-
-    def _arrived(self, sample: zenoh.Sample) -> None:
-        attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
-        if len(attached) != _NUMBER.size + 1:
-            return
-        number = _NUMBER.unpack_from(attached)[0]
-        if (way := self._open.get(number)) is not None:
-            settle(way.waiting[number], sample.payload.to_bytes() if attached.endswith(_ANSWERED) else None)
+            self._ways.pop(address).close()
 
 
 class DirectQuestion:
@@ -221,13 +262,13 @@ class DirectQuestion:
 class Query:
     """A question that came by a query."""
 
-    def __init__(self, query: zenoh.Query, own: str, inbox: str) -> None:
-        self._query, self._own, self._inbox = query, own, inbox
+    def __init__(self, query: zenoh.Query, own: str, inbox: str, host: str) -> None:
+        self._query, self._own, self._called = query, own, f"{inbox}{_ON_HOST}{host}" if host else inbox
         self.payload = query.payload
 
     def answer(self, payload: bytes) -> None:
-        """Send the answer, and the name of the inbox for further questions."""
-        self._query.reply(self._own, payload, express=True, attachment=self._inbox)
+        """Send the answer, and the names of the inbox and of this process's socket, for further questions."""
+        self._query.reply(self._own, payload, express=True, attachment=self._called)
 
     def refuse(self, payload: bytes) -> None:
         """Send the refusal of a question that cannot be read."""
@@ -236,6 +277,10 @@ class Query:
     def drop(self) -> None:
         """End the query; without an answer the asker gets ``NoResponder``."""
         self._query.drop()  # type: ignore[no-untyped-call]
+
+
+Asked = Query | DirectQuestion | LineQuestion
+"""A question that came, by any way."""
 
 
 def new_inbox(mission: str, address: str) -> str:

@@ -22,7 +22,6 @@ from backbone.addresses import NAMESERVER
 from backbone.authentication import secret_of
 from backbone.bus.clock import VirtualClock
 from backbone.bus.host_boards import boards_for
-from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.abilities import NO_ABILITIES, Abilities
@@ -140,7 +139,8 @@ class Component(Generic[P_co]):
         """Open the component's bus: a client of the hub, unless the class is the hub."""
         config = client_config(launch.endpoint, secret_of(launch.run_directory))
         bus = ZenohBus.open(launch.mission, launch.address, clock, config)
-        bus.copies, bus.boards = copies_for(launch.run_directory), boards_for(launch.run_directory)
+        bus.use_host(launch.run_directory)
+        bus.boards = boards_for(launch.run_directory)
         return bus
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

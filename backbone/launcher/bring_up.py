@@ -18,7 +18,6 @@ from backbone import run_files
 from backbone.addresses import LAUNCHER
 from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
-from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
@@ -86,7 +85,7 @@ async def _with_hub(
     await keeper.start_hub(hub, CORE_POLICY)
     config = client_config(own.endpoint, secret_of(own.run_directory))
     bus = await ZenohBus.open_when_up(own.mission, own.address, clock, config)
-    bus.copies = copies_for(own.run_directory)
+    bus.use_host(own.run_directory)
     observer.connected(bus)
     keeper.use(bus)
     await keeper.wait_ready(hub.name, START_TIME_S)

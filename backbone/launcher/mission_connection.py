@@ -13,7 +13,6 @@ from collections.abc import AsyncIterator
 from backbone import run_files
 from backbone.addresses import NAMESERVER
 from backbone.bus.clock import MissionClock
-from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskTime, MissionTime
@@ -45,7 +44,7 @@ async def connected(
         bus = await ZenohBus.open_when_up(
             found.mission, source, clock, client_config(found.endpoint, run_files.secret(found))
         )
-        bus.copies = copies_for(str(run_files.run_directory(found.mission)))
+        bus.use_host(str(run_files.run_directory(found.mission)))
     else:
         assert mission is not None  # noqa: S101  the command line refuses this
         clock = await clock_elsewhere(mission, endpoint, source, secret)

@@ -18,7 +18,6 @@ from typing import assert_never
 import msgspec
 
 from backbone.authentication import NoSecret, dictionary_of
-from backbone.bus.host_copies import copies_for
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.bus.zenoh_threads import threads_of_a_hub
@@ -84,7 +83,7 @@ class Nameserver(Component[NameserverParameters]):
         config = hub_config([launch.endpoint, *listen], dictionary_file=dictionary_file)
         threads_of_a_hub()
         bus = ZenohBus.open(launch.mission, launch.address, clock, config)
-        bus.copies = copies_for(launch.run_directory)
+        bus.use_host(launch.run_directory)
         return bus
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

@@ -1,9 +1,9 @@
 """All buses, so that what holds on one is shown to hold on the others.
 
 The local bus runs in virtual time. The others run over a real hub on the loopback interface: the Zenoh bus with a
-session for each component, without and with blackboards on which large conversations leave all values, however small;
-the shared bus with one session for all components (neighbors), and with two sessions that take the components in turn
-(neighbors and strangers, who have blackboards, too).
+session for each component, without and with the lines of one host and blackboards on which large conversations leave
+all values, however small; the shared bus with one session for all components (neighbors), and with two sessions that
+take the components in turn (neighbors and strangers, who have lines and blackboards, too).
 """
 
 import asyncio
@@ -38,7 +38,7 @@ def folder() -> Iterator[Path]:
         yield Path(name)
 
 
-@pytest.fixture(params=["local", "zenoh", "boards", "shared", "shared by turns"])
+@pytest.fixture(params=["local", "zenoh", "one host", "shared", "shared by turns"])
 def on_bus(request: pytest.FixtureRequest, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Runner:
     """Return what runs a law on one of the buses."""
 
@@ -56,6 +56,7 @@ def on_bus(request: pytest.FixtureRequest, folder: Path, monkeypatch: pytest.Mon
 
             def join(source: str, own: Clock) -> Bus:
                 bus = ZenohBus.open("conformance", source, own, client_config(endpoint))
+                bus.use_host(directory)
                 bus.boards = host_boards.boards_for(directory)
                 return bus
 
@@ -79,7 +80,7 @@ def on_bus(request: pytest.FixtureRequest, folder: Path, monkeypatch: pytest.Mon
     runs: dict[str, Any] = {
         "local": on_local,
         "zenoh": lambda law: on_zenoh(law, ""),
-        "boards": lambda law: on_zenoh(law, str(folder)),
+        "one host": lambda law: on_zenoh(law, str(folder)),
         "shared": lambda law: on_shared(law, 1, ""),
         "shared by turns": lambda law: on_shared(law, 2, str(folder)),
     }

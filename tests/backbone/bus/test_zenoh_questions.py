@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from pathlib import Path
 
 import pytest
 import zenoh
@@ -40,8 +41,15 @@ async def echo(asked: Envelope[Echo]) -> Message:
     raise AssertionError
 
 
+@pytest.fixture(params=["through the hub", "by a line"])
+def way(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Return which way questions go that are asked again, also in further processes."""
+    monkeypatch.setenv("FOLDER", str(tmp_path) if request.param == "by a line" else "")
+    return request.param
+
+
 @pytest.fixture
-async def endpoint() -> AsyncIterator[str]:
+async def endpoint(way: str) -> AsyncIterator[str]:
     """Return the endpoint of a hub."""
     at = free_endpoint()
     hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([at]))
@@ -53,6 +61,7 @@ async def endpoint() -> AsyncIterator[str]:
 async def joined(endpoint: str, source: str) -> AsyncIterator[ZenohBus]:
     """Give a bus that ignores bugs of answers."""
     bus = ZenohBus.open(MISSION, source, CLOCK, client_config(endpoint))
+    bus.use_host(os.environ.get("FOLDER", ""))
     bus.on_bug = lambda bug: None if isinstance(bug, ZeroDivisionError) else pytest.fail(repr(bug))
     try:
         yield bus
@@ -178,7 +187,7 @@ async def test_an_answer_that_was_given_before_the_end_arrives(endpoint: str) ->
 async def test_bytes_of_any_kind_end_neither_server_nor_asker(endpoint: str) -> None:
     async with serving(endpoint) as server, joined(endpoint, ASKER) as asker:
         await on_the_way(asker)
-        inbox, answers = asker.ways.way_to(SERVER), asker.ways.answers
+        inbox, answers = asker.ways.way_to(SERVER), asker.ways.questions.answers
         assert inbox is not None
         with zenoh.open(client_config(endpoint)) as stranger:
             for attachment in (

@@ -1,0 +1,371 @@
+"""Questions between two processes of one host, by a socket between them: no other process and no thread is woken.
+
+Each process listens at a socket, which its answers by another way name, see ``zenoh_questions``. Who asks again
+connects, and keeps this *line* for all its questions to that process; the answers come back on it. The end of a process
+ends its lines, after the answers that it had sent. Processes of other users are not let in.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import struct
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from backbone.bus.answers import Came, NotHere
+from backbone.operating_system import local_sockets
+from backbone.waiting import settle
+from backbone.wire import MAX_MESSAGE_BYTES
+
+MOST_PACKET_BYTES = 65_536  # chosen: three of them fit into a socket as the system makes it (net.core.wmem_default)
+MOST_WAITING_BYTES = 2 * MAX_MESSAGE_BYTES  # chosen: a peer that is stopped costs no more
+MOST_AT_ONCE = 32  # chosen: packets of one line before the rest of the event loop has its turn
+ACCEPT_AGAIN_S = 1.0  # chosen: as long as asyncio's own servers wait (asyncio.constants.ACCEPT_RETRY_DELAY)
+_PACKET = struct.Struct("<QB")
+_INBOX = struct.Struct("<H")
+_MORE = 0x80  # the message goes on in the next packet of its number
+
+log = logging.getLogger(__name__)
+
+
+class Kind(IntEnum):
+    """What a message on a line is."""
+
+    QUESTION = 0
+    ANSWER = 1
+    NO_ANSWER = 2  # a bug ended the answer
+    NO_INBOX = 3  # nobody got the question
+
+
+def packets_of(number: int, kind: Kind, body: bytes) -> Iterator[bytes]:
+    """Yield the packets of a message."""
+    most = MOST_PACKET_BYTES - _PACKET.size
+    for at in range(0, max(1, len(body)), most):
+        part = body[at : at + most]
+        yield _PACKET.pack(number, kind | (_MORE if at + most < len(body) else 0)) + part
+
+
+def question_of(inbox: str, payload: bytes) -> bytes:
+    """Return the body of a question."""
+    name = inbox.encode()
+    return _INBOX.pack(len(name)) + name + payload
+
+
+class Gathering:
+    """The messages of one side of a line, made whole of their packets. Pure."""
+
+    def __init__(self) -> None:
+        self._parts: dict[int, list[bytes]] = {}
+        self._bytes = 0
+
+    def take(self, packet: bytes) -> tuple[int, Kind, bytes] | None:
+        """Return number, kind and body of the message that is whole with this packet; None: none is.
+
+        Raises:
+            ValueError: It is no packet, or its message is longer than any.
+        """
+        if len(packet) < _PACKET.size:
+            raise ValueError(f"a packet of {len(packet)} bytes")
+        number, kind = _PACKET.unpack_from(packet)
+        part = packet[_PACKET.size :]
+        if not kind & _MORE and number not in self._parts:
+            return number, Kind(kind), part
+        parts = self._parts.setdefault(number, [])
+        parts.append(part)
+        self._bytes += len(part)
+        if self._bytes > MOST_WAITING_BYTES:
+            raise ValueError(f"{self._bytes} bytes of messages that are not whole")
+        if kind & _MORE:
+            return None
+        body = b"".join(self._parts.pop(number))
+        self._bytes -= len(body)
+        return number, Kind(kind), body
+
+
+class Line:
+    """A connection to another process of this host.
+
+    Args:
+        took: Called with each message that came: line, number, kind, body.
+        ended: Called once, when no further message can come.
+    """
+
+    def __init__(
+        self,
+        connected: socket.socket,
+        took: Callable[[Line, int, Kind, bytes], None],
+        ended: Callable[[Line], None],
+    ) -> None:
+        self._socket, self._took, self._ended = connected, took, ended
+        self._loop = asyncio.get_running_loop()
+        self._came = Gathering()
+        self._waiting: deque[bytes] = deque()
+        self._waiting_bytes = 0
+        self._is_full = False
+        self.is_open = True
+        self._loop.add_reader(connected, self._read)
+
+    def send(self, number: int, kind: Kind, body: bytes) -> None:
+        """Send a message, later if the peer has no time now. A line whose peer takes nothing for long ends."""
+        if not self.is_open:
+            return
+        for packet in packets_of(number, kind, body):
+            self._waiting.append(packet)
+            self._waiting_bytes += len(packet)
+        if not self._is_full:
+            self._send_waiting()
+        if self._waiting_bytes > MOST_WAITING_BYTES:
+            log.warning("a process of this host takes no messages: %d bytes wait", self._waiting_bytes)
+            self.close()
+
+    def close(self) -> None:
+        """End the line. Idempotent."""
+        if self.is_open:
+            self.is_open = False
+            self._loop.remove_reader(self._socket)
+            self._loop.remove_writer(self._socket)
+            self._socket.close()
+            self._waiting.clear()
+            self._waiting_bytes = 0
+            self._ended(self)
+
+    def _read(self) -> None:
+        for _packet in range(MOST_AT_ONCE):
+            try:
+                packet = self._socket.recv(MOST_PACKET_BYTES)
+                message = self._came.take(packet) if packet else None
+            except BlockingIOError:
+                return
+            except (OSError, ValueError) as error:
+                log.info("a line to a process of this host ends: %s", error)
+                packet, message = b"", None
+            if not packet:
+                self.close()
+                return
+            if message is not None:
+                self._took(self, *message)
+            if not self.is_open:
+                return
+
+    def _send_waiting(self) -> None:
+        try:
+            while self._waiting:
+                self._socket.send(self._waiting[0])
+                self._waiting_bytes -= len(self._waiting.popleft())
+        except BlockingIOError:
+            if not self._is_full:
+                self._is_full = True
+                self._loop.add_writer(self._socket, self._send_waiting)
+        except OSError as error:
+            log.info("a line to a process of this host ends: %s", error)
+            self.close()
+        else:
+            if self._is_full:
+                self._is_full = False
+                self._loop.remove_writer(self._socket)
+
+
+class LineQuestion:
+    """A question that came on a line, with what its answer needs."""
+
+    def __init__(self, line: Line, number: int, payload: bytes) -> None:
+        self._line, self._number, self.payload = line, number, _Whole(payload)
+        self._is_answered = False
+
+    def answer(self, payload: bytes) -> None:
+        """Send the answer."""
+        self._is_answered = True
+        self._line.send(self._number, Kind.ANSWER, payload)
+
+    def refuse(self, payload: bytes) -> None:
+        """Send the refusal of a question that cannot be read."""
+        self.answer(payload)
+
+    def drop(self) -> None:
+        """Say that there is no answer, unless there was one."""
+        if not self._is_answered:
+            self._line.send(self._number, Kind.NO_ANSWER, b"")
+
+
+class _Whole(bytes):
+    """Bytes with the interface of a payload."""
+
+    def to_bytes(self) -> bytes:
+        """Return itself."""
+        return self
+
+
+@dataclass(slots=True)
+class _Asked:
+    """What is asked on one line.
+
+    Attributes:
+        waiting: Number → open question.
+        left: Called when the line has ended.
+    """
+
+    waiting: dict[int, asyncio.Future[Came]] = field(default_factory=dict)
+    left: list[Callable[[], None]] = field(default_factory=list)
+
+
+class HostLines:
+    """The lines of one process. Make it inside a running event loop, and use it there.
+
+    Raises:
+        OSError: The system refuses the socket.
+    """
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._listening, self.name = local_sockets.listen()
+        """Name of the socket at which this process listens."""
+        self._inboxes: dict[str, Callable[[LineQuestion], None]] = {}
+        self._answering: set[Line] = set()
+        self._asking: dict[str, Line] = {}
+        self._asked: dict[Line, _Asked] = {}
+        self._number = 0
+        self._loop.add_reader(self._listening, self._accept)
+
+    @property
+    def askers(self) -> int:
+        """Number of processes that ask this one."""
+        return len(self._answering)
+
+    def serve(self, inbox: str, asked: Callable[[LineQuestion], None]) -> Served:
+        """Call a function with each question to this inbox until withdrawn."""
+        self._inboxes[inbox] = asked
+        return Served(self._inboxes, inbox)
+
+    def way(self, name: str, inbox: str, lost: Callable[[LineWay], None]) -> LineWay | None:
+        """Return the way to an inbox of the process that listens at this name; None: none of this host does."""
+        line = self._asking.get(name)
+        if line is None:
+            try:
+                line = Line(local_sockets.connect(name), self._answered, self._ended)
+            except (OSError, ValueError) as error:
+                log.debug("no line to %s: %s", inbox, error)
+                return None
+            self._asking[name], self._asked[line] = line, _Asked()
+        way = LineWay(self, line, inbox, lost)
+        self._asked[line].left.append(way.leave)
+        return way
+
+    async def ask(self, line: Line, inbox: str, payload: bytes, answered: asyncio.Future[Came]) -> Came:
+        """Return what came of a question."""
+        self._number += 1
+        number, waiting = self._number, self._asked[line].waiting
+        waiting[number] = answered
+        try:
+            line.send(number, Kind.QUESTION, question_of(inbox, payload))
+            return await answered
+        finally:
+            waiting.pop(number, None)
+
+    def forget(self, line: Line, left: Callable[[], None]) -> None:
+        """Do not call this function when the line ends."""
+        if (asked := self._asked.get(line)) is not None and left in asked.left:
+            asked.left.remove(left)
+
+    def close(self) -> None:
+        """End all lines. Idempotent."""
+        if self._listening.fileno() >= 0:
+            self._loop.remove_reader(self._listening)
+            self._listening.close()
+        for line in (*self._answering, *self._asking.values()):
+            line.close()
+
+    def _accept(self) -> None:
+        try:
+            self._answering.add(Line(local_sockets.accept(self._listening), self._came, self._answering.discard))
+        except BlockingIOError:
+            return
+        except PermissionError as error:
+            log.warning("a process of this host was not let in: %s", error)
+        except OSError as error:  # no descriptors are left: who connects waits, or goes through the hub
+            log.warning("no further line on this host for now: %s", error)
+            self._loop.remove_reader(self._listening)
+            self._loop.call_later(ACCEPT_AGAIN_S, self._accept_again)
+
+    def _accept_again(self) -> None:
+        if self._listening.fileno() >= 0:
+            self._loop.add_reader(self._listening, self._accept)
+
+    def _came(self, line: Line, number: int, kind: Kind, body: bytes) -> None:
+        if kind is not Kind.QUESTION or len(body) < _INBOX.size:
+            line.close()
+            return
+        end = _INBOX.size + _INBOX.unpack_from(body)[0]
+        asked = self._inboxes.get(body[_INBOX.size : end].decode(errors="replace"))
+        if asked is None:
+            line.send(number, Kind.NO_INBOX, b"")
+        else:
+            asked(LineQuestion(line, number, body[end:]))
+
+    def _answered(self, line: Line, number: int, kind: Kind, body: bytes) -> None:
+        if (answered := self._asked[line].waiting.get(number)) is not None:
+            settle(answered, {Kind.ANSWER: body, Kind.NO_INBOX: NotHere}.get(kind))
+
+    def _ended(self, line: Line) -> None:
+        for name in [name for name, one in self._asking.items() if one is line]:
+            del self._asking[name]
+        asked = self._asked.pop(line)
+        for left in asked.left:
+            left()
+        for answered in asked.waiting.values():
+            settle(answered, None)
+
+
+class Served:
+    """An inbox that takes questions until it is withdrawn."""
+
+    def __init__(self, inboxes: dict[str, Callable[[LineQuestion], None]], inbox: str) -> None:
+        self._inboxes, self._inbox = inboxes, inbox
+
+    def undeclare(self) -> None:
+        """Withdraw it."""
+        self._inboxes.pop(self._inbox, None)
+
+
+class LineWay:
+    """The way to the inbox of one life of a component on this host.
+
+    Args:
+        lost: Called when the line has ended, or nobody reads the inbox any more.
+    """
+
+    def __init__(self, lines: HostLines, line: Line, inbox: str, lost: Callable[[LineWay], None]) -> None:
+        self._lines, self._line, self.inbox, self._lost = lines, line, inbox, lost
+        self.is_open = True
+
+    async def ask(self, payload: bytes, answered: asyncio.Future[Came]) -> Came:
+        """Return what came of a question."""
+        came = await self._lines.ask(self._line, self.inbox, payload, answered)
+        if came is NotHere:
+            self.leave()
+        return came
+
+    def leave(self) -> None:
+        """Be lost."""
+        if self.is_open:
+            self.close()
+            self._lost(self)
+
+    def close(self) -> None:
+        """Take no further question. Questions that wait still do."""
+        self.is_open = False
+        self._lines.forget(self._line, self.leave)
+
+
+def lines_for(directory: str) -> HostLines | None:
+    """Return the lines of this process; None if its launch names no folder, or the system has no such sockets."""
+    if not (directory and local_sockets.IS_POSSIBLE):
+        return None
+    try:
+        return HostLines()
+    except OSError as error:
+        log.warning("no lines on this host: %s", error)
+        return None

@@ -1,0 +1,84 @@
+"""Sockets between processes of one user on one machine. Their names end with their processes: no file is left.
+
+Packets arrive whole, in order, or not at all, and no call ever blocks. Linux alone has such names; they belong to the
+network namespace, so processes that a network separates do not meet.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+import sys
+
+IS_POSSIBLE = sys.platform == "linux"
+_PEER = struct.Struct("iII")  # struct ucred, unix(7): pid, user, group
+_NAME_BYTES = 12  # chosen: nobody guesses it, or takes it by chance
+
+
+def listen() -> tuple[socket.socket, str]:
+    """Return a socket that accepts connections, and its name.
+
+    Raises:
+        OSError: The system refuses the socket.
+    """
+    name = os.urandom(_NAME_BYTES).hex()
+    made = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    try:
+        made.setblocking(False)
+        made.bind(_at(name))
+        made.listen()
+    except BaseException:
+        made.close()
+        raise
+    return made, name
+
+
+def connect(name: str) -> socket.socket:
+    """Return a connection to the process of this user that listens at the name.
+
+    Raises:
+        OSError: None does, or it has no time, or it is another user's.
+    """
+    made = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    try:
+        made.setblocking(False)
+        made.connect(_at(name))
+        require_own(made)
+    except BaseException:
+        made.close()
+        raise
+    return made
+
+
+def accept(listening: socket.socket) -> socket.socket:
+    """Return the next connection.
+
+    Raises:
+        BlockingIOError: There is none.
+        PermissionError: It was another user's, and is closed.
+        OSError: The system refuses it.
+    """
+    made, _address = listening.accept()
+    try:
+        made.setblocking(False)
+        require_own(made)
+    except BaseException:
+        made.close()
+        raise
+    return made
+
+
+def require_own(connected: socket.socket) -> None:
+    """Return if the process at the other end belongs to this user.
+
+    Raises:
+        PermissionError: It belongs to another one.
+    """
+    _pid, user, _group = _PEER.unpack(connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
+    if user != os.geteuid():
+        raise PermissionError(f"the process at the other end belongs to user {user}")
+
+
+def _at(name: str) -> str:
+    return f"\0scout-backbone/{name}"
