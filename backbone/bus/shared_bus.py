@@ -30,6 +30,7 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.bus.local_bus import LocalNetwork, Neighbor
+from backbone.bus.subscribers import Subscribers
 from backbone.bus.zenoh_bus import ZenohBus
 from backbone.bus.zenoh_far_copies import FarCopies
 from backbone.bus.zenoh_sessions import client_config, close_session, open_session, watch_links
@@ -56,7 +57,7 @@ class SharedSession:
         self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
         self._copies, self._far = copies_for(directory), cast("FarCopies | None", None)
-        self._lines = lines_for(directory)
+        self._lines, self._subscribers = lines_for(directory), Subscribers(self._session)
         self._directory, self._members = directory, set[str]()
 
     def join(self, source: str, clock: Clock) -> SharedBus:
@@ -64,6 +65,7 @@ class SharedSession:
         bus = SharedBus(self._neighbors, source, clock, self._session)
         self._far = self._far or FarCopies(self._session, bus.mission, source)
         bus.copies, bus.far, bus.ways.lines, bus.members = self._copies, self._far, self._lines, self._members
+        bus.subscribers = self._subscribers
         self._members.add(source)
         bus.boards = boards_for(self._directory, self._members)
         return bus

@@ -46,6 +46,7 @@ from backbone.bus.interface import (
 )
 from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, LosslessStreams
 from backbone.bus.near_listening import NearListening
+from backbone.bus.subscribers import Subscribers
 from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
 from backbone.bus.zenoh_questions import Asked, DirectQuestion, Query, Ways, new_inbox, query
@@ -108,6 +109,8 @@ class ZenohBus(InboxBus):
         """For the recorder of the mission where it has no socket; settable. Same."""
         self.boards: HostBoards | None = None
         """For large values to and from this host; settable before they are used."""
+        self.subscribers = Subscribers(session)
+        """Settable: one for all buses of a session."""
         self._session, self._is_hub, self._shared = session, is_hub, shared
         self._links = None if shared else watch_links(session)
         self._declared: set[Declaration] = set()
@@ -310,7 +313,7 @@ class ZenohBus(InboxBus):
             return self._declare(near, near)
         kind = LatestSample if latest else EachSample
         receive = kind(self, pattern, reader, listener, most_bytes)
-        return self._declare(self._session.declare_subscriber(pattern, receive), receive)
+        return self._declare(self.subscribers.declare(pattern, receive), receive)
 
     def dropped(self) -> dict[str, int]:
         """Return the messages that listeners did not get, by key; see ``Bus.dropped``."""
@@ -324,7 +327,7 @@ class ZenohBus(InboxBus):
         """Listen to one key, by the boards of this host where its senders have some."""
 
         def declare(receive: Callable[[zenoh.Sample], None]) -> Any:
-            return self._session.declare_subscriber(own, receive)
+            return self.subscribers.declare(own, receive)
 
         near = NearListening(self, reader, listener, boards, own, declare)
 
@@ -353,7 +356,7 @@ class ZenohBus(InboxBus):
         if lossless:
             every = LosslessSamples(self, self._session, expression, heard.hand_over)
             return LosslessOverhearing(self._declare(every, every), every)
-        heard.declared = self._declare(self._session.declare_subscriber(expression, heard))
+        heard.declared = self._declare(self.subscribers.declare(expression, heard))
         return heard
 
     # ------------------------------------------------------------------ life

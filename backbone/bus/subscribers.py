@@ -1,0 +1,61 @@
+"""The subscribers of one session: one of zenoh for each pattern of keys, however many listeners of the process it has.
+
+Each subscriber of zenoh has a thread. The members of a shared process listen to the same keys, such as the leases: one
+thread wakes for all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+
+Receive = Callable[[zenoh.Sample], None]
+
+
+class Subscribers:
+    """Declares subscribers on a session. Used in the event loop; receivers are called in threads of zenoh."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self._fans: dict[str, _Fan] = {}
+
+    def declare(self, pattern: str, receive: Receive) -> Subscribed:
+        """Call the receiver with each sample of these keys until it is withdrawn."""
+        fan = self._fans.get(pattern)
+        if fan is None:
+            fan = self._fans[pattern] = _Fan()
+            fan.entity = self._session.declare_subscriber(pattern, fan)
+        fan.receivers = (*fan.receivers, receive)
+        return Subscribed(lambda: self._withdraw(pattern, receive))
+
+    def _withdraw(self, pattern: str, receive: Receive) -> None:
+        fan = self._fans[pattern]
+        fan.receivers = tuple(one for one in fan.receivers if one is not receive)
+        if not fan.receivers:
+            del self._fans[pattern]
+            fan.entity.undeclare()
+
+
+class _Fan:
+    """The receivers of one subscriber of zenoh. They are replaced as a whole, because another thread reads them."""
+
+    def __init__(self) -> None:
+        self.receivers: tuple[Receive, ...] = ()
+        self.entity: Any = None
+
+    def __call__(self, sample: zenoh.Sample) -> None:
+        for receive in self.receivers:
+            receive(sample)
+
+
+class Subscribed:
+    """One receiver's subscription."""
+
+    def __init__(self, withdraw: Callable[[], None]) -> None:
+        self._withdraw = withdraw
+
+    def undeclare(self) -> None:
+        """Withdraw it; once."""
+        self._withdraw()
