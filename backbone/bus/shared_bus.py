@@ -30,10 +30,10 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.bus.local_bus import LocalNetwork, Neighbor
-from backbone.bus.subscribers import Subscribers
 from backbone.bus.zenoh_bus import ZenohBus
 from backbone.bus.zenoh_far_copies import FarCopies
 from backbone.bus.zenoh_sessions import client_config, close_session, open_session, watch_links
+from backbone.bus.zenoh_subscribers import Subscribers
 from backbone.keys import Conversation
 from backbone.quality import NEVER_DROPPED
 from backbone.wire import Accepts, Envelope, Message

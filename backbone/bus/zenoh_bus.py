@@ -46,7 +46,6 @@ from backbone.bus.interface import (
 )
 from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, LosslessStreams
 from backbone.bus.near_listening import NearListening
-from backbone.bus.subscribers import Subscribers
 from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
 from backbone.bus.zenoh_questions import Asked, DirectQuestion, Query, Ways, new_inbox, query
@@ -60,6 +59,7 @@ from backbone.bus.zenoh_sessions import (
     watch_links,
 )
 from backbone.bus.zenoh_settings import LINK_LEASE_MS
+from backbone.bus.zenoh_subscribers import Subscribers
 from backbone.errors import Refusal
 from backbone.keys import Conversation, address_of, key, key_of_all, key_of_senders, sender_of
 from backbone.quality import LARGE, NEVER_DROPPED, QUALITY
