@@ -25,6 +25,7 @@ from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.ending_messages import AwaitLastBranch, EndMission, LastBranchOver, MissionEnding
+from backbone.launcher.hand_recorders import HandRecorderWatch
 from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch, ends_before
 from backbone.launcher.last_run import run_last
@@ -91,6 +92,7 @@ class Launcher(Component[NoParameters]):
         )
         self._awaited: set[str] = set()
         self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
+        self._hand_recorders = HandRecorderWatch(bus, clock, self._is_deaf, self._hand_recorder_changed)
         self._log = LogKeeper(bus)
         self.outcome = Outcome()
         self._others = OtherHosts(description, clock.now_s(), options.record)
@@ -112,6 +114,7 @@ class Launcher(Component[NoParameters]):
     async def serve(self) -> None:
         """Start the mission through the placer and keep it running; publish its health."""
         self.start_task(self._health_watch.run(), "health")
+        self.start_task(self._hand_recorders.run(), "recorders by hand")
         if self._recorder is not None:
             self._recorder.on_changed = self._recorder_changed
             self.start_task(self._recorder.keep(), "recorder")
@@ -137,6 +140,13 @@ class Launcher(Component[NoParameters]):
     def _recorder_changed(self, line: str) -> None:
         self.publish_event(self._description.name, line, LogLevel.WARNING)
         self.changed()
+
+    def _hand_recorder_changed(self, name: str, what: str) -> None:
+        self.publish_event(name, what, LogLevel.WARNING)
+        self.changed()
+
+    def _is_deaf(self) -> bool:
+        return any(absence.name == component_of(NAMESERVER) for absence in self._keeper.absences())
 
     async def _end_after(self, mission_s: float) -> None:
         await self.clock.sleep_s(mission_s)
@@ -198,7 +208,8 @@ class Launcher(Component[NoParameters]):
         if self.outcome.ready_after_s is None:
             mission.append(Absence(self._description.name, 0.0, "the mission is coming up", self._being_started()))
         lost = self._recorder.absence() if self._recorder is not None else None
-        return [*core, *mission, *self._others.absences(), *([lost] if lost is not None else [])]
+        recorders = [*([lost] if lost is not None else []), *self._hand_recorders.absences()]
+        return [*core, *mission, *self._others.absences(), *recorders]
 
     def _being_started(self) -> str:
         """Return the components for which the start waits, with their feedback."""
