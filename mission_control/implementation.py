@@ -11,9 +11,9 @@ from typing import ClassVar, Protocol, Self
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import WrongParameter
 from backbone.component.launch import Launch
 from backbone.component.log_level import LogLevel
+from backbone.component.messages import WrongParameter
 from backbone.exchange import NotExchanged, SwapClass
 from backbone.exchange_course import UNPROVED, complaint, hand_over
 from backbone.reading_anew import WrongClass

@@ -21,8 +21,8 @@ import msgspec
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import WrongParameter
 from backbone.component.log_level import LogLevel
+from backbone.component.messages import WrongParameter
 from backbone.errors import LinkError, Refusal
 from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
 from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules, complaint, hand_over

@@ -13,7 +13,7 @@ import pytest
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.component import MAX_FEEDBACK_LENGTH, Component, WrongParameter
+from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import (
     AskParameters,
@@ -29,7 +29,9 @@ from backbone.component.messages import (
     Stopping,
     Story,
     StoryEvent,
+    WrongParameter,
 )
+from backbone.component.story import MAX_FEEDBACK_LENGTH
 from backbone.errors import NoResponder, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
