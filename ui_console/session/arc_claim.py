@@ -1,7 +1,7 @@
-"""The stick of one console: it claims an ARC for the robot of the console's parameters, and gives it back.
+"""A console's claim on an ARC, for the robot of the console's parameters, from the take to the release.
 
-The stick claims as a behavior does, with a priority of its own beside the mission's. An ARC that was given back can
-rest for the next claim. What is done with the robot meanwhile is the part of ``controls``.
+The console claims as a behavior does, with a priority of its own beside the mission's. An ARC that was given back can
+rest for the next claim. Commands to the robot meanwhile are the part of ``controls``.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from ui_console.session.stop_ear import StopEar
 log = logging.getLogger(__name__)
 
 
-class Stick:
-    """At most one ARC, from its claim to its release.
+class ArcClaim:
+    """Claims at most one ARC at a time, keeps it while it waits and works, and gives it back.
 
     Args:
         console: Its parameters name robot and kind of ARC.
@@ -54,7 +54,7 @@ class Stick:
         self._console, self._controls, self._taken = console, controls, taken
         self._see, self._keeps_arc, self._shows_stops = see, keeps_arc, shows_stops
         self._arc: ArcClient | None = None
-        self._claimed: tuple[str, dict[str, object]] | None = None
+        self._last: tuple[str, dict[str, object]] | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._frames: Subscription | None = None
         self._giving_back, self._takes_next = asyncio.Lock(), False
@@ -104,10 +104,10 @@ class Stick:
     def _claim(self, wished: TeleoperationParameters) -> None:
         console, rested = self._console, self._arc
         claim = (wished.kind, wished.claim(console.address))
-        self.rests = self.rests and self._claimed == claim
+        self.rests = self.rests and self._last == claim
         if not self.rests:
             self._arc = ArcClient(console.bus, wished.arc(console.bus), self)
-        arc, self._claimed, self.is_asking = self._arc, claim, True
+        arc, self._last, self.is_asking = self._arc, claim, True
         assert arc is not None  # noqa: S101  an ARC that rests exists
         self._controls.connect(arc)
         self._ear.close()  # the state it reported to the last ARC is new to this one
@@ -157,7 +157,7 @@ class Stick:
 
     # ------------------------------------------------------------------ release
     async def give_back(self, reason: str, *, for_good: bool = False, wanted: bool = True) -> None:
-        """Give the robot back; afterwards the stick rests until the next ``take``.
+        """Give the robot back; afterwards nothing is claimed until the next ``take``.
 
         Args:
             reason: For people.
@@ -223,7 +223,7 @@ class Stick:
         """Answer a notice of the ARC.
 
         Raises:
-            NotMyArc: The stick claims none, or another one.
+            NotMyArc: No ARC is claimed, or another one.
         """
         if self._arc is None:
             raise NotMyArc(f"{self._console.name} claims no ARC")

@@ -1,6 +1,6 @@
 """Teleoperation: a person's hold on one robot.
 
-The console claims an ARC by its ``stick``, and gives it back on request, at its end, or by its death, which the ARC
+The console claims an ARC by its ``arc_claim``, and gives it back on request, at its end, or by its death, which the ARC
 sees. Faces (terminal, script) receive events through ``show`` and pictures through ``see``, and call the verbs.
 Commands go through ``controls``, the operators' questions about the robot through ``consent_talk``, orders to robots
 through ``order_keeper``.
@@ -29,6 +29,7 @@ from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, GiveWish, Motion
 from ui_console.model.lifting import AskLift
 from ui_console.model.orders import Order
+from ui_console.session.arc_claim import ArcClaim
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
@@ -37,7 +38,6 @@ from ui_console.session.hand_over import AskHandOver, HandOver
 from ui_console.session.order_keeper import OrderKeeper
 from ui_console.session.order_verbs import OrderVerbs
 from ui_console.session.presence import OperatorPresence
-from ui_console.session.stick import Stick
 from ui_console.session.waiting import Waiting
 
 log = logging.getLogger(__name__)
@@ -84,7 +84,7 @@ class Teleoperation(OrderVerbs):
         self._kind = self.parameters.kind
         self._controls = Controls(self)
         self._orders = OrderKeeper(self, lambda: self._robot, self._hand_to_order, self._take_back)
-        self._stick = Stick(
+        self._claim = ArcClaim(
             self, self._controls, see=see, keeps_arc=keeps_arc, shows_stops=not watches, taken=self._orders.taken
         )
         self._consent = ConsentTalk(self, self.give_back)
@@ -98,17 +98,17 @@ class Teleoperation(OrderVerbs):
     @property
     def is_held(self) -> bool:
         """True while commands pass."""
-        return self._stick.is_held
+        return self._claim.is_held
 
     @property
     def refusal(self) -> Refusal | None:
         """Why the claim was refused; None if it was not."""
-        return self._stick.refusal
+        return self._claim.refusal
 
     @property
     def given_back(self) -> bool | None:
         """Whether the last release was confirmed; None before one."""
-        return self._stick.given_back
+        return self._claim.given_back
 
     @property
     def arc_abilities(self) -> ArcAbilities | None:
@@ -123,7 +123,7 @@ class Teleoperation(OrderVerbs):
     def take(self) -> None:
         """Claim the robot unless it is claimed; if its release is under way, right afterwards; its order ends."""
         if not self._orders.touched(self._robot):
-            self._stick.take()
+            self._claim.take()
 
     async def switch(self, robot: str, kind: str = "") -> None:
         """Claim another robot in place of the present one, which is stopped and given back first.
@@ -145,7 +145,7 @@ class Teleoperation(OrderVerbs):
             now = self.parameters
             if robot != now.robot or kind not in ("", now.kind):
                 self.parameters = msgspec.structs.replace(now, robot=robot, kind=kind or self._kind)
-                await self._stick.give_back(f"{self.user} takes {robot}", for_good=True)
+                await self._claim.give_back(f"{self.user} takes {robot}", for_good=True)
             if self._orders.goes_on(robot):
                 self.show(events.TurnedTo(self.clock.now_s(), robot))
             else:
@@ -173,7 +173,7 @@ class Teleoperation(OrderVerbs):
         Raises:
             Refusal: The claim was refused.
         """
-        await self._stick.wait_granted()
+        await self._claim.wait_granted()
 
     def hold(self, drive: Motion, lasts_s: float | None = None) -> None:
         """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
@@ -200,7 +200,7 @@ class Teleoperation(OrderVerbs):
 
     async def do(self, command: Command) -> bool:
         """Send one command and show its outcome; return True if it was applied."""
-        return not self._stick.rests and await self._controls.do(command)
+        return not self._claim.rests and await self._controls.do(command)
 
     def begin_release(self) -> None:
         """Give the robot back without waiting for it."""
@@ -214,45 +214,45 @@ class Teleoperation(OrderVerbs):
             for_good: End the ARC also if the console keeps it otherwise.
             wanted: False if the operator did not ask for it.
         """
-        robot, had_stick = self._robot, self._stick.is_asking
+        robot, had_stick = self._robot, self._claim.is_asking
         had_order = await self._orders.give_back(robot, reason)
-        await self._stick.give_back(reason, for_good=for_good, wanted=wanted)
+        await self._claim.give_back(reason, for_good=for_good, wanted=wanted)
         if had_order and not had_stick:
-            self._stick.given_back = True
+            self._claim.given_back = True
             self.acted(OperatorAction.RELEASE, robot, reason)
             self.show(events.GivenBack(self.clock.now_s(), reason, True, wanted))
 
     async def _hand_to_order(self, robot: str, order: str) -> None:
         """Give the robot from the stick to its order, which waits for it: no lower ARC gets it in between."""
-        if robot == self._robot and self._stick.is_asking:
+        if robot == self._robot and self._claim.is_asking:
             self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
-            await self._stick.give_back(f"ordered: {order}")
+            await self._claim.give_back(f"ordered: {order}")
 
     def _take_back(self, robot: str) -> None:
         """Claim the robot by the stick, which goes before its order."""
         if robot != self._robot:
             return
-        if self.is_held and self._stick.holding == robot:
+        if self.is_held and self._claim.holding == robot:
             self._orders.taken(robot)
         else:
             self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
-            self._stick.take()
+            self._claim.take()
 
     @property
     def _robot(self) -> str:
-        return self.parameters.robot or self._stick.holding
+        return self.parameters.robot or self._claim.holding
 
     # ------------------------------------------------------------------ consent
     def begin_ask_consent(self, why: str = "") -> None:
         """Ask the consoles that hold the robot, and show their answers; do nothing while such a question is open."""
-        robot, is_waiting = self.parameters.robot, self._stick.is_asking and not self.is_held
-        claim = Claim(self.parameters.arc(self.bus), robot, robot or ANY_ROBOT, self._stick.asked_s)
+        robot, is_waiting = self.parameters.robot, self._claim.is_asking and not self.is_held
+        claim = Claim(self.parameters.arc(self.bus), robot, robot or ANY_ROBOT, self._claim.asked_s)
         self._consent.begin_ask(claim if is_waiting else None, why)
 
     def _consent_at_once(self) -> Consent | None:
         """Return the answer to a question for the robot if it needs no decision; None: the operator decides."""
         if not self.is_held:
-            return Consent(not self._stick.is_asking, self.user, "holds nothing")
+            return Consent(not self._claim.is_asking, self.user, "holds nothing")
         return Consent(False, self.user, "a script drives") if self._work is not None else None
 
     # ------------------------------------------------------------------ the component's hooks
@@ -276,8 +276,8 @@ class Teleoperation(OrderVerbs):
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once())
         if isinstance(asked.body, AskHandOver):
-            holds, by_script = self._stick.holding if self.is_held else "", self._work is not None
-            return await self._hand_over.answer(asked.body, holds, self._stick.asked_s, by_script=by_script)
+            holds, by_script = self._claim.holding if self.is_held else "", self._work is not None
+            return await self._hand_over.answer(asked.body, holds, self._claim.asked_s, by_script=by_script)
         if isinstance(asked.body, AskLift) and self._work is not None:
             stopped_it = asked.body.console == self.address
             return Consent(False, self.user, "a script drives, and stopped it", is_here=stopped_it)
@@ -285,11 +285,11 @@ class Teleoperation(OrderVerbs):
             return self._orders.reported(asked.source, asked.body)
         if not isinstance(asked.body, ArcNotice):
             return await super().answer(asked)
-        return await self._stick.handle(asked.body)
+        return await self._claim.handle(asked.body)
 
     async def drain(self) -> None:
         """Give the robots back if they were not."""
-        await asyncio.gather(self._orders.drain(), self._stick.give_back("the console ends", for_good=True))
+        await asyncio.gather(self._orders.drain(), self._claim.give_back("the console ends", for_good=True))
         await super().drain()
 
     async def connect(self) -> None:
@@ -302,14 +302,14 @@ class Teleoperation(OrderVerbs):
         self._waiting.ask(self.parameters.arc(self.bus))
 
     def _waits_for(self) -> tuple[str, float] | None:
-        return (self.parameters.robot, self._stick.asked_s) if self._stick.is_waiting else None
+        return (self.parameters.robot, self._claim.asked_s) if self._claim.is_waiting else None
 
     # ------------------------------------------------------------------ away, and single commands
     async def _go_away(self) -> None:
         """Let the robot go on with useful work while its operator is away."""
         self.leave()
         self._orders.away(f"{self.user} is away")
-        await self._stick.give_back(f"{self.user} is away", wanted=False)
+        await self._claim.give_back(f"{self.user} is away", wanted=False)
 
     async def _give(self, wish: GiveWish) -> None:
         await self.do(wish)
