@@ -19,14 +19,22 @@ from typing import ClassVar, Protocol
 
 import msgspec
 
-from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.log_level import LogLevel
 from backbone.component.messages import WrongParameter
-from backbone.errors import LinkError, Refusal
+from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
-from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules, complaint, hand_over
-from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from backbone.exchange_course import (
+    UNPROVED,
+    ExchangeCourse,
+    ExchangePhase,
+    ExchangeRules,
+    complaint,
+    hand_over,
+    remark_on_file,
+)
+from backbone.placer.messages import ReviseStart
+from backbone.placer.revising import revise_start
 from backbone.reading_anew import ReadAnew, WrongClass
 from backbone.waiting import set_within
 from resource_pool.driver_slot import DriverSlot, methods_of
@@ -35,7 +43,6 @@ from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions
 log = logging.getLogger(__name__)
 
 CLOSES_WITHIN_S = 2.0  # chosen: a device that does not close by then hangs; machine seconds
-REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
 
 
 class RcOfDrivers(Protocol):
@@ -271,30 +278,20 @@ class DriverExchanges:
                 return ""
         self._put_back(going)
         old, new = _path_of(going.old), going.asked.class_path
-        stays = "goes on" if going.course.switched_s is None else "is back"
-        self._tell(f"{old} {stays}, {new} failed: {going.course.cause}", LogLevel.WARNING)
+        self._tell(going.course.outcome(old, new), LogLevel.WARNING)
         await self._brought_up(going)
         if going.is_beside:
             await self._close(going.new)
-        is_same = old.partition(":")[0] == new.partition(":")[0]
-        return f"a new start of {self._rc.name} reads the file as it is now" if is_same else ""
+        return remark_on_file(self._rc.name, old, new)
 
     async def _proved(self, going: _DriverExchange) -> str:
         going.slot.is_tried, going.course.rounds = False, going.slot.calls
         self._rc.has_driver(going.parameters)
         if going.is_beside:
             await self._close(going.old)
-        after = f": {going.course.cause}" if going.course.cause else ""
-        state = "with the state of" if going.course.keeps_state else "from a fresh state instead of"
-        self._tell(f"{going.asked.class_path} goes on {state} {_path_of(going.old)}{after}")
+        self._tell(going.course.outcome(_path_of(going.old), going.asked.class_path))
         order = ReviseStart(self._rc.name, msgspec.to_builtins(self._rc.parameters))
-        try:
-            await self._rc.bus.ask(PLACER, order, StartRevised, within_s=REVISED_WITHIN_S)
-        except NotPlaced:  # started by hand
-            return ""
-        except (LinkError, Refusal) as error:
-            return f"a new start of {self._rc.name} has the old class again: {error}"
-        return ""
+        return await revise_start(self._rc.bus, order)
 
     async def _close(self, driver: object) -> None:
         """Close a driver that works no more; that it cannot is told, and changes nothing."""
