@@ -146,6 +146,11 @@ def remark_on_file(component: str, old: str, new: str) -> str:
     return f"a new start of {component} reads the file as it is now" if is_same else ""
 
 
+def class_path_of(one: object) -> str:
+    """Return where the class of a part stands, as ``package.module:Class``."""
+    return f"{type(one).__module__}:{type(one).__qualname__}"
+
+
 def hand_over(old: object, new: object) -> bool:
     """Let the new one go on with the attributes that both classes name in ``hands_over``; return whether they do.
 

@@ -24,7 +24,14 @@ import msgspec
 from backbone.component.log_level import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
-from backbone.exchange_course import ExchangeCourse, ExchangePhase, ExchangeRules, complaint, remark_on_file
+from backbone.exchange_course import (
+    ExchangeCourse,
+    ExchangePhase,
+    ExchangeRules,
+    class_path_of,
+    complaint,
+    remark_on_file,
+)
 from backbone.launcher.messages import TakeBranch
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
@@ -35,7 +42,6 @@ from mission_control.implementation import (
     Implementation,
     Load,
     check_exchangeable,
-    class_path_of,
     handed_over,
     made_beside,
 )

@@ -29,6 +29,7 @@ from backbone.exchange_course import (
     ExchangeCourse,
     ExchangePhase,
     ExchangeRules,
+    class_path_of,
     complaint,
     hand_over,
     remark_on_file,
@@ -172,7 +173,7 @@ class DriverExchanges:
             anew.undo()
             raise
         by = f" for {asked.user}" if asked.user else ""
-        self._tell(f"{asked.class_path} warms beside {_path_of(going.old)}{by}")
+        self._tell(f"{asked.class_path} warms beside {class_path_of(going.old)}{by}")
         await self._opened(going)
         if not going.course.is_over:
             await self._taken_over(going)
@@ -199,7 +200,7 @@ class DriverExchanges:
         if missing := methods_of(old) - methods_of(kind):
             raise WrongClass(
                 f"{asked.class_path} is no driver for {rc.name}: it lacks {', '.join(sorted(missing))}",
-                remedy=f"Give it the methods of {_path_of(old)}.",
+                remedy=f"Give it the methods of {class_path_of(old)}.",
             )
         options_type = getattr(kind, "options_type", NoOptions)
         has = {one.encode_name for one in msgspec.structs.fields(options_type)}
@@ -277,7 +278,7 @@ class DriverExchanges:
                 self._rc.fail(fault)  # its creator starts it again, and it opens the device
                 return ""
         self._put_back(going)
-        old, new = _path_of(going.old), going.asked.class_path
+        old, new = class_path_of(going.old), going.asked.class_path
         self._tell(going.course.outcome(old, new), LogLevel.WARNING)
         await self._brought_up(going)
         if going.is_beside:
@@ -289,7 +290,7 @@ class DriverExchanges:
         self._rc.has_driver(going.parameters)
         if going.is_beside:
             await self._close(going.old)
-        self._tell(going.course.outcome(_path_of(going.old), going.asked.class_path))
+        self._tell(going.course.outcome(class_path_of(going.old), going.asked.class_path))
         order = ReviseStart(self._rc.name, msgspec.to_builtins(self._rc.parameters))
         return await revise_start(self._rc.bus, order)
 
@@ -302,7 +303,7 @@ class DriverExchanges:
             async with asyncio.timeout(CLOSES_WITHIN_S):
                 await close()
         except UNPROVED as error:
-            log.warning("%s: %s does not close: %s", self._rc.name, _path_of(driver), complaint(error))
+            log.warning("%s: %s does not close: %s", self._rc.name, class_path_of(driver), complaint(error))
 
     def _now_s(self) -> float:
         return self._rc.clock.now_s()
@@ -318,7 +319,3 @@ async def _open(driver: object) -> None:
 
 async def _nothing() -> None:
     pass
-
-
-def _path_of(driver: object) -> str:
-    return f"{type(driver).__module__}:{type(driver).__qualname__}"
