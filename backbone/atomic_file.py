@@ -10,6 +10,7 @@ import contextlib
 import errno
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 
 from backbone.operating_system.file_locks import lock_alone_nowait
@@ -87,16 +88,25 @@ def _claim(path: Path, flags: int) -> int:
     Raises:
         BlockingIOError: Another writer holds it.
     """
+    return opened_locked(path, os.O_RDWR | os.O_NOFOLLOW | flags, 0o666, lock_alone_nowait)
+
+
+def opened_locked(path: Path, flags: int, mode: int, lock: Callable[[int], None]) -> int:
+    """Open the file that is at this path once it is locked, and return its descriptor.
+
+    Raises:
+        BlockingIOError: ``lock`` does not wait, and another process holds the file.
+    """
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC | flags, 0o666)
+        descriptor = os.open(path, os.O_CLOEXEC | flags, mode)
         try:
-            lock_alone_nowait(descriptor)
+            lock(descriptor)
             if is_at(descriptor, path):
                 return descriptor
         except BaseException:
             os.close(descriptor)
             raise
-        os.close(descriptor)  # its writer had finished before this one held it: the name is free again
+        os.close(descriptor)  # before this process held it, its writer had finished, or it was removed or replaced
 
 
 def is_at(descriptor: int, path: Path) -> bool:

@@ -126,6 +126,30 @@ class ExchangeCourse:
         times = switched_s - self.began_s, ended_s - switched_s
         return Swapped(is_proved, self.cause, self.keeps_state, *times, self.rounds, remark)
 
+    def outcome(self, old: str, new: str) -> str:
+        """Return for people how it ended.
+
+        Args:
+            old: Class path of the old one, as ``new`` of the new one.
+        """
+        if self.phase is ExchangePhase.RETURNED:
+            stays = "goes on" if self.switched_s is None else "is back"
+            return f"{old} {stays}, {new} failed: {self.cause}"
+        after = f": {self.cause}" if self.cause else ""
+        state = "with the state of" if self.keeps_state else "from a fresh state instead of"
+        return f"{new} goes on {state} {old}{after}"
+
+
+def remark_on_file(component: str, old: str, new: str) -> str:
+    """Return what an operator should know of an old class that is back; empty if the file of the new one is another."""
+    is_same = old.partition(":")[0] == new.partition(":")[0]
+    return f"a new start of {component} reads the file as it is now" if is_same else ""
+
+
+def class_path_of(one: object) -> str:
+    """Return where the class of a part stands, as ``package.module:Class``."""
+    return f"{type(one).__module__}:{type(one).__qualname__}"
+
 
 def hand_over(old: object, new: object) -> bool:
     """Let the new one go on with the attributes that both classes name in ``hands_over``; return whether they do.

@@ -334,7 +334,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         if taken.version >= self.tree_version:
             anew = taken.anew if taken.version > self.tree_version else []
             self.tree_version = taken.version
-            arc, self.parameters = self.parameters.arc, self._with_parameters(taken.place)
+            arc, self.parameters = self.parameters.arc, self.with_parameters(taken.place)
             before, nodes = set(self.child_nodes), {node.name: node for node in self.parameters.children}
             self._left = (self._left | before) - nodes.keys()
             self.child_nodes.clear()

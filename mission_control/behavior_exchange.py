@@ -21,13 +21,20 @@ from functools import partial
 
 import msgspec
 
-from backbone.addresses import PLACER
 from backbone.component.log_level import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
-from backbone.exchange_course import ExchangeCourse, ExchangePhase, ExchangeRules, complaint
+from backbone.exchange_course import (
+    ExchangeCourse,
+    ExchangePhase,
+    ExchangeRules,
+    class_path_of,
+    complaint,
+    remark_on_file,
+)
 from backbone.launcher.messages import TakeBranch
-from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from backbone.placer.messages import ReviseStart
+from backbone.placer.revising import revise_start
 from backbone.reading_anew import ReadAnew, WrongClass
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message
@@ -35,7 +42,6 @@ from mission_control.implementation import (
     Implementation,
     Load,
     check_exchangeable,
-    class_path_of,
     handed_over,
     made_beside,
 )
@@ -45,7 +51,6 @@ from resource_pool.arc_client import AskBeat, Resumed, Suspended
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 0.05  # chosen: a person sees no delay; seconds of the machine
-REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
 
 
 @dataclass(slots=True)
@@ -250,26 +255,16 @@ class BehaviorExchanges:
         anew.undo()
         await self._forget(going.new)
         old, new = class_path_of(going.old), going.asked.class_path
-        stays = "goes on" if going.course.switched_s is None else "is back"
-        self._tell(f"{old} {stays}, {new} failed: {going.course.cause}", LogLevel.WARNING)
-        is_same = old.partition(":")[0] == new.partition(":")[0]
-        return f"a new start of {going.old.launch.name} reads the file as it is now" if is_same else ""
+        self._tell(going.course.outcome(old, new), LogLevel.WARNING)
+        return remark_on_file(going.old.launch.name, old, new)
 
     async def _proved(self, going: _BehaviorExchange) -> str:
         await self._forget(going.old)
         going.course.rounds = going.new.gate.commands
-        after = f": {going.course.cause}" if going.course.cause else ""
-        state = "with the state of" if going.course.keeps_state else "from a fresh state instead of"
-        self._tell(f"{going.asked.class_path} goes on {state} {class_path_of(going.old)}{after}")
+        self._tell(going.course.outcome(class_path_of(going.old), going.asked.class_path))
         new = going.new
         order = ReviseStart(new.launch.name, msgspec.to_builtins(new.parameters), going.asked.class_path)
-        try:
-            await new.gate.bus.ask(PLACER, order, StartRevised, within_s=REVISED_WITHIN_S)
-        except NotPlaced:  # started by hand
-            return ""
-        except (LinkError, Refusal) as error:
-            return f"a new start of {new.launch.name} has the old class again: {error}"
-        return ""
+        return await revise_start(new.gate.bus, order)
 
     async def _forget(self, one: Implementation) -> None:
         life = self._lives[one]

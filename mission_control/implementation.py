@@ -11,11 +11,11 @@ from typing import ClassVar, Protocol, Self
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import WrongParameter
 from backbone.component.launch import Launch
 from backbone.component.log_level import LogLevel
+from backbone.component.messages import WrongParameter
 from backbone.exchange import NotExchanged, SwapClass
-from backbone.exchange_course import UNPROVED, complaint, hand_over
+from backbone.exchange_course import UNPROVED, class_path_of, complaint, hand_over
 from backbone.reading_anew import WrongClass
 from backbone.wire import Accepts
 from mission_control.behavior_tree import BehaviorNode
@@ -136,8 +136,3 @@ def handed_over(old: Implementation, new: Implementation) -> bool:
     if any(had.get(name, value) != value for name, value in given.items()):
         new.parameters_changed()
     return is_kept
-
-
-def class_path_of(one: object) -> str:
-    """Return where the class of an implementation stands."""
-    return f"{type(one).__module__}:{type(one).__qualname__}"

@@ -19,14 +19,23 @@ from typing import ClassVar, Protocol
 
 import msgspec
 
-from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import WrongParameter
 from backbone.component.log_level import LogLevel
-from backbone.errors import LinkError, Refusal
+from backbone.component.messages import WrongParameter
+from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
-from backbone.exchange_course import UNPROVED, ExchangeCourse, ExchangePhase, ExchangeRules, complaint, hand_over
-from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from backbone.exchange_course import (
+    UNPROVED,
+    ExchangeCourse,
+    ExchangePhase,
+    ExchangeRules,
+    class_path_of,
+    complaint,
+    hand_over,
+    remark_on_file,
+)
+from backbone.placer.messages import ReviseStart
+from backbone.placer.revising import revise_start
 from backbone.reading_anew import ReadAnew, WrongClass
 from backbone.waiting import set_within
 from resource_pool.driver_slot import DriverSlot, methods_of
@@ -35,7 +44,6 @@ from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions
 log = logging.getLogger(__name__)
 
 CLOSES_WITHIN_S = 2.0  # chosen: a device that does not close by then hangs; machine seconds
-REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
 
 
 class RcOfDrivers(Protocol):
@@ -165,7 +173,7 @@ class DriverExchanges:
             anew.undo()
             raise
         by = f" for {asked.user}" if asked.user else ""
-        self._tell(f"{asked.class_path} warms beside {_path_of(going.old)}{by}")
+        self._tell(f"{asked.class_path} warms beside {class_path_of(going.old)}{by}")
         await self._opened(going)
         if not going.course.is_over:
             await self._taken_over(going)
@@ -192,7 +200,7 @@ class DriverExchanges:
         if missing := methods_of(old) - methods_of(kind):
             raise WrongClass(
                 f"{asked.class_path} is no driver for {rc.name}: it lacks {', '.join(sorted(missing))}",
-                remedy=f"Give it the methods of {_path_of(old)}.",
+                remedy=f"Give it the methods of {class_path_of(old)}.",
             )
         options_type = getattr(kind, "options_type", NoOptions)
         has = {one.encode_name for one in msgspec.structs.fields(options_type)}
@@ -270,31 +278,21 @@ class DriverExchanges:
                 self._rc.fail(fault)  # its creator starts it again, and it opens the device
                 return ""
         self._put_back(going)
-        old, new = _path_of(going.old), going.asked.class_path
-        stays = "goes on" if going.course.switched_s is None else "is back"
-        self._tell(f"{old} {stays}, {new} failed: {going.course.cause}", LogLevel.WARNING)
+        old, new = class_path_of(going.old), going.asked.class_path
+        self._tell(going.course.outcome(old, new), LogLevel.WARNING)
         await self._brought_up(going)
         if going.is_beside:
             await self._close(going.new)
-        is_same = old.partition(":")[0] == new.partition(":")[0]
-        return f"a new start of {self._rc.name} reads the file as it is now" if is_same else ""
+        return remark_on_file(self._rc.name, old, new)
 
     async def _proved(self, going: _DriverExchange) -> str:
         going.slot.is_tried, going.course.rounds = False, going.slot.calls
         self._rc.has_driver(going.parameters)
         if going.is_beside:
             await self._close(going.old)
-        after = f": {going.course.cause}" if going.course.cause else ""
-        state = "with the state of" if going.course.keeps_state else "from a fresh state instead of"
-        self._tell(f"{going.asked.class_path} goes on {state} {_path_of(going.old)}{after}")
+        self._tell(going.course.outcome(class_path_of(going.old), going.asked.class_path))
         order = ReviseStart(self._rc.name, msgspec.to_builtins(self._rc.parameters))
-        try:
-            await self._rc.bus.ask(PLACER, order, StartRevised, within_s=REVISED_WITHIN_S)
-        except NotPlaced:  # started by hand
-            return ""
-        except (LinkError, Refusal) as error:
-            return f"a new start of {self._rc.name} has the old class again: {error}"
-        return ""
+        return await revise_start(self._rc.bus, order)
 
     async def _close(self, driver: object) -> None:
         """Close a driver that works no more; that it cannot is told, and changes nothing."""
@@ -305,7 +303,7 @@ class DriverExchanges:
             async with asyncio.timeout(CLOSES_WITHIN_S):
                 await close()
         except UNPROVED as error:
-            log.warning("%s: %s does not close: %s", self._rc.name, _path_of(driver), complaint(error))
+            log.warning("%s: %s does not close: %s", self._rc.name, class_path_of(driver), complaint(error))
 
     def _now_s(self) -> float:
         return self._rc.clock.now_s()
@@ -321,7 +319,3 @@ async def _open(driver: object) -> None:
 
 async def _nothing() -> None:
     pass
-
-
-def _path_of(driver: object) -> str:
-    return f"{type(driver).__module__}:{type(driver).__qualname__}"

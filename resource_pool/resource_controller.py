@@ -316,7 +316,7 @@ class ResourceController(Component[R], Generic[R]):
 
     def has_driver(self, parameters: msgspec.Struct) -> None:
         """Apply the parameters with another driver, which works already."""
-        self.parameters = self._in_force = self._with_parameters(msgspec.to_builtins(parameters))
+        self.parameters = self._in_force = self.with_parameters(msgspec.to_builtins(parameters))
 
     def publish_news(self) -> None:
         """Publish the holders, too."""

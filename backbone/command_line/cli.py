@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
+from backbone.command_line.asking_commands import log, story, why
 from backbone.command_line.module_commands import swap
 from backbone.command_line.options import (
     AsJson,
@@ -23,12 +24,10 @@ from backbone.command_line.options import (
     Endpoint,
     MissionFile,
     MissionName,
-    NameOrCause,
     SecretFile,
     Version,
     chosen,
     complete_name,
-    complete_person,
     complete_resource,
     complete_type,
     finite,
@@ -41,7 +40,6 @@ from backbone.command_line.options import (
 from backbone.command_line.recording_commands import compare, inject, record, recording, replay, top, watch
 from backbone.command_line.tool_commands import bridge, metrics
 from backbone.command_line.tree_commands import tree
-from backbone.component.log_level import LogLevel
 from backbone.launcher.endings import ExitCode, say
 from backbone.spoken import counted
 
@@ -62,7 +60,6 @@ LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes secon
 LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer time is a typing error
 MOST_SEEDS = 1_000_000  # chosen: a day of work
 LARGEST_SEED = 2**32 - 1  # the limit of numpy
-MOST_EVENTS = 10_000  # as in mission_log
 PIPE_WIDTH = 180  # chosen: no table is wider, so files and pipes get whole tables
 
 
@@ -242,64 +239,9 @@ def load(
     run(lambda: print_loads(where, for_s, as_json=as_json, width=_width()))
 
 
-@app.command()
-def why(
-    name: NameOrCause,
-    as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
-    """Explain why a request waits or runs, until when, and why a component is on its host."""
-    from backbone.command_line.asking import print_reasons
-
-    where = chosen(mission, connect, secret_file)
-    run(lambda: print_reasons(where, name, as_json=as_json))
-
-
-@app.command()
-def story(
-    name: NameOrCause,
-    as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
-    """Print the events about a component, request or resource, with their causes."""
-    from backbone.command_line.asking import print_story
-
-    where = chosen(mission, connect, secret_file)
-    run(lambda: print_story(where, name, as_json=as_json))
-
-
-@app.command()
-def log(
-    since: Annotated[
-        str, typer.Option("--since", help="Not before: 5m (s, m, h, d ago), 14:05 (time of day), 123.4 (mission time).")
-    ] = "0",
-    until: Annotated[str, typer.Option("--until", help="Not after; as --since.")] = "",
-    robot: Annotated[
-        str, typer.Option("--robot", autocompletion=complete_resource, help="Only events about this robot, or name.")
-    ] = "",
-    person: Annotated[
-        str, typer.Option("--person", autocompletion=complete_person, help="Only actions and mentions of this person.")
-    ] = "",
-    level: Annotated[LogLevel, typer.Option("--level", help="Only events of at least this level.")] = LogLevel.INFO,
-    text: Annotated[str, typer.Option("--text", help="Only events that contain this text.")] = "",
-    most: Annotated[
-        int, typer.Option("--most", min=1, max=MOST_EVENTS, help="Largest number of events, the newest.")
-    ] = 1_000,
-    as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
-    """Print the events of the mission and the actions of people: the newest that match, oldest first."""
-    from backbone.command_line.asking import print_log
-    from backbone.mission_log.question import LogQuestion
-
-    where, question = chosen(mission, connect, secret_file), LogQuestion(text, robot, person, level, since, until)
-    run(lambda: print_log(where, question, most, as_json=as_json))
+app.command()(why)
+app.command()(story)
+app.command()(log)
 
 
 @app.command()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import gc
 import json
-import os
 import signal
 import socket
 import sys
@@ -33,13 +32,13 @@ from backbone.keys import Conversation
 from backbone.launcher import mission_connection
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.messages import AskTree, Tree
+from backbone.launcher.recorder_beats import RecorderBeats, address_of_recorder
 from backbone.launcher.recorder_signs import RecorderSigns
 from backbone.mission_log.lines import event_json, story_lines
 from backbone.mission_log.log import MissionLog
 from backbone.mission_log.operators import OperatorActed, login_name
 from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
-from backbone.naming import Subsystem, address
 from backbone.operating_system.own_process import go_behind_others
 from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
@@ -92,8 +91,8 @@ async def record_to(
     where: Where, to: Path | None, keys: list[str], for_s: float | None, splitting: Splitting, told: OfLauncher
 ) -> ExitCode:
     """Record the mission until a signal or the time ends it, the disc is full, or the mission has ended."""
-    source = address(Subsystem.BACKBONE, f"recorder-{os.getpid()}")
-    async with mission_connection.connected(where.mission, where.connect, source, where.secret()) as (bus, clock):
+    own = address_of_recorder()
+    async with mission_connection.connected(where.mission, where.connect, own, where.secret()) as (bus, clock):
         path = to or Path(f"{bus.mission}-{datetime.now():%Y%m%d-%H%M%S}.mcap")
         if told.is_described:
             said = json.load(sys.stdin)
@@ -119,11 +118,13 @@ async def record_to(
             )
             with suppress(OSError):
                 go_behind_others()  # who decides goes before who records
-            if told.host_folder is not None:
-                recorder.on_flushed = RecorderSigns().give
+            beats = RecorderBeats(bus, path) if told.host_folder is None else None  # else its starter watches it
+            recorder.on_flushed = beats.give if beats is not None else RecorderSigns().give
             gc.collect()
             gc.freeze()  # else the collector looks through all that was imported again and again
             await _run(recorder, path, for_s, ends_with_input=told.host_only)
+            if beats is not None:
+                beats.end()
     say(f"{path}: {counted(recorder.written, 'message')}")
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")

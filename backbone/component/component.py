@@ -12,79 +12,41 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import time
 from collections.abc import Coroutine, Mapping
 from typing import ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
-from backbone.addresses import NAMESERVER
 from backbone.authentication import secret_of
-from backbone.bus.clock import VirtualClock
 from backbone.bus.host_boards import boards_for
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.abilities import NO_ABILITIES, Abilities
-from backbone.component.asking import ask_until_answered
+from backbone.component.common_answers import CommonAnswers
 from backbone.component.launch import Launch
 from backbone.component.messages import (
-    MESSAGES_DROPPED,
-    PROCESSOR_S,
     Absence,
-    AskParameters,
-    AskState,
-    AskStatistics,
-    AskStory,
-    AskTime,
     CommonQuestion,
     ComponentState,
     LifeState,
     LogLevel,
-    MissionTime,
-    NameTaken,
-    Parameters,
-    Register,
-    Registered,
-    SetParameter,
     StandingStop,
-    Statistics,
-    Stop,
-    Stopping,
-    Story,
+    WrongParameter,
 )
-from backbone.component.story import StoryBook
+from backbone.component.name_claim import claim_name
+from backbone.component.story import StoryBook, complaint
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
-from backbone.naming import claim_address
-from backbone.operating_system.processes import exists
-from backbone.spoken import value_text
+from backbone.waiting import first_of
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
 
-MAX_FEEDBACK_LENGTH = 500  # chosen: a line for people, not a trace
-REGISTER_WITHIN_S = 10.0  # chosen: a restarted hub is back long before, even on a busy machine
 CALM_S = 0.02  # chosen: longer than a context switch, which must not wait for published news; people see no difference
-REGISTER_AGAIN_S = 0.1  # chosen: the nameserver forgets a name without a claim after a second
-REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
-
-
-class OtherIncarnation(Refusal):
-    """The order is for another incarnation of this address: another host or another process."""
-
-    code = "component.incarnation"
-    remedy = "Nothing to do: the order is for another incarnation."
 
 
 class NoParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """For components without parameters."""
-
-
-class WrongParameter(Refusal):
-    """A parameter of that name does not exist, or the value does not fit it."""
-
-    code = "component.parameter"
-    remedy = "Ask the component for its parameters; use one of those names with a value of its type."
 
 
 P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
@@ -245,6 +207,19 @@ class Component(Generic[P_co]):
         """Present state of the component's life cycle."""
         return self._state
 
+    def with_parameters(self, changed: Mapping[str, object]) -> P_co:
+        """Return the parameters with other values for these, or raise ``WrongParameter``."""
+        return cast(P_co, _convert({**msgspec.to_builtins(self.parameters), **changed}, self.parameters_type))
+
+    def change_parameters(self, changed: Mapping[str, object]) -> None:
+        """Put other values for these in force, unless they do not fit or ``parameters_changed`` refuses them."""
+        before, self.parameters = self.parameters, self.with_parameters(changed)
+        try:
+            self.parameters_changed()
+        except Refusal:
+            self.parameters = before
+            raise
+
     def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         """Run the coroutine beside ``serve``, until the component ends; its bug is the component's bug.
 
@@ -288,7 +263,7 @@ class Component(Generic[P_co]):
         """End because of a bug; ``run`` raises it."""
         if self._bug is None:
             self._bug = bug
-            self.feedback = _complaint(bug)
+            self.feedback = complaint(bug)
             self.story.note(self.name, f"failed: {self.feedback}")
             is_refusal = isinstance(bug, BackboneError)  # its detail says more than a traceback
             log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_refusal else bug)
@@ -333,32 +308,8 @@ class Component(Generic[P_co]):
             raise self._bug
 
     async def _claim_name(self) -> None:
-        """Register the name and declare its claim, so that the nameserver also sees a death before readiness."""
-        if not self.registers:
-            return
-        state, until_s = self.component_state(), self.clock.now_s() + REGISTER_WITHIN_S * self.clock.rate
-        while True:
-            try:
-                await ask_until_answered(
-                    self.bus,
-                    self.clock,
-                    NAMESERVER,
-                    Register(state),
-                    Registered,
-                    each_s=REGISTER_EACH_S,
-                    within_s=REGISTER_WITHIN_S,
-                )
-                break
-            except NameTaken as taken:
-                if not self._is_of_the_dead(taken) or self.clock.now_s() >= until_s:
-                    raise
-            await self.clock.sleep_s(REGISTER_AGAIN_S * self.clock.rate)
-        self.bus.declare_alive(claim_address(state.address, state.host, state.pid))
-
-    def _is_of_the_dead(self, taken: NameTaken) -> bool:
-        """Return whether the name belongs to a process of this host that was killed before it declared its claim."""
-        pid = taken.facts.get("pid", 0)
-        return taken.facts.get("host") == self.launch.host and isinstance(pid, int) and pid > 0 and not exists(pid)
+        if self.registers:
+            await claim_name(self.bus, self.clock, self.component_state())
 
     async def _live_and_report_end(self) -> None:
         try:
@@ -366,7 +317,7 @@ class Component(Generic[P_co]):
         except Exception as bug:
             self.fail(bug)
         if self._bug is not None:
-            self.feedback = _complaint(self._bug)  # draining may have reported something else
+            self.feedback = complaint(self._bug)  # draining may have reported something else
         self._enter(LifeState.FAILED if self._bug is not None else LifeState.STOPPED)
         if self._token is not None:
             self._token.close()
@@ -395,9 +346,8 @@ class Component(Generic[P_co]):
             await self.drain()
 
     async def _serve_until_end(self) -> None:
-        self.bus.serve(
-            self.address, CommonQuestion if self.accepts is None else CommonQuestion | self.accepts, self._answer
-        )
+        accepted = CommonQuestion if self.accepts is None else CommonQuestion | self.accepts
+        self.bus.serve(self.address, accepted, CommonAnswers(self).answer)
         self.start_task(self.serve(), "serve")
         self.start_task(self._publish_when_calm(), "publish")
         self._enter(LifeState.READY)
@@ -417,13 +367,7 @@ class Component(Generic[P_co]):
             work.close()
             return False
         working = asyncio.create_task(work, name=f"{self.name}:{name}")
-        ending = asyncio.create_task(self._end.wait(), name=f"{self.name}:end")
-        try:
-            await asyncio.wait({working, ending}, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            working.cancel()
-            ending.cancel()
-            await asyncio.wait({working, ending})
+        await first_of(working, self._end.wait())
         return not working.cancelled() and working.result() is None
 
     def _enter(self, state: LifeState) -> None:
@@ -442,62 +386,9 @@ class Component(Generic[P_co]):
         self._state_published = self.component_state()
         self.bus.publish(self.address, Conversation.STATUS, self._state_published)
 
-    async def _answer(self, asked: Envelope[Message]) -> Message:
-        match asked.body:
-            case AskState():
-                return self.component_state()
-            case AskTime():
-                return MissionTime(self.clock.now_s(), self.clock.rate, time.time())
-            case AskStatistics():
-                bus = {
-                    f"bus_{name}": float(value) for name, value in msgspec.structs.asdict(self.bus.statistics()).items()
-                }
-                is_virtual = isinstance(self.clock, VirtualClock)  # a mission on virtual time is the same each time
-                process = {} if is_virtual else {PROCESSOR_S: time.process_time()}
-                dropped = {f"{MESSAGES_DROPPED}{key}": float(count) for key, count in self.bus.dropped().items()}
-                return Statistics({**bus, **process, **dropped, **self.statistics()})
-            case AskParameters():
-                return Parameters(msgspec.to_builtins(self.parameters))
-            case SetParameter(name=name, value=value, user=user):
-                return self._set_parameter(name, value, user or asked.source)
-            case AskStory(subject=subject):
-                return Story(self.story.of(subject))
-            case Stop(incarnation=meant) if meant not in ("", self.launch.incarnation):
-                raise OtherIncarnation(f"{self.address} lives as {self.launch.incarnation}, not {meant}", meant=meant)
-            case Stop(reason=reason):
-                self.end(reason or f"stopped by {asked.source}")
-                return Stopping()
-            case _:
-                return await self.answer(asked)
-
-    def _set_parameter(self, name: str, value: object, user: str) -> Parameters:
-        old = msgspec.to_builtins(self.parameters)
-        if name not in old:
-            raise WrongParameter(f"{self.name} has no parameter {name!r}; it has: {', '.join(sorted(old)) or 'none'}")
-        before, self.parameters = self.parameters, self._with_parameters({name: value})
-        try:
-            self.parameters_changed()
-        except Refusal:
-            self.parameters = before
-            raise
-        self.story.note(name, f"{user} set {name} from {value_text(old[name])} to {value_text(value)}")
-        return Parameters(msgspec.to_builtins(self.parameters))
-
-    def _with_parameters(self, changed: Mapping[str, object]) -> P_co:
-        """Return the parameters with other values for these.
-
-        Raises:
-            WrongParameter: The values do not fit.
-        """
-        return cast(P_co, _convert({**msgspec.to_builtins(self.parameters), **changed}, self.parameters_type))
-
 
 AnyComponent = Component[msgspec.Struct]
 """A component whose kind of parameters does not matter."""
-
-
-def _complaint(bug: BaseException) -> str:
-    return f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]
 
 
 def _convert(values: dict[str, object], kind: type[msgspec.Struct]) -> msgspec.Struct:

@@ -19,7 +19,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from backbone.atomic_file import is_at, write_all
+from backbone.atomic_file import is_at, opened_locked, write_all
 from backbone.component.repeats import Repeats
 from backbone.operating_system.file_locks import lock_alone_nowait, lock_together
 from backbone.printable_text import printable_lines
@@ -203,16 +203,7 @@ def _remove_ended(path: Path) -> bool:
 
 def _open(path: Path) -> int:
     """Open the file for appending with a shared lock and return its descriptor."""
-    while True:
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
-        try:
-            lock_together(descriptor)
-            if is_at(descriptor, path):
-                return descriptor
-        except BaseException:
-            os.close(descriptor)
-            raise
-        os.close(descriptor)  # it was removed or replaced before this process held it
+    return opened_locked(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600, lock_together)
 
 
 def _turn_output_to(descriptor: int) -> None:

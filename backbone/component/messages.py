@@ -221,4 +221,18 @@ class Stopping(Message, frozen=True):
     """Answer to ``Stop``: the component is ending."""
 
 
+class OtherIncarnation(Refusal):
+    """The order is for another incarnation of this address: another host or another process."""
+
+    code = "component.incarnation"
+    remedy = "Nothing to do: the order is for another incarnation."
+
+
+class WrongParameter(Refusal):
+    """A parameter of that name does not exist, or the value does not fit it."""
+
+    code = "component.parameter"
+    remedy = "Ask the component for its parameters; use one of those names with a value of its type."
+
+
 CommonQuestion = AskState | AskTime | AskStatistics | AskParameters | SetParameter | AskStory | Stop

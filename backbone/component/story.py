@@ -13,6 +13,7 @@ from backbone.printable import printable_all
 from backbone.ranges import LONGEST_MENTION
 
 LENGTH = 512  # chosen: some minutes of a busy component, under 100 kB
+MAX_FEEDBACK_LENGTH = 500  # chosen: a line for people, not a trace
 LONGEST_WHAT = 1_000  # chosen: a refusal with its remedy; 512 of them are half a megabyte
 
 
@@ -64,3 +65,8 @@ def speaks_of(text: str, name: str) -> bool:
 @lru_cache(maxsize=64)
 def _spoken_of(name: str) -> re.Pattern[str]:
     return re.compile(rf"(?<![\w-]){re.escape(name)}(?![\w-])")
+
+
+def complaint(bug: BaseException) -> str:
+    """Return a bug as one line for people."""
+    return f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]

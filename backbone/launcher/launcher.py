@@ -19,12 +19,12 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel, Stop, Stopping
-from backbone.component.peer_monitor import PeerMonitor
-from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnded, Processes, ProcessFell, StartFailed
+from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnded, Processes, ProcessFell
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
 from backbone.launcher.ending_messages import AwaitLastBranch, EndMission, LastBranchOver, MissionEnding
+from backbone.launcher.hand_recorders import HandRecorderWatch
 from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch, ends_before
 from backbone.launcher.last_run import run_last
@@ -34,23 +34,21 @@ from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.tree_keeper import TreeKeeper
+from backbone.launcher.wish_keeper import WishKeeper
 from backbone.mission.behavior_orders import behavior_orders, last_order
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
-from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
-from backbone.placer.wishes import Wish, keep_placed
-from backbone.waiting import end_tasks, first_of
+from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
+from backbone.waiting import first_of
 from backbone.wire import Accepts, Envelope, Message
 
 log = logging.getLogger(__name__)
 
 STOP_TIME_S = 10.0  # chosen: request, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
 LISTING_TIME_S = 1.0  # chosen: a thousand round trips
-MEET_TIME_S = 5.0  # chosen: the placer knows a creator milliseconds after its token rises, on a busy machine later
-MEET_EACH_S = 0.1  # chosen: too short to notice, and a hundred times the cost of a question
 
 
 class Launcher(Component[NoParameters]):
@@ -77,23 +75,22 @@ class Launcher(Component[NoParameters]):
         self._recorder = recorder
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
-        self._wishes: list[Wish] = []
-        self._keeping: dict[str, asyncio.Task[None]] = {}
+        self._others = OtherHosts(description, clock.now_s(), options.record)
+        self._wishes = WishKeeper(self, description, self._others, self._newest)
         self._tree = TreeKeeper(
             bus,
             clock,
             description,
             options.text,
-            begin_root=self._begin_root,
-            leave_root=self._leave_root,
+            begin_root=self._wishes.begin_root,
+            leave_root=self._wishes.leave_root,
             begin=self.start_task,
             note=self.story.note,
         )
-        self._awaited: set[str] = set()
         self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
+        self._hand_recorders = HandRecorderWatch(bus, clock, self._is_deaf, self._hand_recorder_changed)
         self._log = LogKeeper(bus)
         self.outcome = Outcome()
-        self._others = OtherHosts(description, clock.now_s(), options.record)
         self._others_changed = asyncio.Event()
         self._last = LastBranch(description.last)
         self._last_begins, self._last_is_over = asyncio.Event(), asyncio.Event()
@@ -112,6 +109,7 @@ class Launcher(Component[NoParameters]):
     async def serve(self) -> None:
         """Start the mission through the placer and keep it running; publish its health."""
         self.start_task(self._health_watch.run(), "health")
+        self.start_task(self._hand_recorders.run(), "recorders by hand")
         if self._recorder is not None:
             self._recorder.on_changed = self._recorder_changed
             self.start_task(self._recorder.keep(), "recorder")
@@ -134,9 +132,19 @@ class Launcher(Component[NoParameters]):
         if not watching.cancelled():
             watching.result()
 
+    def _newest(self, order: Start) -> Start:
+        return self._tree.newest(order)
+
     def _recorder_changed(self, line: str) -> None:
         self.publish_event(self._description.name, line, LogLevel.WARNING)
         self.changed()
+
+    def _hand_recorder_changed(self, name: str, what: str) -> None:
+        self.publish_event(name, what, LogLevel.WARNING)
+        self.changed()
+
+    def _is_deaf(self) -> bool:
+        return any(absence.name == component_of(NAMESERVER) for absence in self._keeper.absences())
 
     async def _end_after(self, mission_s: float) -> None:
         await self.clock.sleep_s(mission_s)
@@ -194,17 +202,18 @@ class Launcher(Component[NoParameters]):
 
     def _own_absences(self) -> list[Absence]:
         core = [msgspec.structs.replace(absence, vital=True) for absence in self._keeper.absences()]
-        mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
+        mission = self._wishes.absences()
         if self.outcome.ready_after_s is None:
             mission.append(Absence(self._description.name, 0.0, "the mission is coming up", self._being_started()))
         lost = self._recorder.absence() if self._recorder is not None else None
-        return [*core, *mission, *self._others.absences(), *([lost] if lost is not None else [])]
+        recorders = [*([lost] if lost is not None else []), *self._hand_recorders.absences()]
+        return [*core, *mission, *self._others.absences(), *recorders]
 
     def _being_started(self) -> str:
         """Return the components for which the start waits, with their feedback."""
         processes = self._health_watch.picture.processes
-        doing = {name: processes[name].doing for name in self._awaited if name in processes}
-        starts = [f"{name} ({doing[name]})" if doing.get(name) else name for name in sorted(self._awaited)]
+        doing = {name: processes[name].doing for name in self._wishes.awaited if name in processes}
+        starts = [f"{name} ({doing[name]})" if doing.get(name) else name for name in sorted(self._wishes.awaited)]
         return f"starts {', '.join(starts)}" if starts else "starts its services"
 
     async def drain(self) -> None:
@@ -257,99 +266,14 @@ class Launcher(Component[NoParameters]):
         async with self._step(
             "simulated world and resource controllers" if description.components else "resource controllers"
         ):
-            await self._start_all(hardware)
+            await self._wishes.start_all(hardware)
         if description.units:
             async with self._step("execution units"):
-                await self._start_all(
+                await self._wishes.start_all(
                     [Start(u.type, u.name, u.parameters, u.host, process=u.process) for u in description.units]
                 )
         async with self._step("behaviors"):
-            await self._start_all(behavior_orders(description))
-
-    async def _start_all(self, orders: list[Start]) -> None:
-        """Start all components and keep them running; return when all run.
-
-        Raises:
-            Refusal: The first refusal of a start.
-        """
-        await asyncio.gather(*map(self._begin_keeping, orders))
-
-    def _begin_keeping(self, order: Start) -> asyncio.Future[None]:
-        """Keep the component running from now on; the result is there when it runs, or is its refusal."""
-        placed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._keeping[order.name] = self.start_task(self._keep(order, placed), f"keep {order.name}")
-        return placed
-
-    async def _begin_root(self, order: Start) -> None:
-        """Start a root that came into the tree.
-
-        Raises:
-            Refusal: It was not started, and is not wanted.
-        """
-        try:
-            await self._begin_keeping(order)
-        except Refusal:
-            await self._leave_root(order.name)
-            raise
-
-    async def _leave_root(self, name: str) -> None:
-        """Want a root no longer."""
-        if (keeping := self._keeping.pop(name, None)) is not None:
-            await end_tasks(keeping)
-        self._awaited.discard(name)
-        self.changed()
-
-    async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
-        """Keep one wish of the mission file; an order to stop suspends it until the component is started again."""
-
-        def now_placed(_placement: Placement, _was_there: bool) -> None:
-            self._awaited.discard(order.name)
-            if not placed.done():
-                placed.set_result(None)
-
-        self._awaited.add(order.name)
-        subsystem = next(each.subsystem for each in self._description.types if each.name == order.type)
-        component = address(subsystem, order.name)
-        while True:
-            wish = Wish(order.name, started=placed.done())
-            self._wishes.append(wish)
-            try:
-                stopped = await self._keep_placed(wish, order, component, now_placed)
-            except Refusal as refusal:
-                placed.set_exception(refusal)
-                return
-            finally:
-                self._wishes.remove(wish)
-            if not placed.done():  # stopped before it ran: the bring-up does not wait for it
-                placed.set_result(None)
-            self._awaited.discard(order.name)
-            self.publish_event(order.name, f"is not wanted any more: {stopped}")
-            monitor = PeerMonitor(self.bus, component)
-            try:
-                await monitor.wait_there()
-            finally:
-                monitor.close()
-
-    async def _keep_placed(
-        self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
-    ) -> str:
-        """Keep it placed; repeat a refused start while another machine is missing or is new to the placer."""
-
-        def newest() -> Start:
-            return self._tree.newest(order)
-
-        until_s = time.monotonic() + MEET_TIME_S
-        while True:
-            try:
-                return await keep_placed(
-                    self.bus, self.clock, wish, newest, at, on_placed=now_placed, on_changed=self.changed
-                )
-            except (NoHost, StartFailed):
-                if not self._others.names or (not self._others.missing and time.monotonic() >= until_s):
-                    raise
-            if self._others.missing:
-                until_s = time.monotonic() + MEET_TIME_S
-            await self.clock.sleep_s(MEET_EACH_S * self.clock.rate)
+            await self._wishes.start_all(behavior_orders(description))
 
     # ------------------------------------------------------------------ stop
     async def _run_last(self, reason: str) -> None:
@@ -366,13 +290,8 @@ class Launcher(Component[NoParameters]):
         self.report(self._last.doing)
         self._observer.announce(self._last.doing)
         self.publish_event(order.name, "begins: the mission ends with this branch", LogLevel.NOTICE)
-        wish, at = Wish(order.name), address(Subsystem.MISSION_CONTROL, order.name)
-        self._wishes.append(wish)
-        try:
-            keeping = self._keep_placed(wish, order, at, lambda _placement, _was_there: None)
-            await run_last(self._last, self.bus, self.clock, at, keeping, until_s)
-        finally:
-            self._wishes.remove(wish)
+        at = address(Subsystem.MISSION_CONTROL, order.name)
+        await run_last(self._last, self.bus, self.clock, at, self._wishes.keep_once(order, at), until_s)
         self.end(reason)
 
     async def _stop_consoles(self) -> None:

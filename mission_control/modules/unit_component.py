@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, ClassVar
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import Component, WrongParameter
+from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import WrongParameter
 from backbone.debug_views import ListViews, LookAt
 from backbone.exchange import SwapModule
 from backbone.keys import Conversation

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import msgspec
 
-from backbone.addresses import PLACER
 from backbone.component.component import Component
 from backbone.component.log_level import LogLevel
-from backbone.errors import LinkError, Refusal
+from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
-from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, complaint
+from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, complaint, remark_on_file
 from backbone.naming import did_you_mean
-from backbone.placer.messages import NotPlaced, ReviseStart, StartRevised
+from backbone.placer.messages import ReviseStart
+from backbone.placer.revising import revise_start
 from backbone.reading_anew import ReadAnew
 from mission_control.modules.choice import SourceChoice
 from mission_control.modules.exchange import Exchange
@@ -25,7 +25,6 @@ from mission_control.modules.graph import Graph
 from mission_control.modules.module import UNSEEN, Module
 from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, load_module_class
 
-REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
 LEAST_WAIT_S = 0.01  # chosen: a round that runs in a thread when its exchange's time is over ends soon
 
 
@@ -160,34 +159,18 @@ class UnitExchanges:
 
     def _returned(self, candidate: _Candidate, exchange: Exchange) -> Swapped:
         old, new = candidate.before.class_path, candidate.order.class_path
-        stays = "goes on" if exchange.switched_s is None else "is back"
-        self._tell(candidate.asked, f"{old} {stays}, {new} failed: {exchange.cause}", LogLevel.WARNING)
-        is_same = old.partition(":")[0] == new.partition(":")[0]
-        remark = f"a new start of {self._component.name} reads the file as it is now" if is_same else ""
-        return exchange.answer(self._component.clock.now_s(), remark)
+        self._tell(candidate.asked, exchange.outcome(old, new), LogLevel.WARNING)
+        return exchange.answer(self._component.clock.now_s(), remark_on_file(self._component.name, old, new))
 
     async def _proved(self, candidate: _Candidate, wanted: WantedExchange) -> Swapped:
         name, component, exchange = candidate.asked.module, self._component, wanted.exchange
         self._modules[name], self._graph = candidate.new, wanted.graph
         modules = [candidate.order if one.name == name else one for one in component.parameters.modules]
         self._exchanged(modules)
-        after = f": {exchange.cause}" if exchange.cause else ""
-        state = "with the state of" if exchange.keeps_state else "from a fresh state instead of"
-        told = f"{candidate.order.class_path} goes on {state} {candidate.before.class_path}{after}"
+        told = exchange.outcome(candidate.before.class_path, candidate.order.class_path)
         self._tell(candidate.asked, told, LogLevel.NOTICE)
-        return exchange.answer(component.clock.now_s(), await self._revised())
-
-    async def _revised(self) -> str:
-        """Have the next life of the component begin with the new class; return what an operator should know."""
-        component = self._component
         order = ReviseStart(component.name, msgspec.to_builtins(component.parameters))
-        try:
-            await component.bus.ask(PLACER, order, StartRevised, within_s=REVISED_WITHIN_S)
-        except NotPlaced:  # started by hand
-            return ""
-        except (LinkError, Refusal) as error:
-            return f"a new start of {component.name} has the old class again: {error}"
-        return ""
+        return exchange.answer(component.clock.now_s(), await revise_start(component.bus, order))
 
     def _tell(self, asked: SwapModule, what: str, level: LogLevel = LogLevel.INFO) -> None:
         self._component.publish_event(asked.module, what, level)

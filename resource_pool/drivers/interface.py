@@ -16,7 +16,7 @@ from typing import Annotated, Any, Protocol, TypeVar, runtime_checkable
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import WrongParameter
+from backbone.component.messages import WrongParameter
 from backbone.errors import Refusal
 from backbone.ranges import Share
 

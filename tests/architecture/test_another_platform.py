@@ -15,6 +15,8 @@ TOP = Path(__file__).parents[2]
 PURE = """
 tests/backbone/scheduling/test_priority_order.py
 tests/backbone/scheduling/test_schedule_manager.py
+tests/backbone/scheduling/test_rcs_for_requests.py
+tests/backbone/scheduling/test_answers_and_rules.py
 tests/backbone/creator/test_supervision.py
 tests/backbone/creator/test_silence.py
 tests/backbone/placer/test_placement.py

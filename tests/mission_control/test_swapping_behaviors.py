@@ -16,8 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from backbone.bus.interface import Bus
-from backbone.component.component import WrongParameter
-from backbone.component.messages import AskParameters, AskState, ComponentState, Parameters
+from backbone.component.messages import AskParameters, AskState, ComponentState, Parameters, WrongParameter
 from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
 from backbone.placer.messages import ReviseStart

@@ -24,6 +24,7 @@ from tutorial_commands import run_all
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.host_copies import HostCopies
+from backbone.bus.zenoh_settings import HOST_LEASE_MS
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
 from backbone.keys import key as key_of
@@ -300,11 +301,40 @@ def test_a_recorder_that_hangs_delays_nobody(mission: RunningMission, tmp_path: 
         recorder.send_signal(signal.SIGSTOP)
         try:
             for _ in range(20):
-                assert mission.status()["health"] == "ok"
+                assert {one["name"] for one in mission.status()["absent"]} <= {f"recorder-{recorder.pid}"}
                 time.sleep(0.2)
         finally:
             recorder.send_signal(signal.SIGCONT)
         ended(recorder)
+
+
+def absent_remedies(mission: RunningMission) -> dict[str, str]:
+    return {one["name"]: one["remedy"] for one in mission.status()["absent"]}
+
+
+@pytest.mark.thorough
+def test_a_recorder_begun_by_hand_is_named_while_it_hangs_and_no_longer(
+    mission: RunningMission, tmp_path: Path
+) -> None:
+    with recording_to(mission, tmp_path / "paused.mcap") as paused:
+        name = f"recorder-{paused.pid}"
+        paused.send_signal(signal.SIGSTOP)
+        try:
+            wait_for(lambda: f"kill -CONT {paused.pid}" in absent_remedies(mission).get(name, ""), mission)
+        finally:
+            paused.send_signal(signal.SIGCONT)
+        wait_for(lambda: name not in absent_remedies(mission), mission)
+        ended(paused)
+    with recording_to(mission, tmp_path / "killed.mcap") as killed:
+        time.sleep(1.0)
+    with recording_to(mission, tmp_path / "lost.mcap") as lost:
+        lost.send_signal(signal.SIGSTOP)
+        wait_for(lambda: f"recorder-{lost.pid}" in absent_remedies(mission), mission)
+        time.sleep(HOST_LEASE_MS / 1000)  # its link expires, and it is named all the same
+        assert f"recorder-{lost.pid}" in absent_remedies(mission)
+    wait_for(lambda: not absent_remedies(mission), mission)
+    log = mission.command("scout-backbone", "log", "--text", "recover", "--mission", mission.name).stdout
+    assert (name in log, log.count(f"recorder-{killed.pid} "), log.count(f"recorder-{lost.pid} ")) == (False, 1, 1), log
 
 
 def test_what_cannot_be_recorded_is_refused_with_a_remedy(mission: RunningMission, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from pool_on_local_network import Owner, Pool, a_pool
 from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.command_line.attributes import WrongAttribute, attributes_of, change
-from backbone.component.component import WrongParameter
+from backbone.component.messages import WrongParameter
 from backbone.keys import Conversation
 from backbone.nameserver.messages import UnknownName
 from backbone.rc_manager.messages import FixedRules, TraceLine

@@ -8,8 +8,7 @@ import pytest
 from pool_on_local_network import Pool, a_pool
 
 from backbone.bus.clock import run_virtual
-from backbone.component.component import WrongParameter
-from backbone.component.messages import AskParameters, Parameters, SetParameter
+from backbone.component.messages import AskParameters, Parameters, SetParameter, WrongParameter
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import RcState

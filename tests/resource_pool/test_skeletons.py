@@ -12,7 +12,7 @@ import pytest
 from pool_on_local_network import Pool, a_pool
 
 from backbone.bus.clock import run_virtual
-from backbone.component.component import WrongParameter
+from backbone.component.messages import WrongParameter
 from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, StaleEpoch
 from backbone.scheduling.requests import RcUse
 from resource_pool.drivers.interface import UnknownDriver

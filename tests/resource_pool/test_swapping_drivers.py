@@ -16,8 +16,7 @@ from pool_on_local_network import Pool, WiretappedRadio, a_pool
 from pool_orders import command, connect_robot
 
 from backbone.bus.clock import run_virtual
-from backbone.component.component import WrongParameter
-from backbone.component.messages import AskParameters, Parameters
+from backbone.component.messages import AskParameters, Parameters, WrongParameter
 from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
 from backbone.keys import Conversation

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from backbone.component.messages import ComponentState, LifeState, Parameters, Statistics, StoryEvent
-from backbone.creator.messages import HostLoad
-from backbone.nameserver.messages import Components
+from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.nameserver.messages import Components, Disappeared
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import Holder, Lease, RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
-from resource_pool.arc_client import StopState
+from resource_pool.arc_client import StopState, Suspended
 from ui_console.model.console import ConsoleModel
-from ui_console.model.events import Asked, ConsoleEvent, Granted, Heard, LinkHeard, PictureSeen
+from ui_console.model.events import (
+    Asked,
+    Attention,
+    CommandApplied,
+    CommandRefused,
+    ConsoleEvent,
+    GivenBack,
+    Granted,
+    Heard,
+    LinkHeard,
+    PictureSeen,
+)
 
 GRANT = Granted(
     10.0, "scout1", {"scout": "scout1", "command_radio": "radio"}, {"scout1": 7, "radio": 3}, 15.0, 9.95, False
@@ -142,3 +155,24 @@ def held_model() -> ConsoleModel:
     )
     pictures = [PictureSeen(10.5 + 0.1 * n, 10.45 + 0.1 * n, "scout1") for n in range(15)]
     return model(*TEAM_EVENTS, ASK, GRANT, Heard(10.0, holding), *pictures)
+
+
+EVENTS: list[ConsoleEvent] = [
+    *TEAM_EVENTS,
+    ASK,
+    GRANT,
+    Heard(12.0, Suspended("arc", "higher", "console-2", -1.0)),
+    GivenBack(13.0, "released", False),
+    PictureSeen(11.0, 10.9, "scout1"),
+    CommandApplied(11.0, "scout1", 7, "drive", {"left_rad_s": 4.0}, 0.01),
+    CommandRefused(11.0, "a.b", "no", "later"),
+    Attention(11.0, False),
+    Attention(12.0, True),
+    LinkHeard(12.0, False),
+    Heard(12.0, STOP),
+    Heard(12.0, Disappeared("resource_pool/scout1")),
+    Heard(12.0, Disappeared("mission_control/watch1")),
+    *[Heard(12.5, state) for state in COMPONENTS],
+    Heard(12.0, ProcessFell("scout1", "signal 9", -1.0, [])),
+    Heard(12.0, msgspec.structs.replace(LEASES, missing=["radio"])),
+]

@@ -17,7 +17,7 @@ from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
 from ui_console.model.debug_views import SeenViews
-from ui_console.model.driving import STICK_LASTS_S, GiveWish, HaltWish, move_by_stick
+from ui_console.model.driving import STICK_LASTS_S, GiveWish, move_by_stick
 from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, PictureSeen, failed
 from ui_console.model.orders import Order
 from ui_console.model.team import TeamModel
@@ -31,6 +31,7 @@ from ui_console.web.key_sight import KeySight, NoSuchKey
 from ui_console.web.login import Welcome
 from ui_console.web.ordering import Ordering
 from ui_console.web.outbox import Outbox
+from ui_console.web.own_console import OwnConsole
 from ui_console.web.sights import PageSight
 
 log = logging.getLogger(__name__)
@@ -101,9 +102,7 @@ class Operator:
         self.answers = ConsentAnswers(welcome.user, services.clock, self.show, services.observer.acted)
         """The questions of others to this person."""
         self._services = services
-        self._console: Teleoperation | None = None
-        self._life: asyncio.Task[None] | None = None
-        self._claiming = asyncio.Lock()
+        self._console = OwnConsole(self._new_console, self._show_failed, services.observer.fail)
         self._found: FoundLog | None = None
         self._ordering = Ordering(services.team)
         self._latency_s: dict[str, float] = {}
@@ -140,7 +139,7 @@ class Operator:
             case protocol.Here(is_there):
                 self._attend(is_there)
             case protocol.MayI(why):
-                self._with_robot(lambda console: console.begin_ask_consent(why))
+                self._console.act(lambda console: console.begin_ask_consent(why))
             case protocol.Decide(is_given):
                 self.answers.decide(is_given)
             case protocol.DismissLost():
@@ -162,7 +161,7 @@ class Operator:
 
     def stop(self) -> None:
         """Stop the wheels that this operator turns."""
-        self._with_robot(Teleoperation.stop)
+        self._console.act(Teleoperation.stop)
 
     async def leave(self, reason: str) -> None:
         """Stop the wheels and give the robot back; the operator is gone afterwards."""
@@ -172,13 +171,7 @@ class Operator:
         if work:
             await asyncio.wait(work)
         self.is_there = False
-        console, life = self._console, self._life
-        if console is not None and life is not None:
-            self.stop()
-            if console.is_ready and console.is_held:
-                await console.do(HaltWish())
-            console.end(reason)
-            await asyncio.wait({life})
+        await self._console.leave(reason)
         self._services.watching_changed()
         self._services.sights_changed()
         self._services.attention_changed()
@@ -226,22 +219,18 @@ class Operator:
 
     def schedule_heard(self) -> None:
         """React to a new schedule: ask why this operator waits, if so."""
-        self._with_robot(Teleoperation.schedule_heard)
+        self._console.act(Teleoperation.schedule_heard)
 
     # ------------------------------------------------------------------ within
-    def _with_robot(self, act: Callable[[Teleoperation], None]) -> None:
-        if self._console is not None and self._console.is_ready:
-            act(self._console)
-
     def _by_press(self, moment: int, act: Callable[[Teleoperation], None]) -> None:
         """Move the robot unless the press is from an earlier moment, also if the page's message was late."""
         if moment == self.model.moment:
-            self._with_robot(act)
+            self._console.act(act)
 
     def _give(self, moment: int, wish: GiveWish) -> None:
         """Give a command, unless the robot was stopped, freed, granted or lost since the page showed it."""
         if moment == self.model.moment:
-            self._with_robot(lambda console: console.give(wish))
+            self._console.act(lambda console: console.give(wish))
         else:
             self._answer({"refused": f"{wish.word} was not given: the robot's state has changed; press again"})
 
@@ -285,9 +274,9 @@ class Operator:
 
     def _attend(self, is_there: bool) -> None:
         if is_there:
-            self._with_robot(Teleoperation.touch)
+            self._console.act(Teleoperation.touch)
         else:
-            self._with_robot(Teleoperation.leave)
+            self._console.act(Teleoperation.leave)
         if self.is_there != is_there:
             self.is_there = is_there
             self._services.attention_changed()
@@ -307,21 +296,17 @@ class Operator:
         observer, user = self._services.observer, self.welcome.user
         match intent:
             case protocol.TakeOver(robot, kind):
-                async with self._claiming:
-                    await self._take(robot, kind)
+                await self._console.take(robot, kind)
             case protocol.OrderRequest() | protocol.PictureOrder():
-                async with self._claiming:
-                    await self._order(intent)
+                await self._order(intent)
             case protocol.EndOrders(robots):
-                await self._end_orders(robots)
+                await self._console.end_orders(robots, self.model.robot)
             case protocol.ReleaseRequest():
-                async with self._claiming:
-                    if self._console is not None and self._console.is_ready:
-                        await self._console.give_back(f"{user} released it")
+                await self._console.give_back(f"{user} released it")
             case protocol.StopRequest(robot):
                 await self._stop(robot)
             case protocol.StopAllRequest():
-                self._with_robot(Teleoperation.require_let_go)
+                self._console.act(Teleoperation.require_let_go)
                 self._report_unsure(await observer.stop_all("", user))
             case protocol.LiftRequest(robot, number):
                 await observer.lift_stop(robot, number, user, self.show)
@@ -358,7 +343,7 @@ class Operator:
 
     async def _stop(self, robot: str) -> None:
         """Emergency stop; the wheels this operator turns stop with it."""
-        self._with_robot(Teleoperation.require_let_go)
+        self._console.act(Teleoperation.require_let_go)
         is_known = robot in self._services.team.robots.names()
         is_stopped = is_known and await self._services.observer.stop_robot(robot, "", self.welcome.user)
         self._report_unsure([] if is_stopped else [robot])
@@ -369,58 +354,23 @@ class Operator:
 
     async def _order(self, intent: protocol.OrderRequest | protocol.PictureOrder) -> None:
         try:
-            orders = self._ordering.orders_for(intent)
+            is_given = await self._console.order(lambda: self._ordering.orders_for(intent))
         except Refusal as refusal:
             self._answer({"refused": f"{refusal.detail}. {refusal.remedy}"})
             return
-        if not self._has_console:
-            await self._open(orders[0].robot if len(orders) == 1 else "", orders)
-        elif self._console is not None and self._console.is_ready:
-            self._console.order_group(orders)
-        else:
+        if not is_given:
             self._answer({"refused": "no order was given: your console is not ready; tap again"})
 
-    async def _end_orders(self, robots: list[str]) -> None:
-        console = self._console
-        if console is None or not console.is_ready:
-            return
-        if self.model.robot in robots:
-            console.interrupt()
-        others = [robot for robot in robots if robot != self.model.robot]
-        await asyncio.gather(*map(console.end_order, others))
+    async def _new_console(self, robot: str, orders: Sequence[Order]) -> Teleoperation:
+        console = await self._services.new_console(self, robot, orders)
+        self.model.name = console.name  # others of this person are other screens
+        return console
 
-    @property
-    def _has_console(self) -> bool:
-        return self._console is not None and self._life is not None and not self._life.done()
-
-    async def _take(self, robot: str, kind: str) -> None:
-        if not self._has_console:
-            await self._open(robot)
-        elif self._console is not None and self._console.is_ready:
-            await self._console.switch(robot, kind)
-
-    async def _open(self, robot: str, orders: Sequence[Order] = ()) -> None:
-        try:
-            self._console = await self._services.new_console(self, robot, orders)
-            self.model.name = self._console.name  # others of this person are other screens
-        except LinkError as error:
-            self.show(failed(self._services.clock.now_s(), error))
-            return
-        self._life = asyncio.create_task(self._live(self._console), name=f"life of {self._console.address}")
-        self._life.add_done_callback(self._bug_of)
-
-    async def _live(self, console: Teleoperation) -> None:
-        try:
-            await console.run()
-        except (Refusal, LinkError) as error:
-            self.show(failed(self._services.clock.now_s(), error))
+    def _show_failed(self, error: Refusal | LinkError) -> None:
+        self.show(failed(self._services.clock.now_s(), error))
 
     def _done(self, same: bytes, task: asyncio.Task[None]) -> None:
         self._work.pop(same, None)
-        self._bug_of(task)
-
-    def _bug_of(self, task: asyncio.Task[None]) -> None:
-        """Raise a bug of an operator's task as a bug of the server."""
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._services.observer.fail(bug)
 

@@ -14,11 +14,10 @@ from in_process_zygote import InProcessZygote
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
-from backbone.component.component import OtherIncarnation
 from backbone.component.heartbeat import Vitals
 from backbone.component.launch import Launch
 from backbone.component.logs import log_path
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import OtherIncarnation, Stop, Stopping
 from backbone.creator.failed_starts import LAST_LINES, last_lines
 from backbone.creator.messages import AlreadyHere, EndedBy, NotHere, ProcessFell, RestartPolicy, StartFailed
 from backbone.creator.process_keeper import ProcessKeeper

@@ -12,8 +12,7 @@ import pytest
 from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.component import WrongParameter
-from backbone.component.messages import Parameters, SetParameter
+from backbone.component.messages import Parameters, SetParameter, WrongParameter
 from backbone.creator.messages import EndedBy
 from backbone.launcher.messages import (
     AddBranch,

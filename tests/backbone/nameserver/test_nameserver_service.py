@@ -13,7 +13,7 @@ import pytest
 from backbone.addresses import NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.component import REGISTER_WITHIN_S, Component, NoParameters
+from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import (
     AskStatistics,
@@ -26,6 +26,7 @@ from backbone.component.messages import (
     Statistics,
     Story,
 )
+from backbone.component.name_claim import REGISTER_WITHIN_S
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
 from backbone.nameserver.messages import (

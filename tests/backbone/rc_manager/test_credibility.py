@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
-from test_rc_manager_service import Pool, a_pool, request
+from rc_manager_at_work import Pool, a_pool, request
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual

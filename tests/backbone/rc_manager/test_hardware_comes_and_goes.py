@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from test_rc_manager_service import HARDWARE, PlainArc, PlainRc, Pool, request
+from rc_manager_at_work import HARDWARE, PlainArc, PlainRc, Pool, request
 from trace_checker import check
 
 from backbone.addresses import DEPENDENCY_DATABASE, RC_MANAGER

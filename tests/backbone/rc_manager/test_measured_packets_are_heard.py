@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 from msgspec.structs import replace
+from rc_manager_at_work import PlainArc, Pool, a_pool, request
 from test_credibility import why
-from test_rc_manager_service import PlainArc, Pool, a_pool, request
 
 from backbone.bus.clock import run_virtual
 from backbone.keys import Conversation

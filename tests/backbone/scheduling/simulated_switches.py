@@ -30,7 +30,7 @@ from backbone.scheduling.events import (
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.master_schedule import EXACT_UP_TO
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
+from backbone.scheduling.requests import PathNode, RcUse, RequestState, SchedulingRequest, Usage
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
 
@@ -199,3 +199,11 @@ class Bench:
     def verdict(self) -> list[Violation]:
         """Return the violations that an independent checker finds in the trace so far."""
         return check([*self.trace, {"ev": "end", "t": self.now_s}])
+
+
+def all_of(bench: Bench, kind: type) -> list:
+    return [instruction for _, instruction in bench.instructions if isinstance(instruction, kind)]
+
+
+def states(bench: Bench) -> dict[str, RequestState]:
+    return {view.arc: view.state for view in bench.answers.schedule(bench.now_s).requests}

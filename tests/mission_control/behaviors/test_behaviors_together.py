@@ -8,8 +8,7 @@ import pytest
 from behaviors_at_work import at_work, example, filmed_at, wait_until
 
 from backbone.bus.clock import run_virtual
-from backbone.component.component import WrongParameter
-from backbone.component.messages import Parameters, SetParameter
+from backbone.component.messages import Parameters, SetParameter, WrongParameter
 from mission_control.behavior import Behavior
 from mission_control.messages import BehaviorStatus
 

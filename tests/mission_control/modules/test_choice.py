@@ -10,8 +10,7 @@ from test_unit_component import NUMBERS, TESTER, UnitComponent, listen, play
 
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus
-from backbone.component.component import WrongParameter
-from backbone.component.messages import Parameters, SetParameter
+from backbone.component.messages import Parameters, SetParameter, WrongParameter
 from backbone.keys import Conversation
 from mission_control.modules.arrangement import UnitOrder, arranged
 from mission_control.modules.choice import ChoiceOrder

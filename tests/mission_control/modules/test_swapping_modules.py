@@ -16,7 +16,6 @@ from backbone.addresses import PLACER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.component import WrongParameter
 from backbone.component.launch import Launch
 from backbone.component.messages import (
     AskParameters,
@@ -27,6 +26,7 @@ from backbone.component.messages import (
     Parameters,
     SetParameter,
     Story,
+    WrongParameter,
 )
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
 from backbone.keys import Conversation

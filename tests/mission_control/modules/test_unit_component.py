@@ -15,7 +15,6 @@ from sample_modules import Number
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.bus.local_bus import LocalBus, LocalNetwork
-from backbone.component.component import WrongParameter
 from backbone.component.launch import Launch
 from backbone.component.messages import (
     DEADLINES_MISSED,
@@ -25,6 +24,7 @@ from backbone.component.messages import (
     SetParameter,
     Statistics,
     StoryEvent,
+    WrongParameter,
 )
 from backbone.deadlines import FIRST_S
 from backbone.debug_views import ListViews, Views

@@ -1,0 +1,71 @@
+"""Beats of a recorder that a person began, to the launcher of the mission.
+
+No process watches such a recorder, unlike one of ``up --record`` (``recorder_signs``). So it raises a claim to its
+address, publishes a beat at its begin and after a flush each second, and a last one when its file is whole.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from pathlib import Path
+
+from backbone.bus.interface import Bus
+from backbone.keys import Conversation
+from backbone.naming import Subsystem, address, claim_address
+from backbone.ranges import Line, Mention, Pid
+from backbone.wire import Message
+
+NAME_BEGIN = "recorder-"
+BEAT_EACH_S = 1.0  # chosen: named within seconds, and a small message each second costs nothing
+
+
+class RecorderBeat(Message, frozen=True):
+    """A recorder begins, or has flushed its file; published under ``Conversation.BEAT``.
+
+    Attributes:
+        host: Its machine, as the system names it.
+        pid: Its process there.
+        file: The first file of its recording, for people.
+        is_last: True if the recording is whole and the recorder ends.
+    """
+
+    host: Mention
+    pid: Pid
+    file: Line
+    is_last: bool = False
+
+
+def address_of_recorder() -> str:
+    """Return the address of a recorder in this process."""
+    return address(Subsystem.BACKBONE, f"{NAME_BEGIN}{os.getpid()}")
+
+
+class RecorderBeats:
+    """Publishes the beats of one recorder; its claim stands from now on.
+
+    Args:
+        bus: Of the recorder; the claim falls when it is closed, or when the process dies.
+    """
+
+    def __init__(self, bus: Bus, file: Path) -> None:
+        self._bus, self._next_s = bus, 0.0
+        self._host, self._pid, self._file = socket.gethostname(), os.getpid(), str(file.absolute())
+        bus.declare_alive(claim_address(bus.source, self._host, self._pid))
+        self.give()
+
+    def give(self) -> None:
+        """Publish a beat, if the last one is ``BEAT_EACH_S`` ago."""
+        now_s = time.monotonic()
+        if now_s >= self._next_s:
+            self._next_s = now_s + BEAT_EACH_S
+            self._publish()
+
+    def end(self) -> None:
+        """Publish that the recording is whole."""
+        self._publish(is_last=True)
+
+    def _publish(self, *, is_last: bool = False) -> None:
+        beat = RecorderBeat(self._host, self._pid, self._file, is_last)
+        self._bus.publish(self._bus.source, Conversation.BEAT, beat)

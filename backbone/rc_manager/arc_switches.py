@@ -1,0 +1,99 @@
+"""The context switches under way: one at a time for each ARC, each reported to the schedule manager when it is done."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine, Mapping
+from typing import Protocol
+
+from backbone.bus.interface import Clock
+from backbone.rc_manager.context_switch import ContextSwitch
+from backbone.rc_manager.rc_watch import RcWatch
+from backbone.rc_manager.switch_times import SwitchTimes
+from backbone.scheduling.events import ConnectArc, Event, Freed, Opened, OpenFailed, RevokeArc
+from backbone.scheduling.requests import RcUse
+from backbone.waiting import end_tasks
+
+
+class SwitchService(Protocol):
+    """The RC manager, as its switches need it."""
+
+    clock: Clock
+
+    def happened(self, event: Event) -> None:
+        """Pass the event to the schedule manager, and carry its instructions out."""
+
+    def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
+        """Run the coroutine until the component ends."""
+
+
+class ArcSwitches:
+    """Carries out what the schedule manager orders for ARCs.
+
+    Args:
+        service: The RC manager.
+        context_switch: Connects and revokes.
+        rcs: Hears which RCs failed.
+        grace_s: Time of an ARC to stop cleanly.
+    """
+
+    def __init__(self, service: SwitchService, context_switch: ContextSwitch, rcs: RcWatch, grace_s: float) -> None:
+        self._service, self._context_switch, self._rcs, self._grace_s = service, context_switch, rcs, grace_s
+        self._under_way: dict[str, asyncio.Task[None]] = {}
+        self._times = SwitchTimes()
+
+    def __contains__(self, arc: str) -> bool:
+        """Return whether work is under way for this ARC."""
+        return arc in self._under_way
+
+    @property
+    def tasks(self) -> list[asyncio.Task[None]]:
+        """The work that is under way."""
+        return [*self._under_way.values()]
+
+    def statistics(self) -> dict[str, float]:
+        """Return numbers and times of switches."""
+        return self._times.statistics()
+
+    def connect(self, order: ConnectArc, uses: Callable[[], Mapping[str, RcUse]]) -> None:
+        """Connect the ARC to its RCs.
+
+        Args:
+            uses: Returns how the ARC uses each RC, when it is its turn.
+        """
+        self.begin(order.arc, lambda: self._connect(order, uses()))
+
+    def revoke(self, order: RevokeArc) -> None:
+        """Take the RCs from the ARC."""
+        self._times.revoked(order.epochs, order.arc, self._service.clock.now_s())
+        self.begin(order.arc, lambda: self._revoke(order))
+
+    def begin(self, arc: str, work: Callable[[], Coroutine[object, None, None]]) -> None:
+        """Run the work after the work that is still under way for this ARC was ended."""
+        before = self._under_way.get(arc)
+
+        async def in_turn() -> None:
+            if before is not None and not before.done():
+                await end_tasks(before)
+            await work()
+            if self._under_way.get(arc) is asyncio.current_task():
+                del self._under_way[arc]
+
+        self._under_way[arc] = self._service.start_task(in_turn(), f"switch {arc}")
+
+    async def _connect(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> None:
+        failed = await self._context_switch.connect(order, uses)
+        if failed is None:
+            self._times.granted(order.epochs, order.arc, order.settle_s, self._service.clock.now_s())
+            self._service.happened(Opened(order.arc))
+            return
+        self._rcs.failed(failed)
+        self._service.happened(OpenFailed(order.arc, failed))
+        if failed:
+            self._rcs.meet_in_a_while(failed)
+
+    async def _revoke(self, order: RevokeArc) -> None:
+        release_s = max(self._rcs.resources[rc].disconnect_s for rc in order.epochs)
+        for rc in await self._context_switch.revoke(order, self._grace_s + release_s):
+            self._rcs.does_not_answer(rc)
+        self._service.happened(Freed(order.arc))

@@ -1,0 +1,122 @@
+"""Watch over the ARCs: which ones ask, what they may use, and whether they still beat."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections import Counter
+from collections.abc import Coroutine, Iterable, Iterator, Mapping
+from typing import Protocol
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.story import StoryBook
+from backbone.errors import LinkError, Refusal
+from backbone.rc_manager.arc_switches import ArcSwitches
+from backbone.rc_manager.beats import Beats
+from backbone.rc_manager.context_switch import in_pool
+from backbone.rc_manager.messages import AskRequest, Beat, CurrentRequest, Done, TakePath
+from backbone.rc_manager.recovery import Recovery
+from backbone.scheduling.events import Departed, Event
+from backbone.scheduling.requests import PathNode, RcUse, Scheduled, SchedulingRequest
+from backbone.scheduling.views import RequestAttributes
+from backbone.wire import Envelope
+
+log = logging.getLogger(__name__)
+
+ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; after this it hangs or is gone
+
+
+class ArcService(Protocol):
+    """The RC manager, as the watch needs it."""
+
+    bus: Bus
+    clock: Clock
+    story: StoryBook
+
+    def happened(self, event: Event) -> None:
+        """Pass the event to the schedule manager, and carry its instructions out."""
+
+    async def request(self, request: SchedulingRequest) -> Scheduled:
+        """Choose RCs for the request, and admit it."""
+
+    def admit_again(self, current: CurrentRequest) -> bool:
+        """Admit a request with the RCs that were chosen for it before, unless one of them is gone."""
+
+    def start_task(self, work: Coroutine[object, None, None], name: str) -> object:
+        """Run the coroutine until the component ends."""
+
+
+class ArcWatch:
+    """The ARCs that ask for RCs.
+
+    Args:
+        service: The RC manager.
+        switches: The context switches under way.
+        recovery: Asks an ARC for its request.
+    """
+
+    def __init__(self, service: ArcService, switches: ArcSwitches, recovery: Recovery) -> None:
+        self._service, self._switches, self._recovery = service, switches, recovery
+        self.uses: dict[str, Mapping[str, RcUse]] = {}
+        """ARC → how it uses each of its RCs."""
+        self._beats = Beats(service.clock.rate)
+        self._requesting: Counter[str] = Counter()
+
+    @contextlib.contextmanager
+    def choosing(self, arc: str) -> Iterator[None]:
+        """Count a request of this ARC as one for which RCs are being chosen."""
+        self._requesting[arc] += 1
+        try:
+            yield
+        finally:
+            self._requesting[arc] -= 1
+
+    def is_choosing(self) -> bool:
+        """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
+        return self._requesting.total() > 0
+
+    def remember(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
+        """Know the ARC from now on: it asks for these RCs."""
+        self.uses[request.arc] = next(uses for uses in request.alternatives if set(uses) == set(rcs))
+        self._beats.heard(request.arc, self._service.clock.now_s())
+
+    def forget(self, arc: str) -> bool:
+        """Know the ARC no longer, and expect no beats; return whether it was known."""
+        self._beats.forget(arc)
+        return self.uses.pop(arc, None) is not None
+
+    def end_silent(self) -> None:
+        """End the requests of ARCs that hang. When: every ``RENEW_EVERY_S``."""
+        for arc, silent_s in self._beats.look(self._service.clock.now_s()).items():
+            log.warning("%s has not beaten for %.1f s", arc, silent_s)
+            self.uses.pop(arc, None)
+            self._service.happened(Departed(arc, "silent"))
+
+    def heard_beat(self, envelope: Envelope[Beat]) -> None:
+        """Take in a beat; one of an ARC that is not known leads to a question for its request."""
+        arc = envelope.body.arc
+        if arc in self.uses:
+            self._beats.heard(arc, self._service.clock.now_s())
+        elif arc not in self._switches and not self._requesting[arc]:
+            self._switches.begin(arc, lambda: self._meet(arc))
+
+    async def _meet(self, arc: str) -> None:
+        """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
+        current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
+        if current is None or arc in self.uses or self._requesting[arc] or self._service.admit_again(current):
+            return
+        try:
+            await self._service.request(current.request)  # its own question was lost, or is still on its way
+        except (Refusal, LinkError) as error:
+            self._service.story.note(arc, f"got no place in the schedule: {error}")
+
+    def tell_paths(self, requests: Iterable[RequestAttributes]) -> None:
+        """Tell ARCs by which path they ask now: a later RC manager must hear of it."""
+        for one in requests:
+            self._service.start_task(self._tell_path(one.arc, one.path), f"path of {one.arc}")
+
+    async def _tell_path(self, arc: str, path: list[PathNode]) -> None:
+        try:
+            await self._service.bus.ask(in_pool(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
+        except (Refusal, LinkError) as error:
+            self._service.story.note(arc, f"did not take its new path; the next RC manager would not know it: {error}")

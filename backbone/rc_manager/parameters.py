@@ -1,0 +1,23 @@
+"""Parameters of the RC manager."""
+
+from __future__ import annotations
+
+from backbone.scheduling.rules import SchedulingRules
+
+
+class RcManagerParameters(SchedulingRules, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """For whom and with which rules the RC manager decides.
+
+    Attributes:
+        mission: Name of the mission's own node, root of the behavior tree.
+        mission_priority: Its priority among the consoles.
+        trace: File the decisions are written to; empty: none.
+    """
+
+    mission: str
+    mission_priority: int = 0
+    trace: str = ""
+
+    def rules(self) -> SchedulingRules:
+        """Return the rules alone."""
+        return SchedulingRules(**{rule: getattr(self, rule) for rule in SchedulingRules.__struct_fields__})

@@ -1,0 +1,150 @@
+"""A bug ends a component, is told, and is raised; a refusal is none."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+import pytest
+from component_stage import TOWER, Poke, Poked, Stage, TooSteep, live
+
+from backbone.component.messages import (
+    LifeState,
+)
+from backbone.component.story import MAX_FEEDBACK_LENGTH
+from backbone.errors import NoResponder
+from backbone.keys import Conversation
+
+# Bugs
+
+
+@pytest.mark.parametrize(
+    ("where", "diary"),
+    [
+        ("connect", ["connect connecting"]),
+        ("serve", ["connect connecting", "serve ready", "drain draining"]),
+        ("drain", ["connect connecting", "serve ready", "drain draining"]),
+    ],
+)
+def test_a_bug_in_a_hook_ends_it_failed_and_is_raised(
+    where: str, diary: list[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    async def law() -> None:
+        stage = Stage(stumble=where)
+        life = await stage.begin()
+        stage.walker.end("enough")
+        with pytest.raises(KeyError, match=where):
+            await life
+        await stage.clock.sleep_s(0.1)
+        assert stage.walker.diary == diary
+        assert stage.states[-1].state is LifeState.FAILED
+        assert stage.states[-1].feedback == f"KeyError: '{where}'"
+        assert stage.observed[-1] in ("failed", "no token")
+
+    with caplog.at_level(logging.CRITICAL):
+        live(law())
+
+
+def test_failed_is_said_before_the_token_falls() -> None:
+    async def law() -> None:
+        stage = Stage(stumble="serve")
+        life = await stage.begin()
+        with pytest.raises(KeyError):
+            await life
+        await stage.clock.sleep_s(0.1)
+        assert stage.observed == ["ready", "token", "draining", "failed", "no token"]
+
+    live(law())
+
+
+def test_a_bug_in_an_answer_ends_it_and_drains_once() -> None:
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        with pytest.raises(NoResponder):
+            await stage.ask(Poke("stumble"), Poked)
+        with pytest.raises(KeyError, match="poked"):
+            await life
+        assert stage.walker.diary.count("drain draining") == 1
+        assert stage.states[-1].state is LifeState.FAILED
+
+    live(law())
+
+
+def test_a_bug_in_a_listener_ends_it() -> None:
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        stage.walker.bus.subscribe(TOWER, Conversation.EVENTS, Poked, lambda event: {}[event])
+        stage.tower.publish(TOWER, Conversation.EVENTS, Poked(1))
+        with pytest.raises(KeyError):
+            await life
+        assert stage.walker.diary[-1] == "drain draining"
+
+    live(law())
+
+
+def test_a_bug_in_a_task_ends_it_and_drains_once() -> None:
+    async def law() -> None:
+        stage = Stage(hold="serve", stumble="task")
+        life = await stage.begin()
+        await stage.ask(Poke("task"), Poked)
+        with pytest.raises(KeyError, match="task"):
+            await life
+        assert stage.walker.diary[-2:] == ["serve cancelled ready", "drain draining"]
+        assert stage.states[-1].feedback == "KeyError: 'task'"
+
+    live(law())
+
+
+def test_the_first_of_two_bugs_is_the_one_raised() -> None:
+    async def law() -> None:
+        stage = Stage(stumble="drain", hold="serve")
+        life = await stage.begin()
+        with pytest.raises(NoResponder):
+            await stage.ask(Poke("stumble"), Poked)
+        with pytest.raises(KeyError, match="poked"):
+            await life
+
+    live(law())
+
+
+def test_a_refusal_is_no_bug() -> None:
+    async def law() -> None:
+        stage = Stage()
+        life = await stage.begin()
+        with pytest.raises(TooSteep):
+            await stage.ask(Poke("refuse"), Poked)
+        assert (await stage.ask(Poke("x"), Poked)).count == 2
+        stage.walker.end("enough")
+        await life
+
+    live(law())
+
+
+def test_a_long_complaint_is_cut_in_the_feedback() -> None:
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        stage.walker.fail(ValueError("x" * 10_000))
+        with pytest.raises(ValueError, match="xxx"):
+            await life
+        assert len(stage.states[-1].feedback) == MAX_FEEDBACK_LENGTH
+
+    live(law())
+
+
+# Tasks
+
+
+def test_tasks_end_with_the_component() -> None:
+    async def law() -> None:
+        stage = Stage(hold="task")
+        life = await stage.begin()
+        await stage.ask(Poke("task"), Poked)
+        await stage.clock.sleep_s(0.1)
+        assert "task ready" in stage.walker.diary
+        stage.walker.end("enough")
+        await asyncio.wait_for(life, 1.0)
+
+    live(law())

@@ -1,0 +1,226 @@
+"""Tables and dialogs of the terminal console."""
+
+from __future__ import annotations
+
+import pytest
+from console_scenes import ASK, SCHEDULE, STOP, TEAM_EVENTS, held_model, model
+from pressed_keys import FORWARD, SIZE
+from screen_text import screen_text
+from textual.widgets import Input
+from written_session import WrittenSession, settle
+
+from backbone.component.messages import StoryEvent
+from backbone.errors import Refusal
+from backbone.mission_log.log import AskLog, Log
+from ui_console.model.consent import Consent, Settled, Sought
+from ui_console.model.events import (
+    ConsentAsked,
+    ConsentHeard,
+    Heard,
+)
+from ui_console.model.profile import Profile
+from ui_console.session.feed import LogAway
+from ui_console.terminal.app import ConsoleApp, read_value
+from ui_console.terminal.tables import PanelName
+from ui_console.terminal.widgets import Panel, Video
+
+
+# ---------------------------------------------------------------------- robots, tables, dialogs
+async def test_the_picker_takes_the_robot_chosen_and_escape_takes_none() -> None:
+    session = WrittenSession(Heard(8.0, SCHEDULE))
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("p", "escape")
+        await settle(pilot)
+        assert session.wanted == []
+        await pilot.press("p", "down", "enter")
+        await settle(pilot)
+    assert session.wanted == [("switch", "scout2")]
+
+
+async def test_tab_goes_through_all_tables_and_back() -> None:
+    screen = ConsoleApp(WrittenSession(*TEAM_EVENTS))
+    async with screen.run_test(size=SIZE) as pilot:
+        seen = []
+        for _table in PanelName:
+            seen.append(screen.chosen)
+            await pilot.press("tab")
+        assert seen == list(PanelName)
+        await pilot.press("shift+tab")
+        assert screen.chosen is PanelName.LOG
+
+
+async def test_the_log_of_the_whole_mission_is_searched_and_followed() -> None:
+    def event(at_s: float, what: str) -> StoryEvent:
+        return StoryEvent(at_s, "ui_console/console-1", what, "scout2", "")
+
+    session = WrittenSession(*TEAM_EVENTS)
+    session.log = Log([event(0.5, "tells of long ago"), event(9.0, "tells again")])
+    app = ConsoleApp(session)
+    async with app.run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("slash")
+        await pilot.press(*"robot", "colon", *"scout2 ", *"tells", "enter")
+        await settle(pilot)
+        assert session.wanted == [("search", AskLog(robot="scout2", text="tells"))]
+        told = screen_text(app)
+        assert "log: robot:scout2 tells (2 events)" in told
+        assert "tells of long ago" in told
+        assert "saw motion" not in told
+        for heard in (event(9.0, "tells again"), event(11.0, "tells news"), event(11.5, "is silent")):
+            session.model.apply(Heard(12.0, heard))
+        app.redraw()
+        told = screen_text(app)
+        assert told.count("tells again") == 1, "told and heard"
+        assert "tells news" in told
+        assert "is silent" not in told
+        await pilot.press("slash", "delete", "enter")
+        await settle(pilot)
+        assert "saw motion" in screen_text(app)
+
+
+@pytest.mark.parametrize(
+    ("line", "refusal", "words"),
+    [
+        ("since:soon", None, "'soon' is no moment"),
+        ("smoke", LogAway("the launcher, which keeps the log, did not answer"), "did not answer"),
+    ],
+)
+async def test_a_search_that_fails_says_why_and_leaves_the_log_as_it_was(
+    line: str, refusal: Refusal | None, words: str
+) -> None:
+    session = WrittenSession(*TEAM_EVENTS)
+    session.log = refusal or Log([])
+    app = ConsoleApp(session)
+    async with app.run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("slash")
+        await pilot.press(*("colon" if one == ":" else one for one in line), "enter")
+        await settle(pilot)
+        await pilot.pause()
+        assert words in screen_text(app)
+        assert app.chosen is not PanelName.LOG
+
+
+async def test_the_cursor_stays_on_its_row_while_rows_come_and_go() -> None:
+    session = WrittenSession(Heard(8.0, SCHEDULE))
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE) as pilot:
+        await pilot.press("right_square_bracket", "right_square_bracket")
+        panel = screen.query_one("#robots", Panel)
+        assert panel.row is not None
+        assert panel.row.subject == "scout2"
+        screen.redraw()
+        assert panel.row.subject == "scout2"
+        await pilot.press("left_square_bracket")
+        assert panel.row.subject == "scout1"
+
+
+async def test_why_is_shown_and_closed_and_drives_nothing_meanwhile() -> None:
+    session = WrittenSession(Heard(8.0, SCHEDULE))
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("y")
+        await settle(pilot)
+        assert "watch1 has its minimum run time" in screen_text(pilot.app)
+        await pilot.press("w", "escape")
+        await pilot.pause()
+        assert "minimum run time" not in screen_text(pilot.app)
+    assert session.wanted == [("why", "scout1")]
+
+
+async def test_why_of_an_alarm_says_where_to_look_too() -> None:
+    app = ConsoleApp(WrittenSession(*TEAM_EVENTS, Heard(11.0, STOP)))
+    async with app.run_test(size=SIZE) as pilot:
+        while app.chosen is not PanelName.ALARMS:
+            await pilot.press("tab")
+        await pilot.press("y")
+        await settle(pilot)
+        assert "where: scout on base" in screen_text(app)
+
+
+@pytest.mark.parametrize("is_sure", [True, False])
+async def test_a_parameter_is_changed_by_typing_another_value(is_sure: bool) -> None:
+    session = WrittenSession(*TEAM_EVENTS)
+    session.is_sure = is_sure
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE, notifications=True) as pilot:
+        while screen.chosen is not PanelName.PARAMETERS:
+            await pilot.press("tab")
+        await pilot.press("e")
+        await pilot.pause()
+        screen.screen.query_one(Input).value = "25"
+        await pilot.press("enter")
+        await settle(pilot)
+        assert session.wanted == [("set", "watch1", "threshold", 25)]
+        assert ("did not take" in screen_text(screen)) is not is_sure
+
+
+async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_keys_that_decide() -> None:
+    shown = held_model()
+    sought = Sought("ui_console/console-2", "ben", "scout1", "my robot is stuck", 18.0)
+    shown.apply(sought)
+    session = WrittenSession(shown=shown)
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=(160, 36)) as pilot:
+        await settle(pilot)
+        assert "ben asks for scout1: my robot is stuck [g: yes, n: no; 6 s]" in screen_text(screen)
+        await pilot.press("g")
+        assert session.wanted[-1] == ("decide", True)
+        shown.apply(Settled(sought, Consent(True, "anna", "")))
+        screen.redraw()
+        await settle(pilot)
+        assert "ben asks" not in screen_text(screen)
+
+
+async def test_a_pendants_holder_is_asked_in_the_same_words_and_answers_by_the_same_keys() -> None:
+    shown = held_model()
+    shown.apply(Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0))
+    session = WrittenSession(shown=shown)
+    screen = ConsoleApp(session, profile=Profile.PENDANT)
+    async with screen.run_test(size=(50, 20)) as pilot:
+        await settle(pilot)
+        assert "ben asks for scout1: stuck [g: yes, n: no; 6 s]" in " ".join(screen_text(screen).split())
+        await pilot.press("n")
+    assert session.wanted == [("decide", False)]
+
+
+async def test_who_asks_may_say_why_and_sees_what_came_of_it() -> None:
+    shown = model(*TEAM_EVENTS, ASK)
+    session = WrittenSession(shown=shown)
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=(160, 36)) as pilot:
+        await pilot.press("M")
+        await pilot.press(*"stuck", "enter")
+        await settle(pilot)
+        assert session.wanted[-1] == ("may I", "stuck")
+        shown.apply(ConsentAsked(12.0, "scout1", ["console-2"], 18.0))
+        screen.redraw()
+        await settle(pilot)
+        assert "asked console-2 for scout1: 6 s left" in screen_text(screen)
+        shown.apply(ConsentHeard(13.0, "scout1", "ben", False, "nearly done"))
+        screen.redraw()
+        await settle(pilot)
+        assert "ben keeps scout1: nearly done" in screen_text(screen)
+
+
+def test_what_is_typed_is_json_or_the_text_itself() -> None:
+    assert [read_value(text) for text in ("1", "0.5", "true", '"a"', "a b", "[1]")] == [1, 0.5, True, "a", "a b", [1]]
+
+
+async def test_with_a_gamepad_the_keys_name_its_buttons_too() -> None:
+    async with ConsoleApp(WrittenSession(), has_gamepad=True).run_test(size=(100, 60)) as pilot:
+        await pilot.press("f1")
+        await settle(pilot)
+        assert "the left stick drives" in screen_text(pilot.app)
+
+
+async def test_video_only_hides_everything_but_picture_and_status_and_brings_it_back() -> None:
+    session = WrittenSession(shown=held_model())
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE) as pilot:
+        await pilot.press("v")
+        await pilot.pause()
+        assert not screen.query_one("#side").display
+        assert screen.query_one(Video).size.width == SIZE[0]
+        assert screen.query_one(Video).size.height == SIZE[1] - 1
+        await pilot.press("w", "v")
+        await pilot.pause()
+        assert screen.query_one("#side").display
+    assert session.wanted == [FORWARD]

@@ -1,0 +1,277 @@
+"""A console's claim on an ARC, for the robot of the console's parameters, from the take to the release.
+
+The console claims as a behavior does, with a priority of its own beside the mission's. An ARC that was given back can
+rest for the next claim. Commands to the robot meanwhile are the part of ``controls``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+import msgspec
+
+from backbone.bus.interface import Subscription
+from backbone.component.messages import LifeState, LogLevel
+from backbone.errors import LinkError, Refusal, code_of
+from backbone.mission_log.operators import OperatorAction
+from backbone.wire import Message
+from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
+from ui_console.model import events
+from ui_console.model.driving import HaltWish
+from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
+from ui_console.session.controls import Controls
+from ui_console.session.kind_finder import KindFinder
+from ui_console.session.observer import Observer
+from ui_console.session.stop_ear import StopEar
+
+log = logging.getLogger(__name__)
+
+
+class ArcClaim:
+    """Claims at most one ARC at a time, keeps it while it waits and works, and gives it back.
+
+    Args:
+        console: Its parameters name robot and kind of ARC.
+        controls: Act on the ARC while it is claimed.
+        see: Called with the newest picture; None: nobody looks.
+        keeps_arc: Let an ARC rest that is given back.
+        shows_stops: Show stops of the robot that is held; False if the console watches all robots.
+        taken: Called with the robot at each grant.
+    """
+
+    def __init__(
+        self,
+        console: Observer[TeleoperationParameters],
+        controls: Controls,
+        *,
+        see: Callable[[Frame], None] | None,
+        keeps_arc: bool,
+        shows_stops: bool,
+        taken: Callable[[str], None],
+    ) -> None:
+        self._console, self._controls, self._taken = console, controls, taken
+        self._see, self._keeps_arc, self._shows_stops = see, keeps_arc, shows_stops
+        self._arc: ArcClient | None = None
+        self._last: tuple[str, dict[str, object]] | None = None
+        self._keeping: asyncio.Task[None] | None = None
+        self._frames: Subscription | None = None
+        self._giving_back, self._takes_next = asyncio.Lock(), False
+        self._decided = asyncio.Event()
+        self._grants = 0
+        self._kinds = KindFinder(console, controls.know)
+        self._ear = StopEar(console, self._heard_stop)
+        self.rests = False
+        """True while the ARC rests."""
+        self.is_asking = False
+        """True from the claim to the release."""
+        self.asked_s = 0.0
+        """Mission time of the claim."""
+        self.holding = ""
+        """The robot of the last grant; empty after its release."""
+        self.refusal: Refusal | None = None
+        """Why the claim was refused; None if it was not."""
+        self.given_back: bool | None = None
+        """Whether the last release was confirmed; None before one."""
+
+    @property
+    def is_held(self) -> bool:
+        """True while commands pass."""
+        return self._keeping is not None and self._arc is not None and self._arc.granted is not None
+
+    @property
+    def is_waiting(self) -> bool:
+        """True while the ARC is kept and not granted."""
+        return self._keeping is not None and not self.is_held
+
+    # ------------------------------------------------------------------ claim
+    def take(self) -> None:
+        """Claim the robot unless it is claimed; if its release is under way, right afterwards."""
+        if self._giving_back.locked():
+            self._takes_next = True
+            self._decided.clear()
+            return
+        if self.is_asking:
+            return
+        if not self._console.parameters.kind:
+            if not self._kinds.is_finding:
+                self._decided.clear()
+                self._kinds.begin(self._console.parameters, self._kind_found, self._claim_refused)
+            return
+        self._claim(self._console.parameters)
+
+    def _claim(self, wished: TeleoperationParameters) -> None:
+        console, rested = self._console, self._arc
+        claim = (wished.kind, wished.claim(console.address))
+        self.rests = self.rests and self._last == claim
+        if not self.rests:
+            self._arc = ArcClient(console.bus, wished.arc(console.bus), self)
+        arc, self._last, self.is_asking = self._arc, claim, True
+        assert arc is not None  # noqa: S101  an ARC that rests exists
+        self._controls.connect(arc)
+        self._ear.close()  # the state it reported to the last ARC is new to this one
+        if wished.robot:
+            console.start_task(self._ear.listen(wished.robot), "stop")
+        if self._see is not None:
+            self._frames = arc.frames(self._saw)
+        self.asked_s, self._grants, self.refusal = console.clock.now_s(), 0, None
+        self._decided.clear()
+        console.acted(OperatorAction.TAKE, wished.robot or ANY_ROBOT, f"with priority {wished.priority}")
+        console.show(events.Asked(self.asked_s, wished.robot, wished.kind, wished.priority))
+        self._kinds.take(wished.kind)
+        self._keeping = console.start_task(self._keep(arc, claim, rested), "arc")
+
+    async def wait_granted(self) -> None:
+        """Return when the claim was granted.
+
+        Raises:
+            Refusal: The claim was refused.
+        """
+        await self._decided.wait()
+        if self.refusal is not None:
+            raise self.refusal
+
+    async def _keep(self, arc: ArcClient, claim: tuple[str, dict[str, object]], rested: ArcClient | None) -> None:
+        """Keep the ARC as it was claimed; first end an ARC that rested and cannot be used any more."""
+        kind, parameters = claim
+        rests, self.rests = self.rests, False
+        try:
+            if rested is not None and not rests:
+                await rested.release("asks otherwise")
+            await arc.keep(self._console.clock, kind, parameters, rests=rests)
+        except Refusal as refusal:
+            self._controls.disconnect()
+            self._arc, self._keeping, self.is_asking = None, None, False
+            self._claim_refused(refusal)
+
+    def _kind_found(self, wished: TeleoperationParameters, kind: str) -> None:
+        if self._console.parameters == wished:
+            self._console.parameters = msgspec.structs.replace(wished, kind=kind)
+            self.take()
+
+    def _claim_refused(self, refusal: Refusal) -> None:
+        self.refusal, now_s = refusal, self._console.clock.now_s()
+        self._console.show(events.CommandRefused(now_s, code_of(refusal), refusal.detail, refusal.remedy, True))
+        self._decided.set()
+
+    # ------------------------------------------------------------------ release
+    async def give_back(self, reason: str, *, for_good: bool = False, wanted: bool = True) -> None:
+        """Give the robot back; afterwards nothing is claimed until the next ``take``.
+
+        Args:
+            reason: For people.
+            for_good: End the ARC also if it could rest.
+            wanted: False if the operator did not ask for it.
+        """
+        async with self._giving_back:
+            self._kinds.cancel()
+            if self._arc is not None and (self.is_asking or for_good):
+                await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
+        if self._takes_next and self._console.state is LifeState.READY:
+            self._takes_next = False
+            self.take()
+
+    async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool, wanted: bool) -> None:
+        keeping, self._keeping = self._keeping, None
+        self._controls.switch_off()
+        if keeping is not None:
+            keeping.cancel()
+            await asyncio.wait({keeping})
+        confirmed = await self._let_go(arc, reason, for_good=for_good)
+        if self._frames is not None:
+            self._frames.close()
+            self._frames = None
+        if self.is_asking:
+            self.is_asking, self.given_back = False, confirmed
+            self._record_given_back(reason, confirmed=confirmed, wanted=wanted)
+
+    async def _let_go(self, arc: ArcClient, reason: str, *, for_good: bool) -> bool:
+        """Rest the ARC if the console keeps it, else end it; return whether the ARC confirmed that."""
+        if self._keeps_arc and arc.granted is not None and not for_good:  # an ARC that waits could just be granted
+            try:
+                await arc.rest()
+            except (LinkError, Refusal) as error:
+                log.info("%s does not rest: %s", arc.arc, error)
+            else:
+                self.rests = True
+                return True
+        confirmed = True
+        try:
+            await arc.release(reason)
+        except LinkError as error:
+            log.info("the release was not confirmed: %s", error)
+            confirmed = False
+        self._controls.disconnect()
+        self._arc, self.rests = None, False
+        return confirmed
+
+    def _record_given_back(self, reason: str, *, confirmed: bool, wanted: bool) -> None:
+        console = self._console
+        self._ear.close()
+        self._controls.record_drive_end(self.holding, reason)
+        console.answers.ended(True, reason)
+        robot, self.holding = self.holding or console.parameters.robot or ANY_ROBOT, ""
+        console.acted(
+            OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which its ARC did not confirm'}"
+        )
+        console.report("holds no robot")
+        console.show(events.GivenBack(console.clock.now_s(), reason, confirmed, wanted))
+
+    # ------------------------------------------------------------------ the ARC
+    async def handle(self, notice: ArcNotice) -> Message:
+        """Answer a notice of the ARC.
+
+        Raises:
+            NotMyArc: No ARC is claimed, or another one.
+        """
+        if self._arc is None:
+            raise NotMyArc(f"{self._console.name} claims no ARC")
+        return await self._arc.handle(notice)
+
+    async def arc_resumed(self, notice: Resumed) -> None:
+        """Show the grant; see ``ArcListener``."""
+        if self._keeping is None:
+            log.info("%s was granted after it was given back", notice.arc)
+            return  # the RC manager granted before it got the withdrawal; it revokes the RCs then
+        robot, console = notice.robot or "no robot", self._console
+        self._controls.require_let_go()
+        await self._ear.listen(robot)
+        if not self.is_held or self._arc is None or self._arc.epochs != notice.epochs:
+            return  # the ARC lost it again meanwhile
+        again, self._grants = self._grants > 0, self._grants + 1
+        console.report(f"drives {robot}")
+        if not again:
+            console.publish_event(robot, f"was taken over by {console.user}", LogLevel.NOTICE)
+        self.holding = robot
+        self._taken(robot)
+        now_s, epochs = console.clock.now_s(), notice.epochs
+        console.show(events.Granted(now_s, robot, notice.rcs, epochs, notice.until_s, self.asked_s, again))
+        self._decided.set()
+
+    async def arc_suspending(self, notice: Suspending) -> None:  # noqa: ARG002  one command needs no deadline
+        """Stop the wheels within the deadline; see ``ArcListener``."""
+        if not self.rests:
+            await self._controls.do(HaltWish())
+
+    async def arc_suspended(self, notice: Suspended) -> None:
+        """Show the loss; see ``ArcListener``."""
+        self._controls.require_let_go()
+        if self._keeping is not None:
+            because = f"{notice.reason} by {notice.by}" if notice.by else notice.reason
+            self._console.answers.ended(False, f"it was lost: {because}")
+            self._controls.record_drive_end(self.holding, because)
+            self._console.report(f"waits: {because}")
+            self._console.show(events.Heard(self._console.clock.now_s(), notice))
+
+    def _heard_stop(self, state: StopState) -> None:
+        """Show that the robot held was stopped or may move again: its driver has to know that first."""
+        if self._arc is not None and self._arc.heard_stop(state):
+            self._controls.require_let_go()
+        if self._shows_stops and state.number > 0:  # 0: it never was stopped
+            self._console.show(events.Heard(self._console.clock.now_s(), state))
+
+    def _saw(self, frame: Frame) -> None:
+        if self._see is not None:
+            self._console.show(events.PictureSeen(self._console.clock.now_s(), frame.captured_s, frame.robot))
+            self._see(frame)
