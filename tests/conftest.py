@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import garbage
 import limits
 import pytest
 import selection
@@ -40,6 +41,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Have limits for each test, failures printed when they happen, and long tests left out."""
+    config.pluginmanager.register(garbage.Frozen(), "frozen")
     limits.watch(config)
     config.pluginmanager.register(selection.OnlyQuick(), "only-quick")
 
