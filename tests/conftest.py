@@ -16,6 +16,7 @@ import garbage
 import limits
 import pytest
 import selection
+import web_browser
 from hypothesis import settings
 
 from backbone.bus import zenoh_threads
@@ -44,6 +45,11 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(garbage.Frozen(), "frozen")
     limits.watch(config)
     config.pluginmanager.register(selection.OnlyQuick(), "only-quick")
+
+
+def pytest_unconfigure() -> None:
+    """End the browser of this process."""
+    web_browser.CHROMIUM_THREAD.close()
 
 
 MissionNetwork = Callable[..., AbstractAsyncContextManager[LocalNetwork]]
