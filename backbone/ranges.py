@@ -140,6 +140,8 @@ def wildness(value: object, depth: int = 0) -> str:
         ('', 'a number of nan')
     """
     match value:
+        case str() if len(value) <= LONGEST_DOCUMENT:
+            return ""  # the commonest first: a message holds thousands
         case None | bool() | Enum():
             return ""
         case float() if not -1e18 <= value <= 1e18:
@@ -150,7 +152,7 @@ def wildness(value: object, depth: int = 0) -> str:
             return ""
         case str() | bytes() | memoryview() if len(value) > LONGEST_DOCUMENT:
             return f"{len(value)} characters in one value"
-        case str() | bytes() | memoryview():
+        case bytes() | memoryview():
             return ""
         case list() | tuple() | dict() if len(value) > MOST_ENTRIES:
             return f"{len(value)} entries in one value"

@@ -12,9 +12,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import garbage
 import limits
 import pytest
 import selection
+import web_browser
 from hypothesis import settings
 
 from backbone.bus import zenoh_threads
@@ -40,8 +42,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Have limits for each test, failures printed when they happen, and long tests left out."""
+    config.pluginmanager.register(garbage.Frozen(), "frozen")
     limits.watch(config)
     config.pluginmanager.register(selection.OnlyQuick(), "only-quick")
+
+
+def pytest_unconfigure() -> None:
+    """End the browser of this process."""
+    web_browser.CHROMIUM_THREAD.close()
 
 
 MissionNetwork = Callable[..., AbstractAsyncContextManager[LocalNetwork]]

@@ -15,11 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from playwright_thread import BrowserThread
 
 WITHIN_S = 30.0
 SIZES = {"desktop": (1440, 900), "tablet": (820, 1180), "phone": (390, 844)}
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--force-color-profile=srgb"]
+CHROMIUM_THREAD = BrowserThread(lambda playwright: playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS))
 
 
 @asynccontextmanager
@@ -32,7 +34,7 @@ async def page_at(
     theme: str = "dark",
     expects: Collection[str] = ("WebSocket",),
 ) -> AsyncIterator[Any]:
-    """Open a page in a browser of this size; anything the page complains about fails the test.
+    """Open a page of this size in a fresh context of the browser; anything the page complains about fails the test.
 
     Args:
         size: Of ``SIZES``.
@@ -42,31 +44,30 @@ async def page_at(
         theme: What the system likes: light or dark.
         expects: Words of complaints that are no fault of the page.
     """
-    async_api = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
+    pytest.importorskip("playwright.async_api", reason="playwright is not installed")
     if not CHROMIUM:
         pytest.skip("no Chromium on this machine: apt-get install chromium")
     width, height = SIZES[size]
-    async with async_api.async_playwright() as playwright:
-        browser = await playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        try:
-            context = await browser.new_context(
-                viewport={"width": width, "height": height},
-                has_touch=size != "desktop",
-                is_mobile=size == "phone",
-                color_scheme=theme,
-            )
-            page = await context.new_page()
-            await page.add_init_script(script)
-            page.set_default_timeout(1000 * WITHIN_S)
-            complaints: list[str] = []
-            page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
-            await page.goto(f"{address}&user={size}")
-            await page.wait_for_selector(shows)
-            yield page
-            assert [one for one in complaints if not any(words in one for words in expects)] == []
-        finally:
-            await browser.close()
+    browser = await CHROMIUM_THREAD.browser()
+    context = await browser.new_context(
+        viewport={"width": width, "height": height},
+        has_touch=size != "desktop",
+        is_mobile=size == "phone",
+        color_scheme=theme,
+    )
+    try:
+        page = await context.new_page()
+        await page.add_init_script(script)
+        page.set_default_timeout(1000 * WITHIN_S)
+        complaints: list[str] = []
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+        await page.goto(f"{address}&user={size}")
+        await page.wait_for_selector(shows)
+        yield page
+        assert [one for one in complaints if not any(words in one for words in expects)] == []
+    finally:
+        await context.close()
 
 
 async def keep_picture(page: Any, name: str) -> None:

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,13 @@ PLANTED = [
     ("terminal", "resource_pool/planted.py", "from rich.console import Console"),
     ("terminal", "backbone/creator/planted.py", "import typer"),
 ]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _trees() -> Iterator[None]:
+    """Drop the parsed packages after these tests: garbage collection would visit a million nodes to the end."""
+    yield
+    walls.nodes.cache_clear()
 
 
 @pytest.fixture(scope="module")
