@@ -3,7 +3,8 @@
 Records the mission of IROS 2001 for some seconds unless given a recording, plays it beside a listener, and compares.
 Prints one JSON line for each speed: ``late_ms`` is how much later than recorded publications are heard, with the time
 on the bus; ``missing`` counts those that never were, though the listener was there; ``other_order`` those that came
-before an earlier one of their key and sender (of others urgent ones may). Times of the machine.
+before an earlier one of their key and sender (of others urgent ones may). Times of the machine. The floor is a process
+that does nothing but publish as many bytes at these times on bare zenoh, beside a listener of its own.
 """
 
 from __future__ import annotations
@@ -11,9 +12,12 @@ from __future__ import annotations
 import argparse
 import asyncio
 import gc
+import json
 import os
 import subprocess
+import sys
 import tempfile
+import time
 from collections import defaultdict
 from pathlib import Path
 
@@ -21,8 +25,8 @@ import zenoh
 from measuring import BIN, MISSION_XML, percentile, report
 
 from backbone import run_files
-from backbone.bus.clock import MissionClock
-from backbone.bus.zenoh_bus import client_config, open_session
+from backbone.bus.clock import MissionClock, PunctualClock
+from backbone.bus.zenoh_bus import client_config, hub_config, open_session
 from backbone.keys import COPIED, ROOT, Conversation
 from backbone.recording.hearing import Hearing
 from backbone.recording.known_messages import message_classes
@@ -33,6 +37,7 @@ KNOWN_S = 0.1  # measured: a publisher knows of its first subscriber after 7 ms;
 AFTER_S = 2.0  # chosen: the last message is long over; seconds of the machine
 HEARD = tuple(one for one in Conversation if one not in {Conversation.ASK, Conversation.ALIVE, *COPIED})
 MISSION = "replay-bench"
+SHARES = {"p50": 0.5, "p99": 0.99}
 Sent = tuple[str, str, int]
 """Key without the mission, source, number."""
 
@@ -88,8 +93,42 @@ def listen(until_s: float) -> tuple[float, list[tuple[Sent, float]]]:
     ]
 
 
-def compare(sent: dict[Sent, float], heard: list[tuple[Sent, float]], speed: float) -> None:
-    """Print how close what was heard is to what was sent while the listener was there."""
+def bare_late_ms(path: Path, speed: float) -> list[float]:
+    """Return how late publications of the same sizes at the same times are on bare zenoh."""
+    with path.open("rb") as file:
+        messages = Recording(file).messages(tuple(f"*/{one}" for one in HEARD))
+        due = [(one.at_s / speed, len(json.dumps(one.body, default=str))) for one in messages if one.source]
+    first_s = due[0][0]
+    endpoint, came = f"unixsock-stream/{path.parent}/floor.sock", list[float]()
+    with zenoh.open(hub_config([endpoint])) as hub:
+        hub.declare_subscriber("floor", lambda _sample: came.append(time.monotonic()))
+        words = [sys.executable, __file__, "--publish", endpoint]
+        with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as publisher:
+            said, _none = publisher.communicate("".join(f"{at_s - first_s} {size}\n" for at_s, size in due))
+    begun_s = float(said)
+    return [1e3 * (at_s - begun_s - due_s + first_s) for at_s, (due_s, _size) in zip(came, due, strict=True)]
+
+
+def publish(endpoint: str) -> None:
+    """Publish bytes at the times that standard input names; print when the first was due."""
+    due = [(float(at_s), bytes(int(size))) for at_s, size in map(str.split, sys.stdin)]
+    with zenoh.open(client_config(endpoint)) as session:
+        publisher = session.declare_publisher("floor", congestion_control=zenoh.CongestionControl.BLOCK)
+        clock = PunctualClock(time.monotonic() + BEFORE_S)
+        gc.collect()
+        gc.disable()
+
+        async def publish_all() -> None:
+            for at_s, raw in due:
+                await clock.sleep_until_s(at_s)
+                publisher.put(raw)
+
+        asyncio.run(publish_all())
+    print(clock.origin_monotonic_s)
+
+
+def compare(sent: dict[Sent, float], heard: list[tuple[Sent, float]], speed: float, floor_ms: list[float]) -> None:
+    """Print how close what was heard is to what was sent while the listener was there, beside the floor."""
     first = {one: at_s for one, at_s in reversed(heard) if one in sent}
     late_ms = [1e3 * (at_s - sent[one]) / speed for one, at_s in first.items()]
     newest, other_order = defaultdict[tuple[str, str], int](int), 0
@@ -107,6 +146,9 @@ def compare(sent: dict[Sent, float], heard: list[tuple[Sent, float]], speed: flo
         late_p99_ms=round(percentile(late_ms, 0.99), 2),
         late_most_ms=round(max(late_ms), 2),
         other_order=other_order,
+        floor="bare zenoh, bytes made before",
+        **{f"floor_{name}_ms": round(percentile(floor_ms, share), 2) for name, share in SHARES.items()},
+        floor_most_ms=round(max(floor_ms), 2),
     )
 
 
@@ -116,7 +158,11 @@ def main() -> None:
     parser.add_argument("recording", type=Path, nargs="?")
     parser.add_argument("--seconds", type=float, default=15.0)
     parser.add_argument("--speeds", type=float, nargs="+", default=[1.0, 10.0])
+    parser.add_argument("--publish", metavar="ENDPOINT", help=argparse.SUPPRESS)
     given = parser.parse_args()
+    if given.publish:
+        publish(given.publish)
+        return
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_RUNTIME_DIR"] = folder
         path = given.recording or Path(folder) / "it.mcap"
@@ -125,7 +171,8 @@ def main() -> None:
         sent = sent_in(path)
         for speed in given.speeds:
             there_s, heard = play(path, sent, speed)
-            compare({one: at_s for one, at_s in sent.items() if at_s >= there_s}, heard, speed)
+            floor_ms = bare_late_ms(path, speed)
+            compare({one: at_s for one, at_s in sent.items() if at_s >= there_s}, heard, speed, floor_ms)
 
 
 if __name__ == "__main__":
