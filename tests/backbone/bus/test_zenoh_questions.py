@@ -184,6 +184,18 @@ async def test_an_answer_that_was_given_before_the_end_arrives(endpoint: str) ->
             assert await last == "last"
 
 
+async def test_on_one_host_questions_are_answered_without_the_hub(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FOLDER", str(tmp_path))
+    at = free_endpoint()
+    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([at]))
+    async with serving(at), joined(at, ASKER) as asker:
+        await on_the_way(asker)
+        await hub.close()
+        assert [await ask(asker, str(number)) for number in range(10)] == [str(number) for number in range(10)]
+
+
 async def test_bytes_of_any_kind_end_neither_server_nor_asker(endpoint: str) -> None:
     async with serving(endpoint) as server, joined(endpoint, ASKER) as asker:
         await on_the_way(asker)
