@@ -134,11 +134,18 @@ class HostCopies:
                 made.close()
             else:
                 self._socket, self.reach_mission = made, name == MISSION_SOCKET
+                self._loop.add_reader(made, self._ended)
                 return
+
+    def _ended(self) -> None:
+        """Look for another recorder with the next message: this one, which never says anything, has ended."""
+        self._disconnect()
+        self._look_again_s = -math.inf
 
     def _disconnect(self) -> None:
         if self._socket is not None:
             self._become_full(False)
+            self._loop.remove_reader(self._socket)
             self._socket.close()
         self._socket = None
         self._waiting.clear()

@@ -108,6 +108,20 @@ async def test_a_recorder_that_begins_late_or_again_gets_what_is_sent_from_then_
     copies.close()
 
 
+async def test_a_recorder_that_begins_right_after_another_has_ended_gets_the_first_message(folder: Path) -> None:
+    first, second = Heard(), Heard()
+    async with listening(folder, first):
+        copies = HostCopies(folder)
+        copies.send(KEY, b"1")
+        await until(lambda: len(first) == 1, "the first recorder heard it")
+    async with listening(folder, second):
+        await asyncio.sleep(0.01)  # the system reports the end of the first at once
+        assert copies.find_recorder()
+        copies.send(KEY, b"2")
+        await until(lambda: len(second) == 1, "the second recorder heard it")
+    copies.close()
+
+
 async def test_a_process_knows_whether_its_copies_reach_the_recorder_of_the_mission(folder: Path) -> None:
     async with listening(folder, Heard(), is_of_mission=False):
         of_host = HostCopies(folder)
