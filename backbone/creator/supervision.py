@@ -357,12 +357,12 @@ def _absence(one: Supervised, now_s: float) -> Absence:
 
 
 def _next_stage(one: Supervised, end: _End, now_s: float) -> list[Instruction]:
-    """Ask, then SIGTERM, then SIGKILL. A process that is not ready cannot be asked."""
+    """Ask, then SIGTERM, then SIGKILL. A process that is not ready is asked by SIGTERM."""
     was_ready, one.phase = one.phase is Phase.READY, Phase.ENDING
     match end.stage:
-        case EndedBy.ITSELF if was_ready:
+        case EndedBy.ITSELF if was_ready or end.ask_s > 0:
             end.stage, one.deadline_s = EndedBy.ASKING, now_s + end.ask_s
-            if one.asked_by_signal:
+            if one.asked_by_signal or not was_ready:
                 return [SendSignal(one.name, one.pid, signal.SIGTERM)]
             return [AskToStop(one.name, end.ask_s)]
         case EndedBy.ITSELF | EndedBy.ASKING:
