@@ -15,11 +15,11 @@ class TooLate:
     """No answer came in time."""
 
 
-class NotHere:
+class NoInbox:
     """Nobody got the question: no component has the inbox any more."""
 
 
-Came = bytes | type[TooLate] | type[NotHere] | None
+Came = bytes | type[TooLate] | type[NoInbox] | None
 """The bytes of an answer; None: there is none, because the component is gone or a bug ended its answer."""
 
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from backbone.bus.answers import Came, NotHere
+from backbone.bus.answers import Came, NoInbox
 from backbone.operating_system import local_sockets
 from backbone.waiting import settle
 from backbone.wire import MAX_MESSAGE_BYTES
@@ -86,7 +86,7 @@ class Gathering:
         return number, Kind(kind), body
 
 
-class Line:
+class HostLine:
     """A connection to another process of this host.
 
     Args:
@@ -97,8 +97,8 @@ class Line:
     def __init__(
         self,
         connected: socket.socket,
-        took: Callable[[Line, int, Kind, bytes], None],
-        ended: Callable[[Line], None],
+        took: Callable[[HostLine, int, Kind, bytes], None],
+        ended: Callable[[HostLine], None],
     ) -> None:
         self._socket, self._took, self._ended = connected, took, ended
         self._loop = asyncio.get_running_loop()
@@ -169,10 +169,10 @@ class Line:
                 self._loop.remove_writer(self._socket)
 
 
-class LineQuestion:
+class HostQuestion:
     """A question that came on a line, with what its answer needs."""
 
-    def __init__(self, line: Line, number: int, payload: bytes) -> None:
+    def __init__(self, line: HostLine, number: int, payload: bytes) -> None:
         self._line, self._number, self.payload = line, number, _Whole(payload)
         self._is_answered = False
 
@@ -223,10 +223,10 @@ class HostLines:
         self._loop = asyncio.get_running_loop()
         self._listening, self.name = local_sockets.listen()
         """Name of the socket at which this process listens."""
-        self._inboxes: dict[str, Callable[[LineQuestion], None]] = {}
-        self._answering: set[Line] = set()
-        self._asking: dict[str, Line] = {}
-        self._asked: dict[Line, _Asked] = {}
+        self._inboxes: dict[str, Callable[[HostQuestion], None]] = {}
+        self._answering: set[HostLine] = set()
+        self._asking: dict[str, HostLine] = {}
+        self._asked: dict[HostLine, _Asked] = {}
         self._number = 0
         self._loop.add_reader(self._listening, self._accept)
 
@@ -235,7 +235,7 @@ class HostLines:
         """Number of processes that ask this one."""
         return len(self._answering)
 
-    def serve(self, inbox: str, asked: Callable[[LineQuestion], None]) -> Served:
+    def serve(self, inbox: str, asked: Callable[[HostQuestion], None]) -> Served:
         """Call a function with each question to this inbox until withdrawn."""
         self._inboxes[inbox] = asked
         return Served(self._inboxes, inbox)
@@ -245,7 +245,7 @@ class HostLines:
         line = self._asking.get(name)
         if line is None:
             try:
-                line = Line(local_sockets.connect(name), self._answered, self._ended)
+                line = HostLine(local_sockets.connect(name), self._answered, self._ended)
             except (OSError, ValueError) as error:
                 log.debug("no line to %s: %s", inbox, error)
                 return None
@@ -254,7 +254,7 @@ class HostLines:
         self._asked[line].left.append(way.leave)
         return way
 
-    async def ask(self, line: Line, inbox: str, payload: bytes, answered: asyncio.Future[Came]) -> Came:
+    async def ask(self, line: HostLine, inbox: str, payload: bytes, answered: asyncio.Future[Came]) -> Came:
         """Return what came of a question."""
         self._number += 1
         number, waiting = self._number, self._asked[line].waiting
@@ -265,7 +265,7 @@ class HostLines:
         finally:
             waiting.pop(number, None)
 
-    def forget(self, line: Line, left: Callable[[], None]) -> None:
+    def forget(self, line: HostLine, left: Callable[[], None]) -> None:
         """Do not call this function when the line ends."""
         if (asked := self._asked.get(line)) is not None and left in asked.left:
             asked.left.remove(left)
@@ -280,7 +280,7 @@ class HostLines:
 
     def _accept(self) -> None:
         try:
-            self._answering.add(Line(local_sockets.accept(self._listening), self._came, self._answering.discard))
+            self._answering.add(HostLine(local_sockets.accept(self._listening), self._came, self._answering.discard))
         except BlockingIOError:
             return
         except PermissionError as error:
@@ -294,7 +294,7 @@ class HostLines:
         if self._listening.fileno() >= 0:
             self._loop.add_reader(self._listening, self._accept)
 
-    def _came(self, line: Line, number: int, kind: Kind, body: bytes) -> None:
+    def _came(self, line: HostLine, number: int, kind: Kind, body: bytes) -> None:
         if kind is not Kind.QUESTION or len(body) < _INBOX.size:
             line.close()
             return
@@ -303,13 +303,13 @@ class HostLines:
         if asked is None:
             line.send(number, Kind.NO_INBOX, b"")
         else:
-            asked(LineQuestion(line, number, body[end:]))
+            asked(HostQuestion(line, number, body[end:]))
 
-    def _answered(self, line: Line, number: int, kind: Kind, body: bytes) -> None:
+    def _answered(self, line: HostLine, number: int, kind: Kind, body: bytes) -> None:
         if (answered := self._asked[line].waiting.get(number)) is not None:
-            settle(answered, {Kind.ANSWER: body, Kind.NO_INBOX: NotHere}.get(kind))
+            settle(answered, {Kind.ANSWER: body, Kind.NO_INBOX: NoInbox}.get(kind))
 
-    def _ended(self, line: Line) -> None:
+    def _ended(self, line: HostLine) -> None:
         for name in [name for name, one in self._asking.items() if one is line]:
             del self._asking[name]
         asked = self._asked.pop(line)
@@ -322,7 +322,7 @@ class HostLines:
 class Served:
     """An inbox that takes questions until it is withdrawn."""
 
-    def __init__(self, inboxes: dict[str, Callable[[LineQuestion], None]], inbox: str) -> None:
+    def __init__(self, inboxes: dict[str, Callable[[HostQuestion], None]], inbox: str) -> None:
         self._inboxes, self._inbox = inboxes, inbox
 
     def undeclare(self) -> None:
@@ -337,14 +337,14 @@ class LineWay:
         lost: Called when the line has ended, or nobody reads the inbox any more.
     """
 
-    def __init__(self, lines: HostLines, line: Line, inbox: str, lost: Callable[[LineWay], None]) -> None:
+    def __init__(self, lines: HostLines, line: HostLine, inbox: str, lost: Callable[[LineWay], None]) -> None:
         self._lines, self._line, self.inbox, self._lost = lines, line, inbox, lost
         self.is_open = True
 
     async def ask(self, payload: bytes, answered: asyncio.Future[Came]) -> Came:
         """Return what came of a question."""
         came = await self._lines.ask(self._line, self.inbox, payload, answered)
-        if came is NotHere:
+        if came is NoInbox:
             self.leave()
         return came
 

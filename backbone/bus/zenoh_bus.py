@@ -18,12 +18,12 @@ from typing import Any, cast
 
 import zenoh
 
-from backbone.bus.answers import Came, NotHere, TooLate, read_answer
+from backbone.bus.answers import Came, NoInbox, TooLate, read_answer
 from backbone.bus.bus_base import quoted
 from backbone.bus.declared import Declaration, FirstReply, Together
 from backbone.bus.host_boards import HostBoards
 from backbone.bus.host_copies import HostCopies, copies_for
-from backbone.bus.host_lines import LineQuestion, lines_for
+from backbone.bus.host_lines import HostQuestion, lines_for
 from backbone.bus.inbox import (
     EachSample,
     InboxBus,
@@ -155,12 +155,12 @@ class ZenohBus(InboxBus):
         answered = self.open_question()
         self.asked += 1
         try:
-            payload, came = write(self.envelope(question)), cast("Came", NotHere)
+            payload, came = write(self.envelope(question)), cast("Came", NoInbox)
             if (way := self.ways.way_to(address)) is not None:
                 came = await self.ways.ask(way, payload, answered, within_s)
         finally:
             self.end_question(answered)
-        if came is NotHere:
+        if came is NoInbox:
             came = await self._query(address, asked_key, payload, within_s)
         try:
             return read_answer(came, address, question, reply, within_s)
@@ -204,7 +204,7 @@ class ZenohBus(InboxBus):
             else:
                 self.start(self._answer(reader, answer, question))
 
-        def asked_on_line(question: LineQuestion) -> None:
+        def asked_on_line(question: HostQuestion) -> None:
             self.start(self._answer(reader, answer, question))
 
         direct = self._session.declare_subscriber(inbox, lambda sample: self.push(asked_directly, sample))

@@ -28,7 +28,7 @@ import zenoh
 
 from backbone.bus.answers import Came, TooLate
 from backbone.bus.declared import FirstReply
-from backbone.bus.host_lines import HostLines, LineQuestion, LineWay
+from backbone.bus.host_lines import HostLines, HostQuestion, LineWay
 from backbone.bus.inbox import InboxBus
 from backbone.bus.zenoh_outlets import on_the_wire
 from backbone.keys import ROOT, Conversation
@@ -279,7 +279,7 @@ class Query:
         self._query.drop()  # type: ignore[no-untyped-call]
 
 
-Asked = Query | DirectQuestion | LineQuestion
+Asked = Query | DirectQuestion | HostQuestion
 """A question that came, by any way."""
 
 

@@ -16,13 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus import host_lines
-from backbone.bus.answers import Came, NotHere
+from backbone.bus.answers import Came, NoInbox
 from backbone.bus.host_lines import (
     MOST_PACKET_BYTES,
     Gathering,
     HostLines,
+    HostQuestion,
     Kind,
-    LineQuestion,
     LineWay,
     packets_of,
     question_of,
@@ -95,7 +95,7 @@ async def ask(way: LineWay, payload: bytes) -> Came:
     return await asyncio.wait_for(way.ask(payload, asyncio.get_running_loop().create_future()), DEADLINE_S)
 
 
-def echo(question: LineQuestion) -> None:
+def echo(question: HostQuestion) -> None:
     question.answer(question.payload.to_bytes())
     question.drop()
 
@@ -103,7 +103,7 @@ def echo(question: LineQuestion) -> None:
 async def test_questions_of_any_length_are_answered_in_their_order(server: HostLines, asker: HostLines) -> None:
     came: list[bytes] = []
 
-    def note(question: LineQuestion) -> None:
+    def note(question: HostQuestion) -> None:
         came.append(question.payload.to_bytes())
         echo(question)
 
@@ -116,12 +116,12 @@ async def test_questions_of_any_length_are_answered_in_their_order(server: HostL
 
 async def test_a_question_that_is_dropped_or_that_nobody_takes_ends(server: HostLines, asker: HostLines) -> None:
     lost: list[LineWay] = []
-    served = server.serve(INBOX, LineQuestion.drop)
+    served = server.serve(INBOX, HostQuestion.drop)
     way = way_from(asker, server.name, lost.append)
     assert await ask(way, b"?") is None
     assert way.is_open
     served.undeclare()
-    assert await ask(way, b"?") is NotHere
+    assert await ask(way, b"?") is NoInbox
     assert lost == [way]
     assert not way.is_open
 
@@ -131,7 +131,7 @@ async def test_the_end_of_a_process_ends_its_open_questions_after_the_answers_th
 ) -> None:
     lost: list[LineWay] = []
 
-    def answer(question: LineQuestion) -> None:
+    def answer(question: HostQuestion) -> None:
         if question.payload != b"slow":
             echo(question)
             server.close()
