@@ -303,9 +303,9 @@ class Recorder:
                 await self._asked(address, AskSchedule(), Schedule)
             if address == COMPONENT_DATABASE:
                 await self._asked(address, ListTypes(), Types)
-            await self._asked(address, AskState(), ComponentState)
-            await self._asked(address, AskParameters(), Parameters)
-            await self._asked(address, AskStory(), Story)
+            if await self._asked(address, AskState(), ComponentState) is not None:  # else it has ended meanwhile
+                await self._asked(address, AskParameters(), Parameters)
+                await self._asked(address, AskStory(), Story)
 
     async def _asked(self, address: str, question: Message, reply: type[Reply]) -> Reply | None:
         """Return the answer once it was overheard too; None: there is none."""
