@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from functools import partial, reduce
 from operator import or_
 
-from backbone.addresses import LAUNCHER, NAMESERVER
+from backbone.addresses import LAUNCHER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.keys import COPIED, Conversation, address_of
 from backbone.launcher.ending_messages import EndMission, MissionEnding
@@ -58,10 +58,12 @@ class Player:
         self._since_s, self._keys, self._next_step = since_s, keys, next_step
         self._classes, self._checkpoints = classes, checkpoints or Checkpoints(classes)
         self._mission = RecordedMission(classes)
-        self._ahead = ReadAhead(recording, classes, since_s)
+        self._ahead = ReadAhead(recording, classes, since_s, self._key_ahead)
         self._accepts = reduce(or_, classes.values())
         self._tokens: dict[str, Subscription] = {}
-        self._known_keys: list[str] = []
+        self._served: dict[str, Subscription] = {}
+        self._prepared: set[str] = set()
+        self._to_prepare: dict[str, None] = {}  # keys of messages ahead
         self._untaken: deque[Ready] = deque()  # played, and taken by the mission in a gap, or before it answers
         self.ends: Callable[[], None] = lambda: None
         """Called when a person orders the mission to end."""
@@ -78,18 +80,18 @@ class Player:
         """
         self._mission = self._checkpoints.mission_at(self._recording, self._since_s)
         self._mission.rate = self._clock.rate
-        self._known_keys = [one.key for one in self._recording.contents().counts if one.key]
         self._ahead.fill()
 
     def begin(self) -> None:
         """Answer questions, and say what a newcomer must know. When: after ``catch_up``.
 
-        Whatever takes milliseconds is declared here, because later a message may be due.
+        The keys of messages that are read ahead are prepared here, and later ones in gaps: to serve an address and to
+        declare a publisher takes milliseconds, and the next message may be due.
         """
-        for address in dict.fromkeys((NAMESERVER, LAUNCHER, *map(address_of, self._known_keys))):
-            self._bus.serve(address, self._accepts, partial(self._answer, address))
-        for key in filter(self._is_published, dict.fromkeys(self._known_keys)):
-            self._bus.declare_publisher(address_of(key), Conversation(key.rpartition("/")[2]))
+        for address in self._mission.there:
+            self._serve(address)
+        while self._to_prepare:
+            self._prepare_one()
         for address in self._mission.present:
             self._tokens[address] = self._bus.declare_alive(address)
         self._bus.watch_alive("*/*", lambda address, alive: None if alive else self._mission.gone(address))
@@ -122,6 +124,9 @@ class Player:
             self._ahead.took((clock.now_s() - now_s) / clock.rate)
             await clock.sleep_s(0.0)
             now_s = clock.now_s()
+        while self._to_prepare and message.at_s - now_s > TAKE_GAP_S * clock.rate:
+            self._prepare_one()
+            now_s = clock.now_s()
         while self._untaken and message.at_s - now_s > TAKE_GAP_S * clock.rate:
             self._take_one()
             now_s = clock.now_s()
@@ -151,9 +156,27 @@ class Player:
 
     def _token_changed(self, address: str, *, is_up: bool) -> None:
         if is_up and address not in self._tokens:
+            self._serve(address)
             self._tokens[address] = self._bus.declare_alive(address)
         elif not is_up and address in self._tokens:
             self._tokens.pop(address).close()
+            self._served.pop(address).close()
+
+    def _key_ahead(self, key: str) -> None:
+        if key and key not in self._prepared:
+            self._to_prepare[key] = None
+
+    def _prepare_one(self) -> None:
+        key = next(iter(self._to_prepare))
+        del self._to_prepare[key]
+        self._prepared.add(key)
+        self._serve(address_of(key))
+        if self._is_published(key):
+            self._bus.declare_publisher(address_of(key), Conversation(key.rpartition("/")[2]))
+
+    def _serve(self, address: str) -> None:
+        if address not in self._served:
+            self._served[address] = self._bus.serve(address, self._accepts, partial(self._answer, address))
 
     def _take_one(self) -> None:
         taken = self._untaken.popleft()

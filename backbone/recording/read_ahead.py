@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from backbone.recording.reader import NoRecording, Recorded, Recording
@@ -43,10 +43,17 @@ class ReadAhead:
         recording: Read while this is used.
         classes: Known message classes, by schema.
         since_s: First mission time.
+        on_key: Called with the key of each message that was decoded.
     """
 
-    def __init__(self, recording: Recording, classes: Mapping[str, type[Message]], since_s: float) -> None:
-        self._records, self._classes = recording.records(since_s=since_s), classes
+    def __init__(
+        self,
+        recording: Recording,
+        classes: Mapping[str, type[Message]],
+        since_s: float,
+        on_key: Callable[[str], None] = lambda _key: None,
+    ) -> None:
+        self._records, self._classes, self._on_key = recording.records(since_s=since_s), classes, on_key
         self._ready: deque[Ready] = deque()
         self._bytes, self._is_over = 0, False
         self._damage: NoRecording | None = None
@@ -78,6 +85,7 @@ class ReadAhead:
         _schema, _channel, record, message = found
         self._ready.append(Ready(message, message_as_sent(self._classes, message), len(record.data)))
         self._bytes += len(record.data)
+        self._on_key(message.key)
 
     def fill(self) -> None:
         """Decode as much as may wait."""

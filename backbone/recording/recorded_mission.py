@@ -43,7 +43,7 @@ HISTORY = frozenset(
     {Conversation.ALIVE, Conversation.ASK, Conversation.LOG, Conversation.OPERATORS, Conversation.DECISIONS}
 )
 """Conversations of which all messages until then decide what is answered."""
-_TABLES = ("present", "_there", "_states", "_guests", "_newest", "_open", "_answers")
+_TABLES = ("present", "there", "_states", "_guests", "_newest", "_open", "_answers")
 MOST_OPEN = 1000  # chosen: questions under way at one time; the others were never answered
 
 
@@ -71,12 +71,13 @@ class RecordedMission:
         now_s: Mission time.
         rate: Mission seconds per second of the machine, as its clock is to be told.
         present: Addresses of the components that are ready.
+        there: Addresses that answer: those of messages and questions, unless their component is gone.
     """
 
     def __init__(self, classes: Mapping[str, type[Message]]) -> None:
         self.now_s, self.rate = 0.0, 1.0
         self.present: dict[str, None] = {}
-        self._there = {NAMESERVER, LAUNCHER}  # who said something, or was asked, and is not gone
+        self.there = dict.fromkeys((NAMESERVER, LAUNCHER))
         self._classes = classes
         self._states: dict[str, ComponentState] = {}
         self._guests: dict[str, ComponentState] = {}  # who came to look
@@ -98,7 +99,7 @@ class RecordedMission:
         """
         self.now_s = max(self.now_s, message.at_s)
         address, conversation = address_of(message.key), message.key.rpartition("/")[2]
-        self._there.add(address)
+        self.there[address] = None
         if conversation in STATES:
             self._newest[message.key, message.schema] = message
         match said:
@@ -135,7 +136,7 @@ class RecordedMission:
             UnknownName: No component has this name.
             UnknownRequest: The schedule has nothing of this name.
         """
-        if address not in self._there:
+        if address not in self.there:
             raise NotAnswered(f"{address} is not there at {self.now_s:.3f} s")
         match question:
             case AskTime():
@@ -179,7 +180,7 @@ class RecordedMission:
         else:
             self.present.pop(address, None)
             self._states.pop(address, None)
-            self._there.discard(address)
+            self.there.pop(address, None)
 
     def _asked_or_answered(self, address: str, message: Recorded, said: Message) -> None:
         asked = self._open.get(message.cause)
