@@ -38,7 +38,7 @@ class Kind(IntEnum):
     QUESTION = 0
     ANSWER = 1
     NO_ANSWER = 2  # a bug ended the answer
-    NO_INBOX = 3  # nobody got the question
+    NO_INBOX = 3  # no component got the question
 
 
 def packets_of(number: int, kind: Kind, body: bytes) -> Iterator[bytes]:
@@ -334,7 +334,7 @@ class LineWay:
     """The way to the inbox of one life of a component on this host.
 
     Args:
-        lost: Called when the line has ended, or nobody reads the inbox any more.
+        lost: Called when the line has ended, or the component has left the inbox.
     """
 
     def __init__(self, lines: HostLines, line: HostLine, inbox: str, lost: Callable[[LineWay], None]) -> None:

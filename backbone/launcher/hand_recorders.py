@@ -24,7 +24,7 @@ from backbone.wire import Envelope
 LOOK_EACH_S = 0.5  # chosen: half of a beat; seconds of the machine, as all times of this file
 SILENT_AFTER_S = 3.0  # chosen: three beats, as ``recorder_signs`` allows; a recorder goes behind all that decides
 EXPIRED_AFTER_S = 1.5  # chosen: a link expires 2 s after its last message; one that closes, within a beat and a half
-NAMED_FOR_S = 60.0  # chosen: time to read it; nobody here sees whether a process of another host has ended
+NAMED_FOR_S = 60.0  # chosen: time to read it; the launcher does not see the end of a process of another host
 MOST_KNOWN = 64  # chosen: far more than people begin; a faulty client fills no memory
 
 Event = tuple[str, str]

@@ -13,7 +13,7 @@ import sys
 
 IS_POSSIBLE = sys.platform == "linux"
 _PEER = struct.Struct("iII")  # struct ucred, unix(7): pid, user, group
-_NAME_BYTES = 12  # chosen: nobody guesses it, or takes it by chance
+_NAME_BYTES = 12  # chosen: no other process takes the same name by chance
 
 
 def listen() -> tuple[socket.socket, str]:
