@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -66,10 +67,22 @@ async def place() -> AsyncIterator[Place]:
         await bus.close()
 
 
-def listening(bus: ZenohBus) -> Recording:
-    recording = Recording()
-    bus.overhear(Conversation.FAR, recording.take_far, 10_000_000)
+async def listening(place: Place, source: str = ASKER) -> Recording:
+    """Return what a recorder hears, once the hub knows that it listens: it has told another session so."""
+    recording, other = Recording(), place.join("tester/other")
+    place.join(source).overhear(Conversation.FAR, recording.take_far, 10_000_000)
+    await until(lambda: knows_listener(other), "the hub knows of the listener")
     return recording
+
+
+@asynccontextmanager
+async def recorder_of_host(directory: Path, recording: Recording, *, is_of_mission: bool) -> AsyncIterator[None]:
+    ear = HostEar(directory, is_of_mission=is_of_mission)
+    await ear.open(recording.take, lambda bug: pytest.fail(str(bug)))
+    try:
+        yield
+    finally:
+        await ear.close()
 
 
 async def until(holds: Callable[[], bool], what: str) -> None:
@@ -82,8 +95,7 @@ async def until(holds: Callable[[], bool], what: str) -> None:
 
 
 async def test_all_but_pictures_comes_once_from_the_first_message_of_a_process_on_to_its_last(place: Place) -> None:
-    recording = listening(place.join(ASKER))
-    await asyncio.sleep(0.1)  # the hub knows of the listener
+    recording = await listening(place)
     spoken = [one for one in Conversation if one not in {Conversation.ASK, Conversation.ALIVE}]
     source = place.join(SERVER)
     source.publish(THIRD, Conversation.LOG, News(0))
@@ -106,7 +118,7 @@ async def test_all_but_pictures_comes_once_from_the_first_message_of_a_process_o
 
 
 async def test_questions_come_with_their_answers_from_who_answers(place: Place) -> None:
-    recording = listening(place.join(THIRD))
+    recording = await listening(place, THIRD)
     server, asker = place.join(SERVER), place.join(ASKER)
     server.serve(SERVER, Echo, echo)
     for _question in range(3):
@@ -119,34 +131,30 @@ async def test_questions_come_with_their_answers_from_who_answers(place: Place) 
 async def test_a_process_sends_no_copies_by_network_once_its_socket_leads_to_the_recorder_of_the_mission(
     place: Place, short_path: Path, is_of_mission: bool
 ) -> None:
-    far, near = listening(place.join(ASKER)), Recording()
-    ear = HostEar(short_path, is_of_mission=is_of_mission)
-    await ear.open(near.take, lambda bug: pytest.fail(str(bug)))
-    source = place.join(SERVER)
-    source.copies = HostCopies(short_path)
-    for number in range(10):
-        source.publish(SERVER, Conversation.LOG, News(number))
-        source.publish(SERVER, Conversation.STATUS, News(number))
-    await source.close()
-    await until(lambda: len(near) == 20, "all came by the socket")
-    if is_of_mission:
-        await asyncio.sleep(0.1)
-        assert far == []
-    else:
-        await until(lambda: len(far) == 20, "the recorder of the mission has them, too")
-        assert far == near
-    await ear.close()
+    far, near = await listening(place), Recording()
+    async with recorder_of_host(short_path, near, is_of_mission=is_of_mission):
+        source = place.join(SERVER)
+        source.copies = HostCopies(short_path)
+        for number in range(10):
+            source.publish(SERVER, Conversation.LOG, News(number))
+            source.publish(SERVER, Conversation.STATUS, News(number))
+        await source.close()
+        await until(lambda: len(near) == 20, "all came by the socket")
+        if is_of_mission:
+            await asyncio.sleep(0.1)
+            assert far == []
+        else:
+            await until(lambda: len(far) == 20, "the recorder of the mission has them, too")
+            assert far == near
 
 
 async def test_when_its_recorder_ends_a_process_sends_its_copies_by_network(place: Place, short_path: Path) -> None:
-    far, near = listening(place.join(ASKER)), Recording()
-    ear = HostEar(short_path, is_of_mission=True)
-    await ear.open(near.take, lambda bug: pytest.fail(str(bug)))
+    far, near = await listening(place), Recording()
     source = place.join(SERVER)
-    source.copies = HostCopies(short_path)
-    source.publish(SERVER, Conversation.LOG, News(0))
-    await until(lambda: len(near) == 1, "it came by the socket")
-    await ear.close()
+    async with recorder_of_host(short_path, near, is_of_mission=True):
+        source.copies = HostCopies(short_path)
+        source.publish(SERVER, Conversation.LOG, News(0))
+        await until(lambda: len(near) == 1, "it came by the socket")
     for number in range(1, 10):
         source.publish(SERVER, Conversation.LOG, News(number))
     await until(lambda: bool(far) and far[-1].sequence == 10, "the last came by network")
@@ -155,7 +163,7 @@ async def test_when_its_recorder_ends_a_process_sends_its_copies_by_network(plac
 
 
 async def test_members_of_a_shared_process_send_their_copies_once(place: Place) -> None:
-    recording = listening(place.join(ASKER))
+    recording = await listening(place)
     session = SharedSession(MISSION, place.endpoint)
     members = session.join(SERVER, place.clock), session.join(THIRD, place.clock)
     try:
@@ -176,7 +184,7 @@ async def test_nothing_is_copied_while_no_recorder_listens(place: Place) -> None
     assert source.far is not None
     while source.far.wants(Conversation.LOG):  # noqa: ASYNC110  as long as a session may not know of listeners
         await asyncio.sleep(0.05)
-    recording = listening(place.join(ASKER))
+    recording = await listening(place)
     await until(lambda: knows_listener(source), "it is known that a recorder listens")
     assert recording == []
 
