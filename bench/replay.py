@@ -79,7 +79,9 @@ def listen(until_s: float) -> tuple[float, list[tuple[Sent, float]]]:
     clock = MissionClock(run.clock_origin_monotonic_s, run.clock_rate)
     came = list[tuple[zenoh.Sample, float]]()
     session = open_session(client_config(run.endpoint))
-    session.declare_subscriber(f"{ROOT}/{MISSION}/**", lambda sample: came.append((sample, clock.now_s())))
+    for conversation in HEARD:
+        pattern = f"{ROOT}/{MISSION}/*/*/{conversation}"
+        session.declare_subscriber(pattern, lambda sample: came.append((sample, clock.now_s())))
     there_s = clock.now_s() + KNOWN_S * clock.rate
     gc.collect()
     gc.freeze()

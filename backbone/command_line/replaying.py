@@ -11,6 +11,7 @@ import socket
 import sys
 import time
 from dataclasses import dataclass
+from functools import partial
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -20,11 +21,14 @@ import msgspec
 from backbone import run_files
 from backbone.authentication import socket_endpoint
 from backbone.bus.clock import PunctualClock
+from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.command_line.comparing import print_comparison
 from backbone.command_line.message_lines import message_line
 from backbone.command_line.recording_work import opened
 from backbone.component.class_path import load_class
+from backbone.component.messages import StoryEvent
+from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.launcher.preconditions import refuse_if_up
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, legal
@@ -151,6 +155,7 @@ async def _play_in(
         next_step=_asked_for_step if wanted.is_stepped else None,
     )
     player.ends, player.rests = ended.set, _Collector().collect
+    player.announces = partial(_announce, bus, clock, f"plays {path.name} from {since_s:.3f} s on")
     try:
         player.catch_up()
         player.begin()
@@ -174,6 +179,10 @@ async def _play_in(
     finally:
         gc.enable()
         await bus.close()
+
+
+def _announce(bus: Bus, clock: Clock, what: str) -> None:
+    bus.publish(bus.source, Conversation.LOG, StoryEvent(clock.now_s(), bus.source, what, REPLAY, ""))
 
 
 class _Collector:

@@ -24,6 +24,7 @@ from backbone.recording.recorded_mission import RecordedMission
 from backbone.recording.revival import message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message
 
+ANNOUNCED_S = 0.05  # measured: what has rested for seconds is slow for its first 30 ms; seconds of the machine
 TAKE_GAP_S = 0.005  # measured: the first message of a class takes so long, others a tenth; seconds of the machine
 _PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, *COPIED}
 
@@ -67,6 +68,11 @@ class Player:
         self._untaken: deque[Ready] = deque()  # played, and taken by the mission in a gap, or before it answers
         self.ends: Callable[[], None] = lambda: None
         """Called when a person orders the mission to end."""
+        self.announces: Callable[[], None] = lambda: None
+        """Called ``ANNOUNCED_S`` before the first message, but for the steps of a person; settable.
+
+        What it publishes goes the way of the first message ahead of it: through memory and links that have rested.
+        """
         self.rests: Callable[[float], None] = lambda _gap_s: None
         """Called before each message with the seconds of the machine until it is due; settable."""
         self.played = 0
@@ -111,6 +117,9 @@ class Player:
         Raises:
             NoRecording: The recording is damaged from here on.
         """
+        if self._next_step is None and (first := self._ahead.first()) is not None:
+            await self._clock.sleep_until_s(first.message.at_s - ANNOUNCED_S * self._clock.rate)
+            self.announces()
         while (following := self._ahead.first()) is not None:
             await self._wait_until_due(following.message)
             self._ahead.pop()

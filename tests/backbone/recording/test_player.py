@@ -128,6 +128,30 @@ def test_each_publication_comes_at_its_time_in_order_with_its_sender_and_number(
     assert all(envelope.source == SCOUT and envelope.stamp_s <= at_s + 1e-9 for at_s, envelope in heard)
 
 
+@pytest.mark.parametrize(("since_s", "speed", "expected_s"), [(0.5, 0.0, 0.95), (0.5, 2.0, 0.9), (0.98, 0.0, 0.98)])
+def test_the_replay_is_announced_a_moment_before_the_first_message(since_s: float, speed: float, expected_s: float):
+    announced_s: list[float] = []
+
+    async def scene(_ear: LocalBus, clock: VirtualClock, player: Player) -> None:
+        player.announces = lambda: announced_s.append(clock.now_s())
+
+    played(recording_of(*MORNING), scene, since_s=since_s, speed=speed)
+    assert announced_s == pytest.approx([expected_s], abs=1e-5)
+
+
+def test_steps_are_not_announced():
+    announced: list[bool] = []
+
+    async def scene(_ear: LocalBus, _clock: VirtualClock, player: Player) -> None:
+        player.announces = lambda: announced.append(True)
+
+    async def step(_message: Recorded) -> None:
+        assert not announced
+
+    played(recording_of(*MORNING), scene, next_step=step)
+    assert not announced
+
+
 def test_tokens_rise_and_fall():
     played(recording_of(*MORNING))
     assert tokens == [(SCOUT, True), (SCOUT, False)]
