@@ -36,6 +36,7 @@ from measuring import BIN, MISSION_XML, percentile, report, summary
 
 from backbone.command_line.watching import Watched, watch
 from backbone.command_line.where import Where
+from backbone.operating_system.own_process import go_behind_others
 from backbone.recording.known_messages import message_classes
 from ui_console.model.driving import MoveWish
 from ui_console.model.events import CommandApplied, ConsoleEvent
@@ -117,6 +118,7 @@ class Counter(io.TextIOBase):
 
 def be_watcher(cycles: int, seconds: float) -> None:
     """Do a part of the kind that each line of the input says; print how many messages were shown."""
+    go_behind_others()  # as the command does
     message_classes()  # read once, not at each attaching
     lasted_s = used_s = 0.0
     for line in sys.stdin:

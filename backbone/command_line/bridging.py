@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 from backbone.command_line.connection import connected
 from backbone.command_line.listening import opening_port, until_ended
 from backbone.command_line.watching import overhearing
@@ -21,8 +19,7 @@ async def bridge(where: Where, host: str, port: int, keys: tuple[str, ...]) -> E
     Raises:
         PortUnusable: The port cannot be opened.
     """
-    with suppress(OSError):
-        go_behind_others()  # who decides goes before who shows
+    go_behind_others()
     async with connected(where) as (bus, clock), until_ended(bus) as ended:
         with opening_port(host, port):
             served = Bridge(bus.mission, host, port, installed())

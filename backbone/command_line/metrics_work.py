@@ -22,8 +22,7 @@ async def serve_metrics(where: Where, host: str, port: int) -> ExitCode:
     Raises:
         PortUnusable: The port cannot be opened.
     """
-    with suppress(OSError):
-        go_behind_others()  # who decides goes before who counts
+    go_behind_others()
     async with connected(where) as (bus, clock), until_ended(bus) as ended:
         loop, watch = asyncio.get_running_loop(), MetricsWatch(bus, clock)
 

@@ -357,11 +357,13 @@ def watch(
 ) -> None:
     """Print what is said at these keys of a mission that is up, questions and answers too, until Ctrl-C."""
     from backbone.command_line import watching
+    from backbone.operating_system.own_process import go_behind_others
 
     where, wanted = (
         chosen(mission, connect, secret_file),
         watching.Watched(tuple(keys or ()), field, most, for_s, as_json),
     )
+    go_behind_others()
     run(lambda: watching.top(where, wanted, once=False) if rate else watching.watch(where, wanted))
 
 
@@ -375,11 +377,13 @@ def top(
 ) -> None:
     """Print rates and sizes of the keys of a mission that is up, the busiest first."""
     from backbone.command_line import watching
+    from backbone.operating_system.own_process import go_behind_others
 
     where, wanted = (
         chosen(mission, connect, secret_file),
         watching.Watched(tuple(keys or ()), for_s=for_s, as_json=as_json),
     )
+    go_behind_others()
     run(lambda: watching.top(where, wanted, once=True))
 
 

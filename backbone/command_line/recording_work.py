@@ -116,8 +116,7 @@ async def record_to(
                 host_only=told.host_only,
                 is_lossless=told.is_lossless,
             )
-            with suppress(OSError):
-                go_behind_others()  # who decides goes before who records
+            go_behind_others()
             beats = RecorderBeats(bus, path) if told.host_folder is None else None  # else its starter watches it
             recorder.on_flushed = beats.give if beats is not None else RecorderSigns().give
             gc.collect()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+from contextlib import suppress
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME, _PR_SET_CHILD_SUBREAPER = 1, 15, 36  # linux/prctl.h
 _LONGEST_TITLE = 15  # linux/sched.h: TASK_COMM_LEN less its end mark
@@ -28,8 +29,12 @@ def set_title(title: str) -> None:
 
 
 def go_behind_others() -> None:
-    """Let other processes of this machine go first from now on."""
-    os.nice(_BEHIND)
+    """Let other processes of this machine go first from now on, where the system has an order of processes.
+
+    For who records, counts or shows: who decides and commands goes first.
+    """
+    with suppress(OSError):
+        os.nice(_BEHIND)
 
 
 def _prctl(option: int, value: object) -> None:
