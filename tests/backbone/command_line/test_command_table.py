@@ -36,6 +36,7 @@ def said(
     run: Callable[[typer.Typer], object] = run_table,
 ) -> str:
     monkeypatch.setattr(sys, "argv", list(typed))
+    monkeypatch.setattr(sys.modules["__main__"], "__package__", "")  # else the program's name begins "python -m"
     with pytest.raises(SystemExit):
         run(table)
     return capsys.readouterr().out
