@@ -16,44 +16,39 @@ import logging
 import operator
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, TypeVar
-from zlib import crc32
 
 import msgspec
 
 from backbone.addresses import DEPENDENCY_DATABASE, RC_MANAGER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.abilities import Abilities, command_form
+from backbone.component.abilities import Abilities
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
-from backbone.component.peer_monitor import PeerMonitor
 from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import (
-    BEAT_WITHIN_S,
     AskRequest,
-    Beat,
-    ChangeRuntime,
     CloseGate,
     Done,
     GateClosed,
     GateOpens,
     Leases,
     OpenGate,
-    SetIdle,
     TakePath,
     Withdraw,
 )
 from backbone.scheduling.requests import Usage
-from backbone.waiting import set_within
 from backbone.wire import Accepts, Envelope, Message, kinds_of
+from resource_pool.arc_commands import ArcCommands
 from resource_pool.arc_request import ROBOT, ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
-from resource_pool.commands import OF_THE_BASE, Command, command_of
+from resource_pool.commands import Command
 from resource_pool.gate import Gate
+from resource_pool.manager_watch import ManagerWatch
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
     Accepted,
@@ -61,11 +56,9 @@ from resource_pool.messages import (
     ArcQuestion,
     ArcState,
     AskArc,
-    AskBeat,
     GiveCommand,
     NeedsRestart,
     NoSuchAction,
-    Noted,
     NotFromYou,
     NotYours,
     Release,
@@ -78,19 +71,15 @@ from resource_pool.messages import (
     WantRuntime,
 )
 from resource_pool.owner_notices import OwnerNotices
+from resource_pool.owner_watch import OwnerWatch
 from resource_pool.placed_request import PlacedRequest
 from resource_pool.set_lease import SetLease
 
 log = logging.getLogger(__name__)
-
 W = TypeVar("W")
 
-OWNER_GONE_S = 0.5  # chosen: a robot is free within a second of its console's death; a new hub is found sooner
-OWNER_BEAT_S = 0.9  # chosen: an owner that answers later has missed a beat; less than the RC manager's limit
-BEAT_SPREAD_S = 0.2  # chosen: all ARCs get a renewal at once; their owners and the hub answer a few at a time
 PREPARE_S = 0.9  # chosen: less than the RC manager's limit for the opening, so the gate opens in time or never
 RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # parameters that may change while it runs
-ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; after this it has missed one
 
 
 class AggregateResourceController(Component[ArcParameters]):
@@ -117,17 +106,16 @@ class AggregateResourceController(Component[ArcParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._in_force = self.parameters
-        self._owner = self.parameters.owner
+        self._in_force, self._owner, note = self.parameters, self.parameters.owner, self.story.note
         self._gate = Gate(self.name)
-        self._placed = PlacedRequest(bus, clock, self.name, changed=self._set_parameters, note=self.story.note)
-        self._asked = asyncio.Event()
-        self._notices = OwnerNotices(bus, clock, self._owner, self.story.note)
-        self._lease = SetLease(self.name, clock.rate)
-        self._leased, self._renewed = asyncio.Event(), asyncio.Event()
-        self._slice = ArcSlice(bus, clock, self._gate, self._owner, longest_s=self._longest_s, note=self.story.note)
+        self._placed = PlacedRequest(bus, clock, self.name, changed=self._set_parameters, note=note)
+        self._notices = OwnerNotices(bus, clock, self._owner, note)
+        self._lease, self._leased = SetLease(self.name, clock.rate), asyncio.Event()
+        self._slice = ArcSlice(bus, clock, self._gate, self._owner, longest_s=self._longest_s, note=note)
+        self._owner_watch = OwnerWatch(bus, clock, self._owner, state=self._arc_state, end=self.end, note=note)
+        self._manager_watch = ManagerWatch(bus)
+        self._able = ArcCommands(launch.type, self.commands)
         self._offering: asyncio.Task[None] | None = None
-        self._manager: PeerMonitor | None = None
         self._commands = self._refused = 0
 
     # ------------------------------------------------------------------ hooks
@@ -145,17 +133,8 @@ class AggregateResourceController(Component[ArcParameters]):
         return Abilities(
             gives_pictures=cls.gives_pictures,
             body=cls.body,
-            commands=[
-                command_form(kind, kind.word(), moves=kind.moves, without=OF_THE_BASE, roles=cls.roles_of(kind))
-                for kind in cls.commands
-            ],
+            commands=ArcCommands(cls.__name__, cls.commands).forms(),
         )
-
-    @classmethod
-    def roles_of(cls, command: type[Command]) -> list[str]:
-        """Return the roles of the RCs that obey this command."""
-        able = cls.commands[command]
-        return [able] if isinstance(able, str) else list(able)
 
     @classmethod
     def kinds(cls) -> dict[str, str]:
@@ -204,11 +183,11 @@ class AggregateResourceController(Component[ArcParameters]):
     async def serve(self) -> None:
         """Send the request, then watch owner and RC manager until the ARC ends."""
         self.start_task(self._notices.send(), "notify owner")
-        self.start_task(self._watch_owner(), "watch owner")
-        self.start_task(self._beat(), "beat")
+        self.start_task(self._owner_watch.watch(), "watch owner")
+        self.start_task(self._owner_watch.beat(), "beat")
         self.start_task(self._watch_lease(), "watch lease")
         await self._send_request()
-        self.start_task(self._watch_rc_manager(), "watch RC manager")
+        self.start_task(self._manager_watch.watch(self._send_request), "watch RC manager")
 
     async def drain(self) -> None:
         """Give the set back."""
@@ -230,7 +209,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 return await self._close(order)
             case AskRequest():
                 current = self._placed.current(self.epochs, self._gate.granted_s)
-                self._asked.set()
+                self._manager_watch.asks()
                 return current
             case TakePath(path=path):
                 self._placed.take_path(path)
@@ -242,13 +221,11 @@ class AggregateResourceController(Component[ArcParameters]):
             case Command() as command:
                 return await self._command(command)
             case GiveCommand() as order:
-                return await self._command(self._command_by_word(order))
+                return await self._command(self._able.by_word(order))
             case WantIdle(idle=idle):
-                await self._placed.change(SetIdle(self.name, idle), idle=idle)
+                await self._placed.set_idle(idle)
             case WantRuntime(minimum_runtime_s=least, maximum_runtime_s=most):
-                require_runtime(self.name, least, most)
-                change = ChangeRuntime(self.name, least, most)
-                await self._placed.change(change, minimum_runtime_s=least, maximum_runtime_s=most)
+                await self._placed.set_run_times(least, most)
             case WantLonger(until_s=until_s):
                 await self._slice.extend(until_s)
             case Release(reason=reason):
@@ -283,7 +260,6 @@ class AggregateResourceController(Component[ArcParameters]):
         return {"commands": self._commands, "refused_swapped_out": self._refused}
 
     # ------------------------------------------------------------------ asking for run time
-
     async def _send_request(self) -> None:
         """Send the request to the RC manager; end if the RC manager refuses it."""
         try:
@@ -340,7 +316,8 @@ class AggregateResourceController(Component[ArcParameters]):
             return
         self._slice.end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
         self.report(f"granted: {', '.join(self._placed.rcs.values())}")
-        noted = self._notices.notify(Resumed(self.name, self._placed.rcs, order.epochs, order.until_s, self._robot()))
+        rcs, robot = self._placed.rcs, self._placed.rcs.get(self.body, "")
+        noted = self._notices.notify(Resumed(self.name, rcs, order.epochs, order.until_s, robot))
         if self.parameters.may_say_not_now:
             self._offering = self.start_task(self._slice.offer(noted), "offer more")
 
@@ -371,9 +348,8 @@ class AggregateResourceController(Component[ArcParameters]):
         return max(self.parameters.minimum_runtime_s, self.parameters.maximum_runtime_s)
 
     # ------------------------------------------------------------------ commands
-
     async def _command(self, command: Command) -> Applied:
-        role = self._role_of(command)
+        role = self._able.role_of(command)
         try:
             epoch = self._gate.epoch_of(self.rc(role))
         except SwappedOut:
@@ -381,24 +357,6 @@ class AggregateResourceController(Component[ArcParameters]):
             raise
         self._commands += 1
         return await self.tell_rc(role, epoch, command)
-
-    def _command_by_word(self, order: GiveCommand) -> Command:
-        for kind in self.commands:
-            if kind.word() == order.word:
-                return command_of(kind, order.values, role=order.role, after_stop=order.after_stop)
-        known = ", ".join(kind.word() for kind in self.commands)
-        raise NoSuchAction(f"{self.launch.type} has no command {order.word}; it has: {known}", command=order.word)
-
-    def _role_of(self, command: Command) -> str:
-        roles = self.roles_of(type(command))
-        if command.role not in ([*roles, ""] if len(roles) == 1 else roles):
-            which = f"no {command.role} that obeys" if command.role else "several RCs that obey"
-            raise NoSuchAction(
-                f"{self.launch.type} has {which} {command.word()}",
-                remedy=f"Name one of these roles in the command: {', '.join(roles)}.",
-                role=command.role,
-            )
-        return command.role or roles[0]
 
     def _arc_state(self) -> ArcState:
         gate = self._gate
@@ -412,16 +370,12 @@ class AggregateResourceController(Component[ArcParameters]):
             reason=gate.reason,
             by=gate.by,
             expected_start_s=gate.expected_s,
-            robot=self._robot(),
+            robot=self._placed.rcs.get(self.body, ""),
         )
 
-    def _robot(self) -> str:
-        return self._placed.rcs.get(self.body, "")
-
     # ------------------------------------------------------------------ watching
-
     def _heard_leases(self, envelope: Envelope[Leases]) -> None:
-        self._renewed.set()
+        self._owner_watch.leases_renewed()
         if self._lease.heard(envelope.body, envelope.stamp_s, self._gate.epochs):
             self.publish_event(self.name, "is counted as running and holds nothing: sends its request again")
             self.start_task(self._ask_anew(), "ask anew")
@@ -437,51 +391,10 @@ class AggregateResourceController(Component[ArcParameters]):
             if self._gate.epochs and self.clock.now_s() >= self._lease.until_s:
                 self.publish_event(self.name, "its lease expired: no renewal came in time", LogLevel.WARNING)
                 self._shut("lease", "rc_manager", -1.0)
-                if self._manager is not None and self._manager.is_there:
+                if self._manager_watch.is_there:
                     await self._ask_anew()
 
     async def _ask_anew(self) -> None:
         """Withdraw the holds that the RC manager still counts, and send the request again."""
         if await self._placed.withdraw_all():
             await self._send_request()
-
-    async def _watch_owner(self) -> None:
-        owner = PeerMonitor(self.bus, self._owner, gone_after_s=OWNER_GONE_S)
-        try:
-            await owner.wait_gone()
-        finally:
-            owner.close()
-        self.end(f"its owner {self._owner} is gone")
-
-    async def _beat(self) -> None:
-        """Publish a heartbeat after each renewal of leases, while this ARC and its owner live."""
-        place_s = crc32(self.name.encode()) % 1000 / 1000 * BEAT_SPREAD_S
-        while True:
-            self._renewed.clear()
-            try:
-                await self.bus.ask(self._owner, AskBeat(self._arc_state()), Noted, within_s=OWNER_BEAT_S)
-            except Refusal as refusal:
-                self.end(f"its owner does not know it: {refusal.detail}")
-            except LinkError as error:
-                self.story.note(self._owner, f"does not answer: {error}")
-            else:
-                self.bus.publish(self.address, Conversation.BEAT, Beat(self.name))
-            if await set_within(self._renewed, BEAT_WITHIN_S):
-                await self.clock.sleep_s(place_s * self.clock.rate)
-
-    async def _watch_rc_manager(self) -> None:
-        """Send the request again if a restarted RC manager has not asked for it."""
-        manager = self._manager = PeerMonitor(self.bus, RC_MANAGER)
-        try:
-            await manager.wait_there()
-            while True:
-                self._asked.clear()
-                await manager.wait_risen(manager.times_risen + 1)
-                try:
-                    async with asyncio.timeout(ASKED_AGAIN_S):
-                        await self._asked.wait()
-                except TimeoutError:
-                    await self._send_request()
-        finally:
-            self._manager = None
-            manager.close()

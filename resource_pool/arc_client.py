@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Mapping
-from typing import Protocol
 
 import msgspec
 
@@ -23,6 +22,7 @@ from backbone.placer.wishes import Wish
 from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_keeper import REPLY_TIME_S, START_TIME_S, ArcKeeper
+from resource_pool.arc_listener import ArcListener, NotMyArc
 from resource_pool.arc_request import ROBOT, claim_parameters
 from resource_pool.commands import Command, Drive, Halt, Jump, Move, WrongCommand
 from resource_pool.localization import (
@@ -114,26 +114,6 @@ __all__ = [
 ]
 
 log = logging.getLogger(__name__)
-
-
-class NotMyArc(Refusal):
-    """This decision process does not claim the ARC of the notice."""
-
-    code = "arc.not_mine"
-    remedy = "Nothing to do: an ARC whose owner does not know it ends by itself."
-
-
-class ArcListener(Protocol):
-    """A decision process's reactions to the begin and end of grants."""
-
-    async def arc_resumed(self, notice: Resumed) -> None:
-        """Continue: commands pass from now on."""
-
-    async def arc_suspending(self, notice: Suspending) -> None:
-        """Stop cleanly; return after that, within ``notice.deadline_s``."""
-
-    async def arc_suspended(self, notice: Suspended) -> None:
-        """Stop sending commands, because the RCs are gone; keep your state."""
 
 
 class ArcClient:

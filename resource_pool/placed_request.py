@@ -12,10 +12,10 @@ from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.errors import LinkError, Refusal
-from backbone.rc_manager.messages import ChangeRuntime, CurrentRequest, Done, Withdraw
+from backbone.rc_manager.messages import ChangeRuntime, CurrentRequest, Done, SetIdle, Withdraw
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.wire import Message
-from resource_pool.arc_request import set_of
+from resource_pool.arc_request import require_runtime, set_of
 from resource_pool.arc_slice import RC_REPLY_S
 
 log = logging.getLogger(__name__)
@@ -116,7 +116,21 @@ class PlacedRequest:
             raise UnknownRequest(f"{self._arc} has no request yet")
         return CurrentRequest(self.request, list(self.rcs.values()), dict(epochs), granted_s)
 
-    async def change(self, wish: Message, **changed: bool | float) -> None:
+    async def set_idle(self, idle: bool) -> None:
+        """Ask for no run time, or again for run time; see ``_change``."""
+        await self._change(SetIdle(self._arc, idle), idle=idle)
+
+    async def set_run_times(self, least_s: float, most_s: float) -> None:
+        """Ask for slices of this length; see ``_change``.
+
+        Raises:
+            MissingRuntime: No slice can have these run times.
+        """
+        require_runtime(self._arc, least_s, most_s)
+        change = ChangeRuntime(self._arc, least_s, most_s)
+        await self._change(change, minimum_runtime_s=least_s, maximum_runtime_s=most_s)
+
+    async def _change(self, wish: Message, **changed: bool | float) -> None:
         """Change the request; the RC manager and its successors get the change.
 
         Raises:

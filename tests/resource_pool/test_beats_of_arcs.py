@@ -11,7 +11,7 @@ from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import BEAT_WITHIN_S, RENEW_EVERY_S, Beat, Leases
-from resource_pool.aggregate_resource_controller import BEAT_SPREAD_S
+from resource_pool.owner_watch import BEAT_SPREAD_S
 
 ROBOTS = ["scout1", "scout2", "radio"]
 

@@ -1,0 +1,51 @@
+"""An ARC's watch over the RC manager: one that was restarted knows no request that it has not asked for."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+from backbone.addresses import RC_MANAGER
+from backbone.bus.interface import Bus
+from backbone.component.peer_monitor import PeerMonitor
+
+ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; after this it has missed one
+
+
+class ManagerWatch:
+    """Watches the RC manager for one ARC.
+
+    Args:
+        bus: For its token.
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self._asked = asyncio.Event()
+        self._manager: PeerMonitor | None = None
+
+    @property
+    def is_there(self) -> bool:
+        """Whether an RC manager lives; False before ``watch``."""
+        return self._manager is not None and self._manager.is_there
+
+    def asks(self) -> None:
+        """Record that the RC manager asked for the ARC's request."""
+        self._asked.set()
+
+    async def watch(self, send_request: Callable[[], Awaitable[None]]) -> None:
+        """Send the request again if a restarted RC manager has not asked for it."""
+        manager = self._manager = PeerMonitor(self._bus, RC_MANAGER)
+        try:
+            await manager.wait_there()
+            while True:
+                self._asked.clear()
+                await manager.wait_risen(manager.times_risen + 1)
+                try:
+                    async with asyncio.timeout(ASKED_AGAIN_S):
+                        await self._asked.wait()
+                except TimeoutError:
+                    await send_request()
+        finally:
+            self._manager = None
+            manager.close()
