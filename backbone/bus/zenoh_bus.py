@@ -20,24 +20,20 @@ import zenoh
 
 from backbone.bus.answers import Came, NoInbox, TooLate, read_answer
 from backbone.bus.bus_base import quoted
-from backbone.bus.declared import Declaration, FirstReply, Together
+from backbone.bus.declared import Together
 from backbone.bus.host_boards import HostBoards
 from backbone.bus.host_copies import HostCopies, copies_for
 from backbone.bus.host_lines import HostQuestion, lines_for
 from backbone.bus.inbox import (
     EachSample,
-    InboxBus,
     LatestSample,
     OverheardSamples,
-    Receiving,
     bytes_of,
     reader_of,
 )
 from backbone.bus.interface import (
     Answer,
     Clock,
-    LifeListener,
-    LinkListener,
     Listener,
     Overhearer,
     Overhearing,
@@ -47,6 +43,7 @@ from backbone.bus.interface import (
 from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, LosslessStreams
 from backbone.bus.near_listening import NearListening
 from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
+from backbone.bus.zenoh_life import LifeBus
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
 from backbone.bus.zenoh_questions import Asked, DirectQuestion, Query, Ways, new_inbox, query
 from backbone.bus.zenoh_sessions import (
@@ -58,10 +55,9 @@ from backbone.bus.zenoh_sessions import (
     open_when_up,
     watch_links,
 )
-from backbone.bus.zenoh_settings import LINK_LEASE_MS
 from backbone.bus.zenoh_subscribers import Subscribers
 from backbone.errors import Refusal
-from backbone.keys import Conversation, address_of, key, key_of_all, key_of_senders, sender_of
+from backbone.keys import Conversation, key, key_of_all, key_of_senders, sender_of
 from backbone.quality import LARGE, NEVER_DROPPED, QUALITY
 from backbone.wire import (
     Accepts,
@@ -83,7 +79,7 @@ _TIMEOUT_PAYLOAD = b"Timeout"
 TELL_WITHIN_S = 0.01  # chosen: copies for recorders are made after a context switch, not in it; a death loses so much
 
 
-class ZenohBus(InboxBus):
+class ZenohBus(LifeBus):
     """One component's bus on a Zenoh session. Open it inside a running event loop.
 
     Args:
@@ -102,7 +98,7 @@ class ZenohBus(InboxBus):
         is_hub: bool = False,
         shared: bool = False,
     ) -> None:
-        super().__init__(mission, source, clock)
+        super().__init__(mission, source, clock, session, is_hub=is_hub)
         self.copies: HostCopies | None = None
         """For the recorder of this host; see ``use_host``."""
         self.far = None if shared else FarCopies(session, mission, source)
@@ -111,9 +107,8 @@ class ZenohBus(InboxBus):
         """For large values to and from this host; settable before they are used."""
         self.subscribers = Subscribers(session)
         """Settable: one for all buses of a session."""
-        self._session, self._is_hub, self._shared = session, is_hub, shared
+        self._shared = shared
         self._links = None if shared else watch_links(session)
-        self._declared: set[Declaration] = set()
         self._outlets = Outlets(session, mission, source, self.quality, only_elsewhere=shared)
         self.lossless = LosslessStreams(self, session, mission, source, only_elsewhere=shared)
         """What it sends to listeners that must get every message."""
@@ -359,75 +354,7 @@ class ZenohBus(InboxBus):
         heard.declared = self._declare(self.subscribers.declare(expression, heard))
         return heard
 
-    # ------------------------------------------------------------------ life
-    def declare_alive(self, address: str) -> Subscription:
-        """Raise this component's liveliness token; see ``Bus.declare_alive``."""
-        self.require_open()
-        own = key(self._mission, address, Conversation.ALIVE)
-        return self._declare(self._session.liveliness().declare_token(own))
-
-    async def stands(self, address: str) -> bool:
-        """Return whether the hub has a token at this address; False without a hub.
-
-        Raises:
-            NoResponder: The bus is closed already.
-        """
-        answered = self.open_question()
-        arrived = FirstReply(self, answered)
-        try:
-            self._session.liveliness().get(
-                key(self._mission, address, Conversation.ALIVE),
-                zenoh.handlers.Callback(arrived.reply, arrived.end, indirect=False),
-                timeout=LINK_LEASE_MS / 1000,
-            )
-            got = await answered
-        finally:
-            self.end_question(answered)
-        return got is not None and got.ok is not None
-
-    def watch_alive(self, address: str, listener: LifeListener) -> Subscription:
-        """Watch liveliness tokens; see ``Bus.watch_alive``."""
-        self.require_open()
-
-        def changed(sample: zenoh.Sample) -> None:
-            self.call("", listener, address_of(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
-
-        def heard(sample: zenoh.Sample) -> None:
-            self.push(changed, sample)
-
-        pattern = key(self._mission, address, Conversation.ALIVE)
-        at_once = zenoh.handlers.Callback(heard, indirect=False)
-        return self._declare(self._session.liveliness().declare_subscriber(pattern, at_once, history=True))
-
-    def watch_link(self, listener: LinkListener) -> Declaration:
-        """Report the loss and return of this session's link; see ``Bus.watch_link``.
-
-        The link of a hub is always up.
-        """
-        self.require_open()
-        if self._is_hub:
-            always = self._declare(None)
-
-            def tell(_event: None) -> None:
-                if always.stands:
-                    self.call("", listener, True)
-
-            self.push(tell, None)
-            return always
-
-        def changed(event: zenoh.TransportEvent) -> None:
-            self.call("", listener, event.kind == zenoh.SampleKind.PUT)
-
-        return self._declare(
-            self._session.info.declare_transport_events_listener(lambda event: self.push(changed, event), history=True)
-        )
-
     # ------------------------------------------------------------------ leaving
-    def take_back(self) -> None:
-        """Withdraw all declarations."""
-        for declared in tuple(self._declared):
-            declared.close()
-
     async def leave(self) -> None:
         """Close the session unless other buses use it; return when its threads have ended."""
         self.empty_inbox()  # pending questions: their requesters get ``NoResponder``
@@ -441,8 +368,3 @@ class ZenohBus(InboxBus):
             await close_session(self._session)
             return
         self._outlets.close()
-
-    def _declare(self, entity: Any, receiver: Receiving | None = None) -> Declaration:
-        declared = Declaration(entity, self._declared, receiver)
-        self._declared.add(declared)
-        return declared
