@@ -359,10 +359,8 @@ def watch(
     from backbone.command_line import watching
     from backbone.operating_system.own_process import go_behind_others
 
-    where, wanted = (
-        chosen(mission, connect, secret_file),
-        watching.Watched(tuple(keys or ()), field, most, for_s, as_json),
-    )
+    where = chosen(mission, connect, secret_file)
+    wanted = watching.Watched(tuple(keys or ()), field, most, for_s, as_json)
     go_behind_others()
     run(lambda: watching.top(where, wanted, once=False) if rate else watching.watch(where, wanted))
 
@@ -379,10 +377,8 @@ def top(
     from backbone.command_line import watching
     from backbone.operating_system.own_process import go_behind_others
 
-    where, wanted = (
-        chosen(mission, connect, secret_file),
-        watching.Watched(tuple(keys or ()), for_s=for_s, as_json=as_json),
-    )
+    where = chosen(mission, connect, secret_file)
+    wanted = watching.Watched(tuple(keys or ()), for_s=for_s, as_json=as_json)
     go_behind_others()
     run(lambda: watching.top(where, wanted, once=True))
 
