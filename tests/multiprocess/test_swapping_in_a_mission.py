@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import importlib
 import itertools
 import os
@@ -180,12 +181,14 @@ async def test_a_person_exchanges_a_module_and_a_new_start_has_the_new_class(
         pid = mission.component("answering")["pid"]
         os.kill(pid, signal.SIGSTOP)
         done = await command(mission, *words[:3])
-        os.kill(pid, signal.SIGCONT)
+        with contextlib.suppress(ProcessLookupError):  # a busy machine takes so long that its creator has replaced it
+            os.kill(pid, signal.SIGCONT)
         assert done.returncode == 5
         assert "answering does not answer" in done.stderr
 
         talk.answered.clear()
-        os.kill(pid, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
         await talk.until_answered_by("second")
 
 
