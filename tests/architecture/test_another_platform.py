@@ -18,6 +18,7 @@ tests/backbone/scheduling/test_schedule_manager.py
 tests/backbone/scheduling/test_rcs_for_requests.py
 tests/backbone/scheduling/test_answers_and_rules.py
 tests/backbone/creator/test_supervision.py
+tests/backbone/creator/test_supervision_laws.py
 tests/backbone/creator/test_silence.py
 tests/backbone/placer/test_placement.py
 tests/backbone/placer/test_wishes.py

@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from pool_on_local_network import HARDWARE, Pool, a_pool
 
 from backbone.bus.clock import run_virtual
@@ -22,20 +20,11 @@ from backbone.naming import Subsystem
 from backbone.ranges import LONGEST_LEASE_S
 from backbone.rc_manager.messages import Connect, Connected
 from backbone.scheduling.requests import RcUse, Usage
-from resource_pool.arc_client import (
-    EmergencyStopped,
-    StopState,
-    ask_stop,
-    lift_stop,
-    stop_robot,
-    watch_stops,
-)
+from resource_pool.arc_client import EmergencyStopped, StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.commands import Drive, Jump
 from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, LoadPacket, NotFromYou, NoTurnSoon, PacketLoaded
 from resource_pool.rcs.scout import Scout
-from resource_pool.stop_knowledge import StopKnowledge
-from resource_pool.stop_latch import StopLatch
-from resource_pool.stop_messages import GivenBeforeStop, OtherStop, Stopper
+from resource_pool.stop_messages import GivenBeforeStop, OtherStop
 from scout_model.radio_link import encode_drive, encode_halt, encode_jump, encode_transmitter_on
 
 RCS = ["scout1", "scout2", "radio"]
@@ -44,81 +33,6 @@ OPERATOR = "ui_console/console-1"
 
 def payloads(pool: Pool, network_id: int) -> list[bytes]:
     return [packet.payload for packet in pool.radio_driver.heard_by(network_id)]
-
-
-# ---------------------------------------------------------------------- the latch
-@given(st.lists(st.tuples(st.sampled_from(["stop", "lift"]), st.integers(0, 4)), max_size=30))
-def test_a_robot_moves_only_if_its_last_stop_was_lifted_by_its_number(steps: list[tuple[str, int]]) -> None:
-    latch, stopped, number = StopLatch("scout1"), False, 0
-    for now_s, (step, given_number) in enumerate(steps):
-        if step == "stop":
-            assert latch.stop("anna", "why", float(now_s)) is not stopped
-            number += 1
-            stopped = True
-        elif given_number != number:
-            with pytest.raises(OtherStop):
-                latch.lift(given_number, "user", float(now_s))
-        else:
-            assert latch.lift(given_number, "user", float(now_s)) is stopped
-            stopped = False
-        assert (latch.state.is_stopped, latch.state.number) == (stopped, number)
-        if stopped:
-            with pytest.raises(EmergencyStopped):
-                latch.require_moving(number)
-        else:
-            latch.require_moving(number)
-            with pytest.raises(GivenBeforeStop):
-                latch.require_moving(number + 1 if number == 0 else number - 1)
-
-
-def test_all_who_stop_a_robot_are_named_once_until_it_may_move_again() -> None:
-    latch = StopLatch("scout1")
-    latch.stop("anna", "", 1.0, "ui_console/a")
-    for who in ("ben", "anna", "ben"):
-        latch.stop(who, "", 2.0, f"ui_console/{who[0]}")
-    assert (latch.state.by, latch.state.also) == ("anna", [Stopper("ben", "ui_console/b")])
-    latch.lift(latch.state.number, "ben", 3.0)
-    latch.stop("cleo", "", 4.0)
-    assert (latch.state.by, latch.state.also) == ("cleo", [])
-
-
-def test_a_lift_of_what_was_seen_before_somebody_else_stopped_too_lifts_nothing() -> None:
-    """A press of stop is always confirmed, also for a stopped robot: only an operator who saw that can free it."""
-    latch = StopLatch("scout1")
-    latch.stop("anna", "", 1.0)
-    seen = latch.state.number
-    latch.stop("ben", "", 2.0)
-    with pytest.raises(OtherStop):
-        latch.lift(seen, "anna", 3.0)
-    assert latch.state.is_stopped
-
-
-# ---------------------------------------------------------------------- what a commander knows
-@given(st.lists(st.tuples(st.integers(1, 5), st.booleans()), max_size=20))
-def test_commands_carry_the_number_of_the_newest_stop_only_once_it_is_known_to_be_lifted(
-    heard: list[tuple[int, bool]],
-) -> None:
-    known = StopKnowledge()
-    for number, is_stopped in heard:
-        known.heard(StopState("scout1", is_stopped, number, "anna", "", 0.0))
-    newest = max((number for number, _ in heard), default=0)
-    is_lifted = (newest, False) in heard or not heard
-    assert (known.number("scout1") == newest) is is_lifted
-    assert known.number("scout2") == 0
-
-
-def test_a_lift_is_news_and_told_again_it_is_none() -> None:
-    known, lifted = StopKnowledge(), StopState("scout1", False, 1, "anna", "", 2.0)
-    stopped = StopState("scout1", True, 1, "anna", "", 1.0)
-    told = [known.heard(one) for one in (stopped, stopped, lifted, lifted, stopped)]
-    assert told == [True, False, True, False, False]
-
-
-def test_the_first_to_stop_is_the_one_who_is_named() -> None:
-    latch = StopLatch("scout1")
-    latch.stop("anna", "child in the room", 1.0)
-    latch.stop("ben", "me too", 2.0)
-    assert (latch.state.by, latch.state.reason, latch.state.at_s) == ("anna", "child in the room", 1.0)
 
 
 # ---------------------------------------------------------------------- the robot

@@ -2,126 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-from typing import Any
-
 import pytest
 from fake_resource_pool import FakePlacer
-
-from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.component.component import Component
-from backbone.component.messages import Parameters, SetParameter
-from backbone.errors import Refusal
-from backbone.keys import Conversation
-from backbone.mission.behavior_orders import behavior_order
-from backbone.placer.messages import Ended, NoHost, StopComponent
-from backbone.wire import Message
-from mission_control.behavior import Behavior
-from mission_control.behaviors.condition import Comparison, MessageCondition, MessageConditionParameters
-from mission_control.behaviors.fallback import Fallback
-from mission_control.behaviors.parallel import Parallel
-from mission_control.behaviors.repeat import Repeat
-from mission_control.behaviors.retry import Retry
-from mission_control.behaviors.sequence import Sequence
-from mission_control.behaviors.timeout import Timeout
-from mission_control.behaviors.wait import Wait
-from mission_control.messages import (
-    AskBehavior,
-    BehaviorState,
-    BehaviorStatus,
-    MotionSeen,
-    Region,
-    WaypointReached,
+from trees_of_components import (
+    ARC,
+    FAILURE,
+    SUCCESS,
+    Run,
+    ended,
+    granted,
+    is_running,
+    node,
+    root,
+    set_parameter,
+    tree_of,
 )
 
-ARC = {"kind": "drive", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
-SUCCESS, FAILURE = BehaviorStatus.SUCCESS, BehaviorStatus.FAILURE
-Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
-
-
-class Leaf(Behavior[Any]):
-    """Does nothing until the test ends it."""
-
-
-class Battery(Message, frozen=True):
-    """An event of one's own."""
-
-    charge: float
-
-
-CLASSES: dict[str, type[Component[Any]]] = {
-    "leaf": Leaf,
-    "sequence": Sequence,
-    "fallback": Fallback,
-    "parallel": Parallel,
-    "retry": Retry,
-    "repeat": Repeat,
-    "timeout": Timeout,
-    "wait": Wait,
-    "condition": MessageCondition,
-}
-
-
-@pytest.fixture
-def placer_world(local_mission: Any) -> Run:
-    def run(scene: Callable[[FakePlacer], Awaitable[None]]) -> None:
-        async def main() -> None:
-            async with local_mission("iros2001") as network:
-                placer = FakePlacer(network, VirtualClock(), CLASSES)
-                try:
-                    await scene(placer)
-                finally:
-                    await placer.close()
-
-        run_virtual(main())
-
-    return run
-
-
-def node(kind: str, name: str, *children: dict[str, Any], arc: Any = None, **parameters: Any) -> dict[str, Any]:
-    return {
-        "type": kind,
-        "name": name,
-        "priority": 3,
-        "children": list(children),
-        "parameters": parameters,
-        "arc": arc,
-    }
-
-
-async def root(placer: FakePlacer, tree: dict[str, Any]) -> Any:
-    return await placer.launch(behavior_order(tree, [("iros2001", 10)]))
-
-
-async def granted(placer: FakePlacer, leaf: str) -> Any:
-    """Return the leaf's ARC, with its first grant."""
-    await placer.wait(lambda: f"{leaf}-drive" in placer.arcs)
-    arc = placer.arcs[f"{leaf}-drive"]
-    await arc.grant()
-    await placer.clock.sleep_s(0.1)
-    return arc
-
-
-async def ended(placer: FakePlacer, name: str, status: BehaviorStatus, **payload: Any) -> None:
-    """End a leaf with this status, as soon as it is there."""
-    await placer.wait(lambda: name in placer.components)
-    leaf = placer.components[name]
-    leaf.finish(status, payload)
-    await placer.wait(lambda: placer.components.get(name) is not leaf)
-
-
-def is_running(placer: FakePlacer, *names: str) -> bool:
-    return set(placer.components) == set(names)
-
-
-async def tree_of(placer: FakePlacer, name: str) -> list[str]:
-    """Return the drawing of a branch."""
-    state = await placer.bus.ask(f"mission_control/{name}", AskBehavior(), BehaviorState, within_s=1.0)
-    return state.tree.splitlines()
-
-
-async def set_parameter(placer: FakePlacer, name: str, parameter: str, value: object) -> None:
-    await placer.bus.ask(f"mission_control/{name}", SetParameter(parameter, value, "anna"), Parameters, within_s=1.0)
+from backbone.errors import Refusal
+from backbone.placer.messages import Ended, NoHost, StopComponent
+from mission_control.messages import BehaviorStatus
 
 
 # ---------------------------------------------------------------------- whole branches
@@ -411,108 +310,3 @@ def test_a_parent_that_finishes_while_it_waits_for_a_stop_starts_no_other_child(
         assert (is_running(placer, "steps"), placer.started) == (True, ["steps", "a"])
 
     placer_world(scene)
-
-
-# ---------------------------------------------------------------------- conditions
-def test_a_condition_waits_for_an_event_that_is_as_stated(placer_world: Run) -> None:
-    async def scene(placer: FakePlacer) -> None:
-        seen = node("condition", "seen", source="watch1", message="MotionSeen", field="region.width_px", above=20)
-        top = await root(placer, node("sequence", "react", seen, node("leaf", "go")))
-        await placer.wait(lambda: "seen" in placer.components)
-        watcher = placer.network.join("mission_control/watch1", placer.clock)
-        for source, width_px in (("watch1", 20), ("watch2", 90)):
-            event = MotionSeen(1.0, "scout1", Region(0, 0, width_px, 9))
-            watcher.publish(f"mission_control/{source}", Conversation.EVENTS, event)
-        watcher.publish("mission_control/watch1", Conversation.EVENTS, WaypointReached(1.0, "scout1", 1, 0))
-        await placer.clock.sleep_s(10.0)
-        assert is_running(placer, "react", "seen")
-        watcher.publish("mission_control/watch1", Conversation.EVENTS, MotionSeen(1.0, "scout1", Region(0, 0, 21, 9)))
-        await placer.wait(lambda: is_running(placer, "react", "go"), within_s=1.0)
-        assert top.feedback == "runs go, 2 of 2, after seen succeeded"
-        await watcher.close()
-
-    placer_world(scene)
-
-
-def test_a_condition_reads_events_of_ones_own(placer_world: Run) -> None:
-    async def scene(placer: FakePlacer) -> None:
-        low = node("condition", "low", message=f"{__name__}:Battery", field="charge", below=0.2)
-        condition = await root(placer, low)
-        robot = placer.network.join("resource_pool/scout1", placer.clock)
-        robot.publish("resource_pool/scout1", Conversation.EVENTS, Battery(0.5))
-        await placer.clock.sleep_s(1.0)
-        assert condition.status is BehaviorStatus.RUNNING
-        robot.publish("resource_pool/scout1", Conversation.EVENTS, Battery(0.1))
-        await placer.wait(lambda: condition.status is SUCCESS, within_s=1.0)
-        assert condition.payload == {"detail": "charge is 0.1"}
-        await robot.close()
-
-    placer_world(scene)
-
-
-@pytest.mark.parametrize(("rounds", "status"), [(2, FAILURE), (3, SUCCESS)])
-def test_a_check_of_a_report_decides_at_once(placer_world: Run, rounds: int, status: BehaviorStatus) -> None:
-    async def scene(placer: FakePlacer) -> None:
-        patrol = await root(placer, node("leaf", "patrol"))
-        patrol.tell_parent({"rounds": rounds})
-        check = {"source": "patrol", "message": "BehaviorState", "field": "payload.rounds", "above": 2, "mode": "check"}
-        condition = await root(placer, node("condition", "done", **check))
-        await placer.wait(lambda: condition.status.is_final, within_s=1.0)
-        assert condition.status is status
-        if status is FAILURE:
-            assert condition.payload == {"detail": "payload.rounds is 2, wanted: payload.rounds above 2"}
-
-    placer_world(scene)
-
-
-def test_a_condition_on_a_report_waits_for_a_behavior_that_is_not_there_yet(placer_world: Run) -> None:
-    async def scene(placer: FakePlacer) -> None:
-        asked = {"source": "patrol", "message": "BehaviorState", "field": "status", "equals": "success"}
-        condition = await root(placer, node("condition", "done", **asked))
-        await placer.clock.sleep_s(30.0)
-        patrol = await root(placer, node("leaf", "patrol"))
-        await placer.clock.sleep_s(3.0)
-        assert condition.status is BehaviorStatus.RUNNING
-        patrol.finish(SUCCESS)
-        await placer.wait(lambda: condition.status is SUCCESS, within_s=3.0)
-
-    placer_world(scene)
-
-
-SEEN = WaypointReached(12.0, "scout1", 3, 1)
-
-
-@pytest.mark.parametrize(
-    ("comparison", "holds"),
-    [
-        (Comparison(), True),
-        (Comparison("number"), True),
-        (Comparison("height_m"), False),
-        (Comparison("number.of"), False),
-        (Comparison("number", above=2), True),
-        (Comparison("number", above=3), False),
-        (Comparison("number", above=2, below=3), False),
-        (Comparison("number", equals=3.0), True),
-        (Comparison("waypoint", equals=True), False),
-        (Comparison("robot", equals="scout1"), True),
-        (Comparison("robot", above=0), False),
-    ],
-)
-def test_a_comparison_reads_one_field(comparison: Comparison, holds: bool) -> None:
-    assert comparison.holds_for(SEEN) is holds
-
-
-@pytest.mark.parametrize(
-    ("parameters", "complaint"),
-    [
-        ({"message": "MotionSean"}, "write one of"),
-        ({"message": "no.such:Thing"}, "No module named"),
-        ({"message": "pathlib:Path"}, "which is no message"),
-        ({"message": "MotionSeen", "above": 3.0}, "field is empty"),
-        ({"message": "MotionSeen", "source": "Watch 1"}, "component's name or address"),
-        ({"message": "BehaviorState"}, "name the behavior"),
-    ],
-)
-def test_a_condition_that_cannot_be_is_refused(parameters: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(ValueError, match=complaint):
-        MessageConditionParameters(**parameters)

@@ -5,141 +5,39 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-from collections.abc import Awaitable, Callable
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import pytest
+from orders_on_a_mission import (
+    CONSOLE,
+    DONE,
+    ENDED,
+    FAILED,
+    FORWARD,
+    RUNNING,
+    STARTING,
+    WAITING,
+    Operator,
+    patrols,
+    play,
+    until_over,
+)
 
 from backbone.bus.clock import run_virtual
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.component_database.messages import ComponentType
 from backbone.errors import Refusal, code_of
-from backbone.keys import Conversation
 from backbone.mission.behavior_reports import BreakOff, BrokenOff
-from backbone.mission.model import MissionDescription
-from backbone.mission.reader import read_mission
-from backbone.mission_log.operators import OperatorActed, OperatorAction
-from backbone.naming import Subsystem
+from backbone.mission_log.operators import OperatorAction
 from backbone.placer.messages import Start
-from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
+from mission_control.laboratory.simulation.whole_mission import mission_in_one_process
 from resource_pool.arc_client import AskPose, Pose, lift_stop, stop_robot
-from ui_console.model.driving import MoveWish
-from ui_console.model.events import CommandApplied, ConsoleEvent, GivenBack, OrderChanged, TurnedTo
-from ui_console.model.orders import Order, OrderKind, OrderState, group
+from ui_console.model.events import CommandApplied, GivenBack, OrderChanged, TurnedTo
+from ui_console.model.orders import Order, OrderKind, group
 from ui_console.model.script import read_script
 from ui_console.session.scripted import ScriptDriver
 from ui_console.session.teleoperation import Teleoperation
-
-EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
-CONSOLE = "console-7"
-FORWARD = MoveWish(0.1, 0.0)
-STARTING, RUNNING, WAITING = OrderState.STARTING, OrderState.RUNNING, OrderState.WAITING
-DONE, FAILED, ENDED = OrderState.DONE, OrderState.FAILED, OrderState.ENDED
-
-
-def patrols(*, is_real: bool = False) -> MissionDescription:
-    """Return a mission with a patrol of scout1; unless it is real, another behavior is go_to, and none is follow."""
-    mission = read_mission(EXAMPLES / "behaviors.xml")
-    if is_real:
-        behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
-        return mission.model_copy(update={"behaviors": behaviors})
-    ahead = ComponentType("go_to", "ordered_behaviors:Ahead", Subsystem.MISSION_CONTROL)
-    types = (*(one for one in mission.types if one.name not in ("go_to", "follow")), ahead)
-    behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
-    return mission.model_copy(update={"behaviors": behaviors, "types": types})
-
-
-class Operator:
-    """A person at a console that keeps its ARC, and what the screens show."""
-
-    def __init__(self, running: RunningMission, made: list[Teleoperation], shown: list[ConsoleEvent]) -> None:
-        self.running, self._made, self.shown = running, made, shown
-        self.acts: list[OperatorActed] = []
-        running.bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, lambda heard: self.acts.append(heard.body))
-
-    @property
-    def console(self) -> Teleoperation:
-        return self._made[0]
-
-    @property
-    def now_s(self) -> float:
-        return self.running.clock.now_s()
-
-    async def until(self, condition: Callable[[], Any], within_s: float = 20.0) -> None:
-        until_s = self.now_s + within_s
-        while not condition():
-            assert self.now_s < until_s, (f"not within {within_s} s", self.told())
-            await self.running.clock.sleep_s(0.02)
-
-    async def holds(self, robot: str = "scout1") -> None:
-        await self.until(lambda: self.console.is_held and self.grantee(robot).startswith(CONSOLE))
-        await self.running.clock.sleep_s(1.0)
-
-    async def ordered(self, x_s: float = 0.0, robot: str = "scout1", y_m: float = 0.0, **options: Any) -> None:
-        """Order to drive ahead for so long, and return when the robot does."""
-        self.console.order(Order(OrderKind.GO_TO, robot, x_s, y_m, **options))
-        await self.until(lambda: self.state(robot) is RUNNING)
-
-    async def state_becomes(self, state: OrderState, robot: str = "scout1") -> None:
-        await self.until(lambda: self.states(robot)[-1] is state)
-
-    def state(self, robot: str = "scout1") -> OrderState | None:
-        given = self.console.orders.get(robot)
-        return given.state if given is not None else None
-
-    def states(self, robot: str = "scout1") -> list[OrderState]:
-        """The states shown, without repetitions."""
-        found = [
-            event.given.state
-            for event in self.shown
-            if isinstance(event, OrderChanged) and event.given.order.robot == robot
-        ]
-        return [state for at, state in enumerate(found) if at == 0 or found[at - 1] is not state]
-
-    def told(self) -> list[str]:
-        """What happened, for the message of a failure."""
-        orders = [f"{event.at_s:.2f} {event.given.line}" for event in self.shown if isinstance(event, OrderChanged)]
-        return [*orders, *(str(line) for line in self.running.trace if line["ev"] in ("request", "grant", "release"))]
-
-    def grants(self, robot: str = "scout1", since_s: float = 0.0) -> list[str]:
-        """The ARCs to which the robot was granted, in order."""
-        rows = [line for line in self.running.trace if line["ev"] == "grant" and line["t"] >= since_s]
-        return [str(line["arc"]) for line in rows if robot in str(line)]
-
-    def grantee(self, robot: str = "scout1") -> str:
-        return (self.grants(robot) or [""])[-1]
-
-    def behaviors(self) -> list[str]:
-        return [one for one in (f"{CONSOLE}-order-{number}" for number in range(1, 9)) if self.running.hosts.knows(one)]
-
-
-async def until_over(running: RunningMission, name: str) -> None:
-    while running.hosts.knows(name):
-        await running.clock.sleep_s(0.05)
-
-
-Scene = Callable[[Operator], Awaitable[None]]
-
-
-def play(scene: Scene, *, is_real: bool = False, **parameters: Any) -> None:
-    async def main() -> None:
-        made: list[Teleoperation] = []
-        shown: list[ConsoleEvent] = []
-
-        def console(launch: Launch, bus: Bus, clock: Clock) -> Teleoperation:
-            made.append(Teleoperation(launch, bus, clock, show=shown.append, keeps_arc=True, user="anna"))
-            return made[-1]
-
-        async with mission_in_one_process(patrols(is_real=is_real), consoles={"console": console}) as running:
-            operator = Operator(running, made, shown)
-            given = {"robot": "scout1", "priority": 100, "minimum_runtime_s": 1.0, **parameters}
-            await running.start(Start("console", CONSOLE, given))
-            await scene(operator)
-
-    run_virtual(main())
 
 
 def test_the_robot_goes_from_stick_to_order_and_back_and_is_never_free_for_the_mission() -> None:
