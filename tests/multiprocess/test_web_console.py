@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import math
 import os
 import re
 import stat
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 import web_browser
 from free_ports import free_port
+from program_console import program, wait_until
 from running_mission import MISSION_XML, mission_up
 from served_page import Served, serving
 from web_browser import Cable, Finger, assert_no_sideways_scroll
-from websockets.asyncio.client import ClientConnection, connect
-from websockets.exceptions import ConnectionClosed
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus
@@ -30,7 +28,6 @@ from resource_pool.localization import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
-WITHIN_S = 30.0
 STOPPED_WITHIN_S = 3.0  # of which 0.3 s are the rule; the rest is a machine that also runs other tests
 WORLD = "resource_pool/world"
 LOCALIZER = '<resource type="localizer" name="localizer" process="hardware"/>'
@@ -60,15 +57,6 @@ def differs(one: Pose, other: Pose) -> bool:
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) > 0.005 or turned_rad > 0.03
 
 
-async def wait_until(is_so: Callable[[], Awaitable[bool]], what: str, within_s: float = WITHIN_S) -> None:
-    try:
-        async with asyncio.timeout(within_s):
-            while not await is_so():  # noqa: ASYNC110  what another process does gives no event here
-                await asyncio.sleep(0.1)
-    except TimeoutError:
-        pytest.fail(f"never: {what}")
-
-
 async def wait_still(bus: Bus) -> None:
     """Return when the robot stands, which it must soon."""
 
@@ -79,59 +67,6 @@ async def wait_still(bus: Bus) -> None:
         return math.hypot(after.x_m - before.x_m, after.y_m - before.y_m) < 0.001
 
     await wait_until(stands, "the wheels stopped", STOPPED_WITHIN_S)
-
-
-class Program:
-    """What a page does, as a program."""
-
-    def __init__(self, socket: ClientConnection) -> None:
-        self.socket = socket
-        self.view: dict[str, Any] = {}
-        self.pictures = 0
-
-    async def say(self, **message: Any) -> None:
-        await self.socket.send(json.dumps(message))
-
-    async def listen(self) -> None:
-        with contextlib.suppress(ConnectionClosed):
-            async for message in self.socket:
-                if isinstance(message, bytes):
-                    self.pictures += 1
-                    number = int.from_bytes(message[7:11], "big")
-                    await self.say(do="drawn", robot="scout1", number=number)
-                else:
-                    self.view.update(json.loads(message).get("view", {}))
-
-    async def drive(self) -> None:
-        with contextlib.suppress(ConnectionClosed):
-            while True:
-                moment = self.view["own"]["moment"]
-                await self.say(do="drive", moment=moment, forward=0, right=1, speed=0.4)
-                await asyncio.sleep(0.05)
-
-    async def wait(self, is_so: Callable[[], Any], what: str, within_s: float = WITHIN_S) -> None:
-        async def asked() -> bool:
-            return bool(is_so())
-
-        await wait_until(asked, f"{what}: {self.view.get('own')}", within_s)
-
-    @property
-    def is_held(self) -> bool:
-        return bool(self.view["own"]["is_held"])
-
-
-@asynccontextmanager
-async def program(served: Served, user: str, priority: int = 100) -> AsyncIterator[Program]:
-    async with connect(f"ws://127.0.0.1:{served.port}/socket", compression=None, proxy=None) as socket:
-        made = Program(socket)
-        await made.say(do="hello", token=served.token, user=user, priority=priority)
-        listening = asyncio.create_task(made.listen())
-        try:
-            await made.wait(lambda: made.view.get("robots"), "robots")
-            yield made
-        finally:
-            listening.cancel()
-            await asyncio.wait({listening})
 
 
 async def test_a_program_drives_a_robot_and_when_it_vanishes_the_wheels_stop_and_the_behavior_goes_on(

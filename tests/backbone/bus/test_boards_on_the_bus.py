@@ -8,81 +8,38 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
-from bus_laws import ASKER, SERVER, THIRD, Heard, fail_on_bug, until_known, within
+from bus_laws import ASKER, SERVER, THIRD, Heard, until_known
 from free_ports import free_endpoint
+from hosts_with_boards import (
+    AT,
+    CLOCK,
+    MISSION,
+    PICTURE,
+    SAID,
+    Host,
+    Map,
+    Sketch,
+    host,
+    picture,
+    sending,
+    until,
+    until_near,
+)
 
 from backbone.blackboard import sealed_memory
 from backbone.blackboard.values import MOST_IN_PACKET
 from backbone.bus import host_boards, zenoh_outlets
-from backbone.bus.clock import MissionClock
 from backbone.bus.host_boards import LARGE_BYTES, boards_for
 from backbone.bus.shared_bus import SharedSession
-from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.bus.zenoh_outlets import MOST_PUBLISHERS
 from backbone.keys import Conversation
-from backbone.ranges import Bulk, Count
-from backbone.wire import (
-    MAX_LARGE_MESSAGE_BYTES,
-    MAX_MESSAGE_BYTES,
-    WIRE_VERSION,
-    Envelope,
-    Message,
-    OversizedMessage,
-)
-
-MISSION, CLOCK = "boards", MissionClock.started_now()
-AT, SAID = SERVER, Conversation.FRAMES
-PICTURE = 76_800
-
-
-class Map(Message, frozen=True):
-    number: Count
-    cells: Bulk
-
-
-class Sketch(Message, frozen=True):
-    number: Count
-    text: Annotated[str, msgspec.Meta(max_length=10**9)] = ""
-
-
-def picture(number: int, size: int = PICTURE) -> Map:
-    return Map(number, memoryview(bytes([number % 256]) * size))
-
-
-class Host:
-    """Buses of one host: a folder for their boards, and a hub; counts what goes by the network."""
-
-    def __init__(self, endpoint: str, directory: Path) -> None:
-        self.endpoint, self.directory = endpoint, directory
-        self.buses: list[ZenohBus] = []
-
-    def join(self, source: str, *, is_near: bool = True) -> ZenohBus:
-        bus = ZenohBus.open(MISSION, source, CLOCK, client_config(self.endpoint))
-        bus.boards = boards_for(str(self.directory)) if is_near else None
-        bus.on_bug = fail_on_bug
-        self.buses.append(bus)
-        return bus
-
-
-@asynccontextmanager
-async def host(directory: Path) -> AsyncIterator[Host]:
-    endpoint = free_endpoint()
-    hub = ZenohBus.open(MISSION, "backbone/hub", CLOCK, hub_config([endpoint]))
-    made = Host(endpoint, directory)
-    try:
-        yield made
-    finally:
-        for bus in made.buses:
-            await bus.close()
-        await hub.close()
+from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES, WIRE_VERSION, Envelope, OversizedMessage
 
 
 @pytest.fixture
@@ -108,38 +65,6 @@ def network(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     monkeypatch.setattr(zenoh_outlets, "Outlet", Outlet)
     monkeypatch.setattr(zenoh_outlets, "KNOWN_AFTER_S", 0.1)
     return sizes
-
-
-async def until(holds: Callable[[], bool], what: str, act: Callable[[], None] = lambda: None) -> None:
-    async def wait() -> None:
-        while not holds():
-            act()
-            await asyncio.sleep(0.01)
-
-    await within(wait(), what)
-
-
-def sending(
-    bus: ZenohBus, sent: list[int], size: int = PICTURE, conversation: Conversation = SAID
-) -> Callable[[], None]:
-    """Return what publishes the next picture."""
-
-    def send() -> None:
-        sent.append(len(sent))
-        bus.publish(AT, conversation, picture(len(sent), size))
-
-    return send
-
-
-async def until_near(network: list[int], send: Callable[[], None]) -> None:
-    """Publish until nothing goes by the network any more."""
-
-    def is_near() -> bool:
-        before = len(network)
-        send()
-        return len(network) == before
-
-    await until(is_near, "pictures go by the board alone")
 
 
 async def test_pictures_leave_the_network_and_are_neither_old_nor_doubled(folder: Path, network: list[int]) -> None:
