@@ -316,7 +316,7 @@ class AggregateResourceController(Component[ArcParameters]):
             return
         self._slice.end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
         self.report(f"granted: {', '.join(self._placed.rcs.values())}")
-        rcs, robot = self._placed.rcs, self._placed.rcs.get(self.body, "")
+        rcs, robot = self._placed.rcs, self._placed.rc_of(self.body)
         noted = self._notices.notify(Resumed(self.name, rcs, order.epochs, order.until_s, robot))
         if self.parameters.may_say_not_now:
             self._offering = self.start_task(self._slice.offer(noted), "offer more")
@@ -370,7 +370,7 @@ class AggregateResourceController(Component[ArcParameters]):
             reason=gate.reason,
             by=gate.by,
             expected_start_s=gate.expected_s,
-            robot=self._placed.rcs.get(self.body, ""),
+            robot=self._placed.rc_of(self.body),
         )
 
     # ------------------------------------------------------------------ watching

@@ -68,6 +68,10 @@ class PlacedRequest:
         """
         self.rcs = set_of(self._arc, self._sets, rcs)
 
+    def rc_of(self, role: str) -> str:
+        """Return the name of the chosen RC of this role; empty: there is none."""
+        return self.rcs.get(role, "")
+
     async def send(self) -> Scheduled:
         """Send the request and return its place.
 

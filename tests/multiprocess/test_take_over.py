@@ -282,7 +282,7 @@ async def test_the_watcher_hears_by_whom_while_the_console_process_drives(missio
         await process.wait()
         after = await bus.ask(WORLD, AskPose("scout1"), Pose, within_s=2)
     assert state.suspended_because == f"higher by console-{process.pid}-drive"
-    assert granted["asked_s"] <= granted["at_s"] <= applied["at_s"], (granted, applied)  # type: ignore[operator]
+    assert applied["at_s"] - granted["asked_s"] < DRIVEN_WITHIN_S, (granted, applied)  # type: ignore[operator]
     assert granted["after_s"] == pytest.approx(granted["at_s"] - granted["asked_s"])  # type: ignore[operator]
     assert abs(math.remainder(after.heading_rad - before.heading_rad, math.tau)) > 0.2
     assert released["confirmed"]
