@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from axe import serious_findings
 from running_mission import BIN, mission_up
+from small_recordings import recorded
 from web_browser import assert_no_sideways_scroll, keep_picture, page_at
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
@@ -105,8 +106,9 @@ async def test_the_page_of_a_recording_is_accessible(address: str, size: str, th
 
 
 @pytest.mark.parametrize("more", [("--mission", "night"), ("--design", "mission.xml")])
-def test_a_recording_is_served_alone(night: Path, more: tuple[str, str]) -> None:
-    words = [str(BIN / "scout-console"), "serve", "--recording", str(night), *more]
+def test_a_recording_is_served_alone(tmp_path: Path, more: tuple[str, str]) -> None:
+    (tmp_path / "night.mcap").write_bytes(recorded([]).getvalue())
+    words = [str(BIN / "scout-console"), "serve", "--recording", str(tmp_path / "night.mcap"), *more]
     done = subprocess.run(words, capture_output=True, text=True, timeout=WITHIN_S, check=False)
     assert done.returncode == 2, done.stderr
 
