@@ -7,6 +7,7 @@ import of mujoco in it.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import logging
 import os
@@ -18,18 +19,20 @@ from typing import Literal
 
 import msgspec
 
+from scout_model import gl_known
 from scout_model.errors import RenderingUnavailable
+from scout_model.gl_known import OpenGl, Trial
 
 log = logging.getLogger(__name__)
 
-Backend = Literal["egl", "osmesa", "none"]
+Backend = OpenGl | Literal["none"]
 
 MISSING_PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"  # measured on bare Debian 12: these three render, fewer do not
 TRIAL_TIME_S = 20.0  # chosen: a trial takes half a second; a hanging driver must not hang a mission
 
 FOUND_FILE = "gl_support.json"
 
-_CANDIDATES: tuple[Backend, ...] = ("egl", "osmesa")  # OSMesa last: newer Mesa has dropped it
+_CANDIDATES: tuple[OpenGl, ...] = ("egl", "osmesa")  # OSMesa last: newer Mesa has dropped it
 _MUJOCO_GL: dict[Backend, str] = {"egl": "egl", "osmesa": "osmesa", "none": "disable"}
 
 
@@ -61,11 +64,17 @@ class GlSupport:
 
 
 def probe(trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
-    """Return what can draw on this machine. Blocks for about a second, at worst for two trials' time."""
+    """Return what can draw on this machine.
+
+    What drew in an earlier mission is believed to draw, see ``gl_known``. Otherwise a trial blocks for about half a
+    second, at worst two trials block for their time limit.
+    """
+    if (known := gl_known.recall()) is not None:
+        return GlSupport(known.backend, known.renderer, "")
     for backend in _CANDIDATES:
-        renderer = _try(backend, trial_time_s)
-        if renderer:
-            return GlSupport(backend, renderer, "")
+        if (trial := _try(backend, trial_time_s)) is not None:
+            gl_known.keep(backend, trial)
+            return GlSupport(backend, trial.renderer, "")
     return GlSupport("none", "", MISSING_PACKAGES)
 
 
@@ -98,6 +107,14 @@ def probe_once(folder: Path, trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
         return support
 
 
+def forget(folder: Path | None) -> None:
+    """Let the next probe try, because what was believed to draw does not; ``folder`` is that of ``probe_once``."""
+    gl_known.forget()
+    if folder is not None:
+        with contextlib.suppress(OSError):
+            (folder / FOUND_FILE).unlink()
+
+
 def prepare(backend: Backend) -> None:
     """Set this process up to draw with this backend; call it before the first import of mujoco.
 
@@ -118,8 +135,8 @@ def _environment(backend: Backend) -> dict[str, str]:
     }
 
 
-def _try(backend: Backend, trial_time_s: float) -> str:
-    """Return the renderer's name, empty if this backend does not work."""
+def _try(backend: OpenGl, trial_time_s: float) -> Trial | None:
+    """Return the trial of this backend, None if it did not draw."""
     environment = {**os.environ, **_environment(backend)}
     environment.pop("PYOPENGL_PLATFORM", None)  # mujoco sets it, a child would inherit the wrong one
     try:
@@ -132,7 +149,8 @@ def _try(backend: Backend, trial_time_s: float) -> str:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return ""
-    if trial.returncode != 0:
-        return ""
-    return trial.stdout.decode("utf-8", "replace").strip() or "unnamed renderer"
+        return None
+    for line in trial.stdout.splitlines() if trial.returncode == 0 else ():
+        with contextlib.suppress(msgspec.DecodeError):  # a driver may print lines of its own
+            return msgspec.json.decode(line, type=Trial)
+    return None

@@ -1,4 +1,4 @@
-"""Draw one picture with the OpenGL that MUJOCO_GL names and print which renderer did it.
+"""Draw one picture with the OpenGL that MUJOCO_GL names; print the renderer and the libraries that it loaded.
 
 Run as a program, in a process of its own, by ``gl_probe``: where OpenGL is missing, importing
 mujoco raises or aborts the process.
@@ -7,15 +7,25 @@ mujoco raises or aborts the process.
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
+import msgspec
 import mujoco
 from OpenGL.GL import GL_RENDERER, glGetString  # type: ignore[import-untyped]
+
+from scout_model.gl_known import Trial
 
 _BALL = "<mujoco><worldbody><light/><geom size='.1' rgba='1 1 1 1'/></worldbody></mujoco>"
 
 
+def loaded_libraries() -> list[str]:
+    """Return the paths of the shared libraries of this process."""
+    parts = (line.split(maxsplit=5) for line in Path("/proc/self/maps").read_text().splitlines())
+    return sorted({part[5] for part in parts if len(part) > 5 and ".so" in part[5]})
+
+
 def main() -> int:
-    """Print the renderer's name; return 0 if something was drawn."""
+    """Print the renderer's name and the paths of its libraries as JSON; return 0 if something was drawn."""
     model = mujoco.MjModel.from_xml_string(_BALL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -23,7 +33,8 @@ def main() -> int:
     try:
         renderer.update_scene(data)
         is_drawn = bool(renderer.render().any())
-        sys.stdout.write(glGetString(GL_RENDERER).decode("utf-8", "replace") + "\n")
+        name = glGetString(GL_RENDERER).decode("utf-8", "replace")
+        sys.stdout.buffer.write(msgspec.json.encode(Trial(name, loaded_libraries())) + b"\n")
     finally:
         renderer.close()
     return 0 if is_drawn else 1

@@ -67,6 +67,14 @@ def _own_threads_of_zenoh() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep what missions of these tests find out about the machine out of the account's own cache."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
 @pytest.fixture(autouse=True)
 def _no_task_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Fail a test whose event loop ends in good order while a task still waits: somebody forgot to end it."""

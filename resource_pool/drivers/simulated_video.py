@@ -31,7 +31,7 @@ from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.picture_pace import PicturePace
 from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.drivers.world_messages import WorldModel, WorldState
-from scout_model.gl_probe import GlSupport, prepare, probe, probe_once
+from scout_model.gl_probe import GlSupport, forget, prepare, probe, probe_once
 
 CAMERAS_KEPT = 2  # chosen: one experiment, or two by turns; 20 MB each
 EARLY_S = 1 / 120  # chosen: a quarter of a frame, so that rounded frame times skip no frame
@@ -84,7 +84,11 @@ class SimulatedFramegrabber:
         world = await meet_world(self._site)
         support, backend = await choosing
         lasts = isinstance(asyncio.get_running_loop(), VirtualLoop)
-        self._studio = await run(self._thread, _Studio, world, support, backend, lasts)
+        try:
+            self._studio = await run(self._thread, _Studio, world, support, backend, lasts)
+        except Exception:  # mujoco's import raises errors of many kinds where OpenGL is missing
+            forget(self._site.folder)
+            raise
         if support is not None and support.missing_packages:
             self._site.tell(support.summary)
         self._world = self._site.bus.subscribe(

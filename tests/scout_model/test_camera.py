@@ -1,21 +1,16 @@
-import contextlib
 import math
 import subprocess
 import sys
-import threading
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
-from full_disk import disk_full_at
 from numpy.typing import NDArray
 
-from scout_model import gl_probe
 from scout_model.camera import Camera
 from scout_model.description import Furniture, RobotPlace, Target, WorldDescription
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
-from scout_model.gl_probe import FOUND_FILE, GlSupport, prepare, probe, probe_once
+from scout_model.gl_probe import GlSupport, prepare, probe
 from scout_model.world import World
 
 Picture = NDArray[np.uint8]
@@ -136,67 +131,6 @@ def test_rendered_and_painted_pictures_show_the_same(gl: GlSupport, tmp_path: Pa
     for pictures in (rendered, painted):
         assert changed(pictures["pioneer_scout1"], pictures["empty_scout1"]) > 4000
         assert changed(pictures["pioneer_scout2"], pictures["empty_scout2"]) > 1000
-
-
-def test_a_probe_says_who_renders_or_which_packages_are_missing(gl: GlSupport) -> None:
-    assert bool(gl.renderer) == (gl.backend != "none") == (not gl.missing_packages)
-    assert gl.camera_backend == ("paint" if gl.backend == "none" else "gl")
-    assert (gl.renderer or "libegl1") in gl.summary
-
-
-def test_a_machine_without_egl_drivers_is_recognized(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json")
-    assert probe().backend != "egl"
-
-
-def test_a_driver_that_hangs_does_not_hang_the_probe() -> None:
-    support = probe(trial_time_s=0.001)
-    assert (support.backend, support.camera_backend) == ("none", "paint")
-    assert support.missing_packages == "libegl1 libopengl0 libgl1-mesa-dri"
-
-
-def test_of_many_who_ask_with_one_folder_only_one_probes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found, probed, together = GlSupport("egl", "a renderer", ""), [], threading.Barrier(4)
-
-    def probe_slowly(_trial_time_s: float) -> GlSupport:
-        probed.append(threading.get_ident())
-        with contextlib.suppress(threading.BrokenBarrierError):
-            together.wait(0.1)  # would end at once if the others probed as well
-        return found
-
-    monkeypatch.setattr(gl_probe, "probe", probe_slowly)
-    with ThreadPoolExecutor(4) as pool:
-        assert list(pool.map(lambda _number: probe_once(tmp_path), range(4))) == [found] * 4
-    assert len(probed) == 1
-
-
-def test_what_somebody_died_over_while_writing_it_is_found_out_anew(tmp_path: Path) -> None:
-    (tmp_path / FOUND_FILE).write_bytes(b'{"backend":"eg')
-    first = probe_once(tmp_path, trial_time_s=0.001)
-    assert first.backend == "none"
-    assert probe_once(tmp_path) == first, "it was not kept"
-
-
-@pytest.mark.parametrize("folder", ["gone", "file"])
-def test_a_folder_that_cannot_be_written_into_makes_probing_only_slower(tmp_path: Path, folder: str) -> None:
-    (tmp_path / "file").touch()
-    assert probe_once(tmp_path / folder, trial_time_s=0.001).backend == "none"
-
-
-def test_a_disk_that_is_full_makes_probing_only_slower(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    found, probed = GlSupport("egl", "a renderer", ""), []
-    monkeypatch.setattr(gl_probe, "probe", lambda trial_time_s: probed.append(trial_time_s) or found)
-    with disk_full_at(0):
-        assert [probe_once(tmp_path) for _ in range(2)] == [found] * 2
-    assert len(probed) == 2
-    assert [probe_once(tmp_path) for _ in range(2)] == [found] * 2
-    assert len(probed) == 3, "kept as soon as there is room"
-
-
-@pytest.mark.processes
-def test_probing_imports_no_mujoco() -> None:
-    program = "import sys; from scout_model.gl_probe import probe; probe(0.001); assert 'mujoco' not in sys.modules"
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
 
 
 # ---------------------------------------------------------------------- what is not drawn twice
