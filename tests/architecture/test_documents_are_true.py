@@ -67,6 +67,12 @@ def test_every_link_to_a_heading_leads_to_one(document: Path) -> None:
     assert [anchor for target, anchor in anchors(document) if anchor not in slugs(target)] == []
 
 
+def test_every_page_is_listed_in_the_table_of_contents() -> None:
+    contents = ROOT / "docs/README.md"
+    listed = {target for _, target in links(contents)} | {contents}
+    assert {page for page in (ROOT / "docs").rglob("*.md") if not page.is_relative_to(ROOT / "docs/examples")} <= listed
+
+
 def test_the_questions_people_ask_first_are_answered_two_clicks_from_the_readme() -> None:
     assert (ROOT / "docs/README.md", "the-questions-people-ask-first") in anchors(ROOT / "README.md")
     section = (ROOT / "docs/README.md").read_text().partition("## The questions people ask first")[2]
