@@ -1,9 +1,9 @@
 """The renderer that worked in the last trial, kept for all missions of this account while nothing of it changes.
 
 A trial takes half a second of the start of a mission. ``keep`` writes a success down together with what the trial
-depended on: the shared libraries that it loaded, the folders that name the vendors of OpenGL, the devices, and the
-environment variables by which the libraries choose. ``recall`` returns it if all of that is as it was. A failure is
-not kept, because its remedy is to install packages.
+depended on: the Python installation, the shared libraries that it loaded, the folders that name the vendors of OpenGL,
+the devices, and the environment variables by which the libraries choose. ``recall`` returns the renderer if nothing of
+that has changed. A failure is not kept, because its remedy is to install packages.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import glob
 import os
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
@@ -43,6 +44,7 @@ class KnownRenderer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         backend: The OpenGL of the trial.
         renderer: The name that OpenGL gives it.
+        installation: Folder of the Python installation.
         files: Library or folder → size in bytes and time of the last change in ns; None: it does not exist.
         devices: Device → whether this account may use it.
         environment: Variables by which the libraries choose.
@@ -50,6 +52,7 @@ class KnownRenderer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     backend: OpenGl
     renderer: str
+    installation: str
     files: dict[str, tuple[int, int] | None]
     devices: dict[str, bool]
     environment: dict[str, str]
@@ -88,7 +91,8 @@ def _path() -> Path:
 def _as_of_now(backend: OpenGl, renderer: str, files: Iterable[str]) -> KnownRenderer:
     devices = {device: os.access(device, os.R_OK | os.W_OK) for pattern in DEVICES for device in glob.glob(pattern)}
     environment = {name: value for name, value in os.environ.items() if name.startswith(CHOOSERS)}
-    return KnownRenderer(backend, renderer, {file: _state_of(file) for file in files}, devices, environment)
+    states = {file: _state_of(file) for file in files}
+    return KnownRenderer(backend, renderer, sys.prefix, states, devices, environment)
 
 
 def _state_of(file: str) -> tuple[int, int] | None:

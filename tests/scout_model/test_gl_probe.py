@@ -157,6 +157,12 @@ def test_another_choice_of_driver_ends_the_belief(library: Path, monkeypatch: py
     assert known(library) == "a renderer"
 
 
+def test_another_installation_of_python_tries_for_itself(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gl_known.keep("egl", Trial("a renderer", [str(library)]))
+    monkeypatch.setattr(sys, "prefix", "/another/environment")
+    assert known(library) is None
+
+
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"backend":"none","renderer":"x"}', bytes(1000)])
 def test_a_file_that_is_not_what_was_kept_is_nothing(cache: Path, library: Path, content: bytes) -> None:
     cache.parent.mkdir(parents=True)
