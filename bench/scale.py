@@ -2,7 +2,8 @@
 
 Prints one JSON line for each size:
 
-* how long it took until all was ready, and how long ``status`` takes and whether it lists every component;
+* how long it took until all was ready, how long ``status`` then takes at once, and when and how fast it lists every
+  component: behaviors start theirs after all is ready, so the first list names some as being started;
 * processor time by kind of process, memory as far as it is a process's own or its part of what several share (PSS),
   threads;
 * context switches by the RC manager's trace, from revocation to grant, settling not counted: those while nobody starts;
@@ -278,15 +279,18 @@ async def measure(up: Up, scouts: int, seconds: float, take_overs: int, trace: P
 
 def listed_in_time(scouts: int) -> dict[str, Any]:
     """Ask for the status until it lists all components; return the first and the last answer's figures."""
-    expected, ends_s = components(scouts), time.monotonic() + WHOLE_WITHIN_S
-    took, found = status()
-    first = len(found["components"])
+    expected, began_s = components(scouts), time.monotonic()
+    ends_s = began_s + WHOLE_WITHIN_S
+    at_once, found = status()
+    took, first = at_once, len(found["components"])
     while len(found["components"]) < expected and time.monotonic() < ends_s:
         took, found = status()
     return {
         "components": expected,
         "listed_at_once": first,
         "listed": len(found["components"]),
+        "listed_after_s": round(time.monotonic() - began_s, 2),
+        "status_at_once": at_once._asdict(),
         "status": took._asdict(),
         "absent": found.get("absent", [])[:3],
         "problems": found["problems"][:3],

@@ -11,7 +11,7 @@ import os
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -178,10 +178,14 @@ def status(
     secret_file: SecretFile = None,
 ) -> None:
     """Show health, components by subsystem, who holds which resource, and the schedule; 6 if the mission failed."""
-    from backbone.command_line.status import Shown, show_status
+    from backbone.command_line.status import Display, JsonLines, show_status
 
-    where, shown = chosen(mission, connect, secret_file), Shown(as_json=as_json, watch=watch, width=_width())
-    run(lambda: show_status(where, shown))
+    where, display = chosen(mission, connect, secret_file), cast("Display", JsonLines())
+    if not as_json:
+        from backbone.command_line.tables import MissionTables
+
+        display = MissionTables(_width())
+    run(lambda: show_status(where, display, watch=watch))
 
 
 @app.command()

@@ -21,7 +21,7 @@ from backbone.command_line.inventory_screen import (
     type_tables,
     types_table,
 )
-from backbone.command_line.status import console_of_width
+from backbone.command_line.tables import console_of_width
 from backbone.command_line.where import Where
 from backbone.component_database.messages import TypeCount, UnknownType
 from backbone.launcher.endings import ExitCode, say

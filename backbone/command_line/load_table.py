@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.command_line.connection import connected
-from backbone.command_line.status import console_of_width
+from backbone.command_line.tables import console_of_width
 from backbone.command_line.where import Where
 from backbone.component.messages import AskStatistics, Statistics
 from backbone.errors import LinkError, Refusal

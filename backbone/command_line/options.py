@@ -31,8 +31,9 @@ DISTRIBUTION = "scout-backbone"
 class CommandTable(TyperGroup):
     """Shows each command's summary whole, and converts only those values that need it.
 
-    Typer cuts summaries at the end of the line. It also loads pydantic to convert a value, even if the value is absent
-    or a shell asks for completions; that import takes longer than everything else that ``status`` loads.
+    Typer cuts summaries at the end of the line. It also loads pydantic to convert a value, even if the value is absent,
+    is a text that a command wants as it is, or a shell asks for completions; that import takes a third of the processor
+    time of a short command, and on a full machine each part of that time is waited for.
     """
 
     def __init__(self, **attributes: Any) -> None:
@@ -83,8 +84,18 @@ def _name_of(command: CommandInfo | TyperInfo) -> str:
     return command.name or get_command_name(getattr(command.callback, "__name__", ""))
 
 
+class _Text:
+    """Typer's way to convert a value, for a parameter that is a text: the value stays as it was typed."""
+
+    def coerce(self, value: object, **_where: object) -> object:
+        """Return the value."""
+        return value
+
+
 def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
     for parameter in parameters:
+        if getattr(getattr(parameter, "type_descriptor", None), "annotation", None) is str:
+            parameter.get_runtime_param = _Text
         parameter.process_value = partial(_processed, parameter.process_value, parameter.required)
 
 

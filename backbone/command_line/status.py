@@ -1,15 +1,15 @@
-"""``scout-backbone status``: the mission picture once, or again and again, also of a mission whose hub is away."""
+"""``scout-backbone status``: the mission picture once, or again and again, also of a mission whose hub is away.
+
+Rule of this file: it loads no screen; ``tables`` does. On a full machine a command waits for the processor longer than
+for all its answers, and a screen takes a fifth of its time, which programs that read JSON need not wait for.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import AsyncGenerator
-from dataclasses import dataclass
-
-import psutil
-from rich.console import Console
-from rich.live import Live
+from collections.abc import AsyncGenerator, AsyncIterator
+from typing import Protocol
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
@@ -17,34 +17,52 @@ from backbone.bus.interface import Bus, Clock
 from backbone.command_line.connection import connected
 from backbone.command_line.where import Where
 from backbone.component.messages import Absence
+from backbone.creator.process_table import is_stopped
 from backbone.errors import HubUnreachable, LinkError
 from backbone.launcher.endings import ExitCode
 from backbone.picture.health import HealthWord
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
-from backbone.picture.screen import live_screen, screen
 
 EVERY_S = 1.0  # chosen: programs that watch want one line a second
-REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds
 
 
-@dataclass(frozen=True)
-class Shown:
-    """How a status is shown.
+class Display(Protocol):
+    """How pictures of a mission are shown.
 
     Attributes:
-        as_json: One JSON object instead of tables.
-        watch: Again and again.
-        width: Of tables; None: as the terminal.
+        every_s: Seconds of the machine between two of them.
     """
 
-    as_json: bool
-    watch: bool
-    width: int | None
+    every_s: float
+
+    def show(self, picture: MissionPicture) -> None:
+        """Show one."""
+
+    async def keep_showing(self, pictures: AsyncIterator[MissionPicture]) -> None:
+        """Show each, until there are no more."""
 
 
-async def show_status(where: Where, shown: Shown) -> ExitCode:
-    """Print how a mission is and return the exit code: MISSION_FAILED if it has failed, else DONE.
+class JsonLines:
+    """One JSON object a line."""
+
+    every_s = EVERY_S
+
+    def show(self, picture: MissionPicture) -> None:
+        """Print one."""
+        print(json.dumps(picture.to_json()), flush=True)
+
+    async def keep_showing(self, pictures: AsyncIterator[MissionPicture]) -> None:
+        """Print each, until there are no more."""
+        async for picture in pictures:
+            self.show(picture)
+
+
+async def show_status(where: Where, display: Display, *, watch: bool) -> ExitCode:
+    """Show how a mission is and return the exit code: MISSION_FAILED if it has failed, else DONE.
+
+    Args:
+        watch: Again and again, until Ctrl-C.
 
     Raises:
         MissionNotUp: None of this name is up on this machine.
@@ -53,28 +71,22 @@ async def show_status(where: Where, shown: Shown) -> ExitCode:
     found = run_files.find(where.mission) if where.connect is None else None
     try:
         async with connected(where) as (bus, clock):
-            return await _show(bus, clock, found, shown)
+            return await _show(_pictures(bus, clock, found, display.every_s), display, watch)
     except LinkError as error:
         if found is None:
             raise
         picture = picture_without_hub(found, error)
-        _print(picture, shown)
+        display.show(picture)
         return _exit_code(picture)
 
 
-async def _show(bus: Bus, clock: Clock, found: run_files.RunFile | None, shown: Shown) -> ExitCode:
-    pictures = _pictures(bus, clock, found, EVERY_S if shown.as_json else REDRAW_EVERY_S)
+async def _show(pictures: AsyncGenerator[MissionPicture, None], display: Display, watch: bool) -> ExitCode:
     async with contextlib.aclosing(pictures):
-        if shown.watch and not shown.as_json:
-            console = console_of_width(shown.width)
-            with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
-                async for picture in pictures:
-                    live.update(live_screen(picture, None, console.height), refresh=True)
-        async for picture in pictures:
-            _print(picture, shown)
-            if not shown.watch:
-                return _exit_code(picture)
-    raise AssertionError("a mission is watched until Ctrl-C")
+        if watch:
+            await display.keep_showing(pictures)
+        picture = await anext(pictures)
+        display.show(picture)
+        return _exit_code(picture)
 
 
 async def _pictures(
@@ -98,7 +110,7 @@ def picture_without_hub(found: run_files.RunFile, error: LinkError) -> MissionPi
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     now_s, pid = clock.now_s(), found.launcher_pid
     silence = f"no answer: {error}" if not isinstance(error, HubUnreachable) else f"nothing answers at {found.endpoint}"
-    if _is_paused(pid):
+    if is_stopped(pid):
         remedy = f"Let it go on with 'kill -CONT {pid}', or end the mission with 'scout-backbone down'."
         missed = [
             Absence("launcher", now_s, f"its process {pid} is paused", "", remedy, vital=True),
@@ -108,26 +120,6 @@ def picture_without_hub(found: run_files.RunFile, error: LinkError) -> MissionPi
         missed = [Absence("nameserver", now_s, silence, f"the launcher, process {pid}, restarts it", vital=True)]
     problem = "nothing else is known: no component can be reached without the nameserver"
     return MissionPicture(found.mission, now_s, {}, problems=(problem,), missed=tuple(missed), rate=clock.rate)
-
-
-def _is_paused(pid: int) -> bool:
-    try:
-        return psutil.Process(pid).status() == psutil.STATUS_STOPPED
-    except psutil.NoSuchProcess:
-        return False
-
-
-def _print(picture: MissionPicture, shown: Shown) -> None:
-    if shown.as_json:
-        print(json.dumps(picture.to_json()), flush=True)
-    else:
-        console_of_width(shown.width).print(screen(picture))
-
-
-def console_of_width(width: int | None) -> Console:
-    """Return a console for tables; None: as wide as the terminal."""
-    # What stands in a cell came over the bus: square brackets in it are text, and no markup.
-    return Console(width=width, markup=False, emoji=False, highlight=False)
 
 
 def _exit_code(picture: MissionPicture) -> ExitCode:

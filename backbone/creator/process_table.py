@@ -1,9 +1,13 @@
 """The process table of Linux: descent of processes, their components, and processes that have ended.
 
-Every component leads a session of its own, so its children stay recognizable by that session after the component's
-death. A child that left the session by executing another program is recognized by a variable in its environment. A
-zygote has a session of its own and the name of its parent. It ends its children by itself when the parent dies, and
-needs time for that.
+Every component leads a process group of its own, so its children stay recognizable by that group after the component's
+death. A child that left the group by executing another program is recognized by a variable in its environment. A zygote
+has a session of its own and the name of its parent. It ends its children by itself when the parent dies, and needs time
+for that.
+
+All components of a zygote share its session, because Linux may give each session the same part of the processor
+(autogroup, sched(7)): with a session each, forty starting components go before a command typed at a terminal, and no
+niceness of one counts against another.
 """
 
 from __future__ import annotations
@@ -23,13 +27,13 @@ class Process:
 
     Attributes:
         parent: Its parent's pid.
-        session: Pid of the leader of its session; the leader may have ended.
+        group: Pid of the leader of its process group; the leader may have ended.
         title: First 15 characters of its name.
         is_gone: True if it has ended and waits to be reaped.
     """
 
     parent: int
-    session: int
+    group: int
     title: str
     is_gone: bool
 
@@ -47,11 +51,11 @@ def read_line(stat: str) -> Process:
 
     Example:
         >>> read_line("7 (a (b) c) S 1 7 7 0 -1")
-        Process(parent=1, session=7, title='a (b) c', is_gone=False)
+        Process(parent=1, group=7, title='a (b) c', is_gone=False)
     """
     title, _, rest = stat.partition("(")[2].rpartition(")")
-    state, parent, _group, session, *_ = rest.split()
-    return Process(int(parent), int(session), title, state in "ZX")
+    state, parent, group, *_ = rest.split()
+    return Process(int(parent), int(group), title, state in "ZX")
 
 
 def is_stopped(pid: int) -> bool:
@@ -88,10 +92,10 @@ def descendants(table: Table, ancestor: int) -> set[int]:
 
 
 def tree(table: Table, component: int) -> set[int]:
-    """Return the processes of a living component: itself, its session, its descendants, no zygotes."""
+    """Return the processes of a living component: itself, its process group, its descendants, no zygotes."""
     own = {component} & table.keys()
-    session = {pid for pid, process in table.items() if process.session == component and not is_zygote(process)}
-    return {pid for pid in own | session | descendants(table, component) if not table[pid].is_gone}
+    group = {pid for pid, process in table.items() if process.group == component and not is_zygote(process)}
+    return {pid for pid in own | group | descendants(table, component) if not table[pid].is_gone}
 
 
 def remains(table: Table, component: int, adopter: int | None = None) -> set[int]:
@@ -104,7 +108,7 @@ def remains(table: Table, component: int, adopter: int | None = None) -> set[int
     left = {
         pid
         for pid, process in table.items()
-        if process.session == component or (adopter in (None, process.parent) and mark in processes.environment(pid))
+        if process.group == component or (adopter in (None, process.parent) and mark in processes.environment(pid))
     }
     return {pid for pid in left if not table[pid].is_gone and not is_zygote(table[pid])}
 

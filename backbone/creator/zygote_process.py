@@ -6,8 +6,8 @@ because a child inherits their locks and descriptors.
 Rules, for any killed process:
 
 * A component dies with its zygote (the kernel's parent-death signal).
-* The end of a component is reported after the end of its whole process tree: its session is killed, and a zygote of
-  its own (a creator's) has ended its children before.
+* The end of a component is reported after the end of its whole process tree: its process group is killed, and a
+  zygote of its own (a creator's) has ended its children before.
 * When the zygote's parent has ended, for any reason, the zygote sends SIGTERM, then SIGKILL, to all its components
   and their descendants, removes the mission's folder, and ends.
 """
@@ -276,7 +276,7 @@ class _ZygoteProcess:
     def _become(self, launch: Launch) -> NoReturn:
         code = EXIT_BUG
         try:
-            os.setsid()
+            os.setpgid(0, 0)  # the session stays the zygote's; see process_table
             own_process.die_with_parent()
             if os.getppid() != self._own_pid:  # the zygote died before the child was tied to it
                 os._exit(EXIT_BUG)

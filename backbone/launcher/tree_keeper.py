@@ -96,6 +96,8 @@ class TreeKeeper:
         """Its file as it is now."""
         self.version = 0
         """Number of changes since it came up."""
+        self._orders_of: MissionDescription | None = None
+        self._orders: dict[str, Start] = {}
         self._bus, self._clock, self._begin_root, self._leave_root = bus, clock, begin_root, leave_root
         self._begin, self._note = begin, note
         self._one_at_a_time = asyncio.Lock()
@@ -113,7 +115,7 @@ class TreeKeeper:
 
     def newest(self, order: Start) -> Start:
         """Return the order as the tree is now, of a behavior of the tree; any other order as it is."""
-        return orders(self.description).get(order.name, order)
+        return self._orders_now().get(order.name, order)
 
     async def change(self, change: TreeChange, user: str) -> TreeChanged:
         """Change the tree and return its new version.
@@ -126,6 +128,12 @@ class TreeKeeper:
         """
         async with self._one_at_a_time:
             return await self._change(change, user)
+
+    def _orders_now(self) -> dict[str, Start]:
+        """Return the order of each behavior of the tree; each start asks for one, so they are kept."""
+        if self._orders_of is not self.description:
+            self._orders_of, self._orders = self.description, orders(self.description)
+        return self._orders
 
     # ------------------------------------------------------------------ one change
     async def _change(self, change: TreeChange, user: str) -> TreeChanged:
@@ -184,7 +192,7 @@ class TreeKeeper:
 
     async def _begin_root_at_last(self, order: Start) -> None:
         """Keep the root running from now on, however often its start is refused."""
-        while orders(self.description).get(order.name) == order:
+        while self._orders_now().get(order.name) == order:
             try:
                 await self._begin_root(order)
             except Refusal as refusal:
@@ -241,7 +249,7 @@ class TreeKeeper:
     async def _tell_until_noted(self, name: str) -> str:
         """Return when the behavior has taken its place, or does not run."""
         at = address(Subsystem.MISSION_CONTROL, name)
-        while at in self._alive and (order := orders(self.description).get(name)) is not None:
+        while at in self._alive and (order := self._orders_now().get(name)) is not None:
             owed = self._owed.get(name, set())
             place = {key: order.parameters[key] for key in PLACE_PARAMETERS}
             take = TakeBranch(self.version, place, sorted(owed))

@@ -236,6 +236,13 @@ async def test_twenty_components_are_started_at_once(host: CreatorHost) -> None:
     assert {psutil.Process(each.pid).name() for each in spawned} == set(names)
 
 
+async def test_components_share_the_session_of_their_zygote_and_lead_a_process_group_each(host: CreatorHost) -> None:
+    pids = [(await host.spawn("Quiet", name)).pid for name in ("scout1", "scout2")]
+    assert {os.getsid(pid) for pid in pids} == {host.creators_zygote()}, "Linux shares the processor out by sessions"
+    assert [os.getpgid(pid) for pid in pids] == pids
+    assert os.getsid(host.zygote.pid) == host.zygote.pid, "the core services have a part of their own"
+
+
 async def test_a_component_that_is_not_to_be_restarted_is_left_down(host: CreatorHost) -> None:
     pid = (await host.spawn("Quiet", "scout1", policy=RestartPolicy(restart=False))).pid
     os.kill(pid, signal.SIGKILL)

@@ -108,6 +108,20 @@ def test_names_of_a_mission_that_is_up_are_completed_without_asking_it(
     assert loaded == {"msgspec"}
 
 
-def test_status_of_no_mission_loads_no_description_and_no_simulation(tmp_path: Path) -> None:
-    _, loaded = run("scout-backbone", "status", folder=tmp_path)
-    assert loaded <= {"asyncio", "msgspec", "rich", "uvloop", "zenoh"}
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("status",),
+        ("status", "--json"),
+        ("status", "--mission", "m"),
+        ("status", "--mission", "m", "--connect", "tcp/127.0.0.1:1"),
+        ("why", "scout1", "--mission", "m"),
+        ("story", "scout1"),
+    ],
+    ids=" ".join,
+)
+def test_a_question_to_no_mission_loads_no_description_no_simulation_and_no_conversion_of_texts(
+    words: tuple[str, ...], tmp_path: Path
+) -> None:
+    _, loaded = run("scout-backbone", *words, folder=tmp_path)
+    assert loaded <= {"asyncio", "msgspec", "uvloop", "zenoh", *([] if "--json" in words else ["rich"])}

@@ -21,8 +21,8 @@ from backbone.creator.process_table import (
 from backbone.operating_system.processes import environment, wait_gone
 
 
-def alive(parent: int, session: int, title: str = "x") -> Process:
-    return Process(parent, session, title, is_gone=False)
+def alive(parent: int, group: int, title: str = "x") -> Process:
+    return Process(parent, group, title, is_gone=False)
 
 
 CREATOR, ITS_ZYGOTE = 20, 21
@@ -32,13 +32,13 @@ TABLE = {
     ITS_ZYGOTE: alive(20, 21, zygote_title(CREATOR)),
     30: alive(21, 30, "scout1"),
     31: alive(30, 30, "sleep"),
-    32: alive(30, 32, "own session"),
+    32: alive(30, 32, "own group"),
     33: alive(21, 30, "orphan of 30"),
     34: Process(30, 30, "zombie", is_gone=True),
 }
 
 
-def test_a_component_is_itself_its_session_and_its_descendants() -> None:
+def test_a_component_is_itself_its_group_and_its_descendants() -> None:
     assert tree(TABLE, 30) == {30, 31, 32, 33}
 
 
@@ -48,7 +48,7 @@ def test_a_creator_does_not_include_its_zygote_nor_what_that_forked() -> None:
     assert zygotes_of(TABLE, CREATOR) == {ITS_ZYGOTE}
 
 
-def test_what_a_dead_component_left_is_known_by_its_session() -> None:
+def test_what_a_dead_component_left_is_known_by_its_group() -> None:
     table = {pid: process for pid, process in TABLE.items() if pid != 30}
     assert remains(table, 30) == {31, 33}
 
@@ -58,12 +58,12 @@ def test_a_zombie_is_nothing_that_is_left() -> None:
 
 
 def test_a_title_may_hold_anything() -> None:
-    assert read_line("5 (a) b (c)) Z 4 5 3 0 -1") == Process(4, 3, "a) b (c)", is_gone=True)
+    assert read_line("5 (a) b (c)) Z 4 5 3 0 -1") == Process(4, 5, "a) b (c)", is_gone=True)
 
 
 def test_the_table_knows_this_process() -> None:
     own = read_table()[os.getpid()]
-    assert (own.parent, own.session, own.is_gone) == (os.getppid(), os.getsid(0), False)
+    assert (own.parent, own.group, own.is_gone) == (os.getppid(), os.getpgid(0), False)
 
 
 def test_an_environment_that_cannot_be_read_is_empty() -> None:
@@ -71,7 +71,7 @@ def test_an_environment_that_cannot_be_read_is_empty() -> None:
 
 
 @pytest.mark.processes
-def test_what_left_the_session_by_another_program_is_known_by_its_environment() -> None:
+def test_what_left_the_group_by_another_program_is_known_by_its_environment() -> None:
     component = 4_194_305  # no pid: Linux gives none above 2**22
     environ = {**os.environ, MARK: str(component)}
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, env=environ) as program:

@@ -25,7 +25,9 @@ from backbone.launcher.messages import (
     TreeChangedMeanwhile,
     TreeInvalid,
 )
+from backbone.launcher.tree_changes import orders
 from backbone.launcher.tree_keeper import ENDS_WITHIN_S, TreeKeeper
+from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission_bytes
 from backbone.placer.messages import Ended, NoHost, NotPlaced, ReviseStart, Start, StartRevised, StopComponent
 from backbone.rc_manager.messages import AskAttributes, Done, SetPriority
@@ -253,5 +255,30 @@ def test_a_root_that_takes_anothers_place_is_wanted_until_it_runs(scene: Play) -
         del one.refused["new"]
         await one.clock.sleep_s(1.0)
         assert one.told == [("leave", "spare"), ("stop", "spare"), ("priority", "new", 4), ("begin", "new")]
+
+    scene(body)
+
+
+def test_however_many_starts_ask_for_the_newest_order_each_tree_is_read_once(
+    scene: Play, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[int] = []
+
+    def counted(mission: MissionDescription) -> dict[str, Start]:
+        read.append(len(read))
+        return orders(mission)
+
+    monkeypatch.setattr("backbone.launcher.tree_keeper.orders", counted)
+
+    async def body(one: Scene) -> None:
+        old = Start("surveillance", "spare", {})
+        for _ in range(100):
+            assert one.keeper.newest(old).parameters["children"] == []
+            assert one.keeper.newest(Start("scout", "scout1", {})) == Start("scout", "scout1", {})
+        assert len(read) == 1
+        await one.change(MoveBranch(0, "noon", "spare"))
+        for _ in range(100):
+            assert [child["name"] for child in one.keeper.newest(old).parameters["children"]] == ["noon"]
+        assert len(read) == 2
 
     scene(body)

@@ -1,0 +1,43 @@
+"""Tables of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+
+from rich.console import Console
+from rich.live import Live
+
+from backbone.picture.mission import MissionPicture
+from backbone.picture.screen import live_screen, screen
+
+REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds
+
+
+class MissionTables:
+    """A mission's tables.
+
+    Args:
+        width: Of tables; None: as the terminal.
+    """
+
+    every_s = REDRAW_EVERY_S
+
+    def __init__(self, width: int | None) -> None:
+        self._console = console_of_width(width)
+
+    def show(self, picture: MissionPicture) -> None:
+        """Print one."""
+        self._console.print(screen(picture))
+
+    async def keep_showing(self, pictures: AsyncIterator[MissionPicture]) -> None:
+        """Show each in the place of the one before, until there are no more."""
+        console = self._console
+        with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
+            async for picture in pictures:
+                live.update(live_screen(picture, None, console.height), refresh=True)
+
+
+def console_of_width(width: int | None) -> Console:
+    """Return a console for tables; None: as wide as the terminal."""
+    # What stands in a cell came over the bus: square brackets in it are text, and no markup.
+    return Console(width=width, markup=False, emoji=False, highlight=False)
