@@ -105,6 +105,7 @@ class MissionRecorder:
         """
         path = first_free(self._path)
         command = ["-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
+        self._reading = None
         self._process = process = await asyncio.create_subprocess_exec(
             *(sys.executable, *command, *self._options),
             stdin=PIPE,
@@ -173,7 +174,9 @@ class MissionRecorder:
 
     async def _ended(self) -> str:
         """Return the last line that it said, or its exit code, when it has ended."""
-        assert self._process is not None and self._reading is not None  # noqa: S101, PT018  it was begun
+        assert self._process is not None  # noqa: S101  it was begun
+        if self._reading is None:  # its begin was broken off
+            return f"exit code {await self._process.wait()}"
         last = await asyncio.shield(self._reading)
         return last or f"exit code {await self._process.wait()}"
 
