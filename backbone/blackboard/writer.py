@@ -8,6 +8,7 @@ waits. A reader's death ends its connection, and the system frees what waited fo
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import socket
 import threading
@@ -42,7 +43,13 @@ class _Outgoing:
         return cls(head, bytes(value)) if length <= MOST_IN_PACKET else cls(head, b"", sealed_memory.sealed(value))
 
     def send(self, way: socket.socket) -> None:
-        sealed_memory.send(way, (self.head, self.content), [self.descriptor] if self.descriptor >= 0 else [])
+        try:
+            sealed_memory.send(way, (self.head, self.content), [self.descriptor] if self.descriptor >= 0 else [])
+        except OSError as error:
+            if error.errno != errno.EMSGSIZE or self.descriptor >= 0:
+                raise
+            self.descriptor, self.content = sealed_memory.sealed(self.content), b""  # this socket is smaller than most
+            self.send(way)
 
     def close(self) -> None:
         if self.descriptor >= 0:

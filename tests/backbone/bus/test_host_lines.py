@@ -114,6 +114,36 @@ async def test_questions_of_any_length_are_answered_in_their_order(server: HostL
     assert came == sent
 
 
+@pytest.mark.parametrize("small", ["connect", "accept"])
+async def test_sockets_with_little_room_carry_messages_of_any_length(
+    small: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where net.core.wmem_default is small; the other side's socket is as the system makes it."""
+    make = getattr(local_sockets, small)
+
+    def made(of: object) -> socket.socket:
+        one: socket.socket = make(of)
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)  # the system takes its least
+        return one
+
+    monkeypatch.setattr(local_sockets, small, made)
+    server, asker = HostLines(), HostLines()
+    came: list[int] = []
+
+    def note(question: HostQuestion) -> None:
+        came.append(len(question.payload))
+        echo(question)
+
+    server.serve(INBOX, note)
+    way, sent = way_from(asker, server.name), [os.urandom(length) for length in (0, 4_000, 9_000, 70_000, 300_000)]
+    try:
+        assert await asyncio.gather(*(ask(way, payload) for payload in sent)) == sent
+        assert came == [*map(len, sent)]
+    finally:
+        asker.close()
+        server.close()
+
+
 async def test_a_question_that_is_dropped_or_that_nobody_takes_ends(server: HostLines, asker: HostLines) -> None:
     lost: list[LineWay] = []
     served = server.serve(INBOX, HostQuestion.drop)
