@@ -257,6 +257,17 @@ def listen(directory: Path, name: str) -> socket.socket:
     return made
 
 
+def accept(listening: socket.socket) -> socket.socket:
+    """Return the next connection, whoever is at its other end. Never waits.
+
+    Raises:
+        OSError: There is none (``BlockingIOError``), or the system refuses it.
+    """
+    made, _address = listening.accept()
+    made.setblocking(False)
+    return made
+
+
 def connect(directory: Path, name: str) -> socket.socket:
     """Return a connection to the process that listens at a name of the folder. Never waits.
 
