@@ -77,13 +77,13 @@ class Gathering:
             return number, Kind(kind), part
         parts = self._parts.setdefault(number, [])
         parts.append(part)
-        self._bytes += len(part)
+        self._bytes += len(packet)  # with its head: parts may be empty, and are kept all the same
         if self._bytes > MOST_WAITING_BYTES:
             raise ValueError(f"{self._bytes} bytes of messages that are not whole")
         if kind & _MORE:
             return None
         body = b"".join(self._parts.pop(number))
-        self._bytes -= len(body)
+        self._bytes -= len(body) + len(parts) * _PACKET.size
         return number, Kind(kind), body
 
 

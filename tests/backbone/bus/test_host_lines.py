@@ -71,6 +71,14 @@ def test_a_message_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -
         gathering.take(part)
 
 
+def test_messages_that_only_begin_are_refused_however_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host_lines, "MOST_WAITING_BYTES", 1000)
+    gathering = Gathering()
+    heads = [next(packets_of(number, Kind.QUESTION, b"ab", 10))[:9] for number in range(1000)]  # each: more follows
+    with pytest.raises(ValueError, match="not whole"):
+        list(map(gathering.take, heads))
+
+
 @pytest.fixture
 async def server() -> AsyncIterator[HostLines]:
     lines = HostLines()
