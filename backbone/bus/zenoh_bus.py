@@ -147,7 +147,7 @@ class ZenohBus(LifeBus):
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""
         asked_key = key(self._mission, address, Conversation.ASK)
-        answered = self.open_question()
+        answered, ends_s = self.open_question(), self._loop.time() + within_s
         self.asked += 1
         try:
             payload, came = write(self.envelope(question)), cast("Came", NoInbox)
@@ -156,7 +156,7 @@ class ZenohBus(LifeBus):
         finally:
             self.end_question(answered)
         if came is NoInbox:
-            came = await self._query(address, asked_key, payload, within_s)
+            came = await self._query(address, asked_key, payload, ends_s - self._loop.time())
         try:
             return read_answer(came, address, question, reply, within_s)
         except MalformedMessage:
