@@ -228,6 +228,9 @@ def lock(directory: Path, name: str) -> int | None:
             except BlockingIOError:
                 os.close(descriptor)
                 return None
+            except OSError:
+                os.close(descriptor)
+                raise
             os.close(descriptor)  # its holder removed it meanwhile
 
 

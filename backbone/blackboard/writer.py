@@ -15,7 +15,7 @@ import os
 import socket
 import threading
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -126,13 +126,12 @@ class BlackboardWriter:
         if held is None:
             raise WriterStands(f"another writer of {name} lives", name=name)
         self._held = held
-        try:
-            self._listening = sealed_memory.listen(directory, self._socket_name)
-        except BaseException:
-            os.close(held)
-            raise
-        self._events = sealed_memory.Waits()
-        self._events.add(self._listening)
+        with ExitStack() as undo:
+            undo.callback(os.close, held)
+            self._listening = undo.enter_context(sealed_memory.listen(directory, self._socket_name))
+            self._events = sealed_memory.Waits()
+            self._events.add(self._listening)
+            undo.pop_all()
         self._guard = threading.RLock()
         self._readers: dict[int, _ConnectedReader] = {}
         self._newest: _Outgoing | None = None

@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from taking import WITHIN_S
+from taking import WITHIN_S, Count
 
 from backbone.blackboard import sealed_memory
 from backbone.blackboard import writer as writers
@@ -67,3 +67,20 @@ def test_a_writer_that_is_closed_while_its_thread_looks_ends_that_thread(
     thread = writer.serve_in_thread()
     thread.join(WITHIN_S)
     assert (thread.is_alive(), bugs) == (False, [])
+
+
+@pytest.mark.parametrize("fails", ["Waits", "listen", "fcntl.flock"])
+def test_a_writer_that_could_not_be_opened_leaves_its_place_and_no_descriptor(
+    folder: Path, descriptors: Count, monkeypatch: pytest.MonkeyPatch, fails: str
+) -> None:
+    def refuse(*_given: object) -> None:
+        raise OSError(errno.EMFILE, "no descriptors")
+
+    folder.mkdir(mode=0o700)
+    before = descriptors()
+    with monkeypatch.context() as patched:
+        patched.setattr(f"backbone.blackboard.sealed_memory.{fails}", refuse)
+        with pytest.raises(OSError, match="no descriptors"):
+            BlackboardWriter(folder, "room")
+    assert descriptors() == before
+    BlackboardWriter(folder, "room").close()
