@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from backbone.addresses import PLACER
+from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component
@@ -147,7 +148,7 @@ class FakeArc:
 class FakePlacer:
     """Runs components in this process: ARCs are fakes, other types are looked up in ``classes``."""
 
-    def __init__(self, network: LocalNetwork, clock: Clock, classes: dict[str, type[Component[Any]]]) -> None:
+    def __init__(self, network: LocalNetwork, clock: Clock, classes: Mapping[str, type[Component[Any]]]) -> None:
         self.network, self.clock, self.classes = network, clock, classes
         self.arcs: dict[str, FakeArc] = {}
         self.components: dict[str, Component[Any]] = {}
@@ -300,3 +301,28 @@ class FakePlacer:
             if owned in self.placed:
                 await self._stop(owned)
         return Ended(name, EndedBy.ASKING)
+
+
+Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
+"""Runs a scene with a placer."""
+
+
+def with_placer(local_mission: Any, classes: Mapping[str, type[Component[Any]]]) -> Run:
+    """Return what runs a scene on virtual time with a placer of these classes on a fresh network.
+
+    Args:
+        local_mission: The fixture.
+    """
+
+    def run(scene: Callable[[FakePlacer], Awaitable[None]]) -> None:
+        async def main() -> None:
+            async with local_mission("iros2001") as network:
+                placer = FakePlacer(network, VirtualClock(), classes)
+                try:
+                    await scene(placer)
+                finally:
+                    await placer.close()
+
+        run_virtual(main())
+
+    return run

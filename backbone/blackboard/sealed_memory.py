@@ -228,6 +228,9 @@ def lock(directory: Path, name: str) -> int | None:
             except BlockingIOError:
                 os.close(descriptor)
                 return None
+            except OSError:
+                os.close(descriptor)
+                raise
             os.close(descriptor)  # its holder removed it meanwhile
 
 
@@ -254,6 +257,17 @@ def listen(directory: Path, name: str) -> socket.socket:
     except BaseException:
         made.close()
         raise
+    return made
+
+
+def accept(listening: socket.socket) -> socket.socket:
+    """Return the next connection, whoever is at its other end. Never waits.
+
+    Raises:
+        OSError: There is none (``BlockingIOError``), or the system refuses it.
+    """
+    made, _address = listening.accept()
+    made.setblocking(False)
     return made
 
 

@@ -8,10 +8,14 @@ waits. A reader's death ends its connection, and the system frees what waited fo
 from __future__ import annotations
 
 import asyncio
+import errno
+import logging
+import math
 import os
 import socket
 import threading
-from contextlib import suppress
+import time
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +29,10 @@ from backbone.blackboard.values import (
     files_of,
     require_short,
 )
+
+ACCEPT_AGAIN_S = 1.0  # chosen: as long as asyncio's own servers wait (asyncio.constants.ACCEPT_RETRY_DELAY)
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(slots=True)
@@ -42,7 +50,13 @@ class _Outgoing:
         return cls(head, bytes(value)) if length <= MOST_IN_PACKET else cls(head, b"", sealed_memory.sealed(value))
 
     def send(self, way: socket.socket) -> None:
-        sealed_memory.send(way, (self.head, self.content), [self.descriptor] if self.descriptor >= 0 else [])
+        try:
+            sealed_memory.send(way, (self.head, self.content), [self.descriptor] if self.descriptor >= 0 else [])
+        except OSError as error:
+            if error.errno != errno.EMSGSIZE or self.descriptor >= 0:
+                raise
+            self.descriptor, self.content = sealed_memory.sealed(self.content), b""  # this socket is smaller than most
+            self.send(way)
 
     def close(self) -> None:
         if self.descriptor >= 0:
@@ -112,18 +126,17 @@ class BlackboardWriter:
         if held is None:
             raise WriterStands(f"another writer of {name} lives", name=name)
         self._held = held
-        try:
-            self._listening = sealed_memory.listen(directory, self._socket_name)
-        except BaseException:
-            os.close(held)
-            raise
-        self._events = sealed_memory.Waits()
-        self._events.add(self._listening)
+        with ExitStack() as undo:
+            undo.callback(os.close, held)
+            self._listening = undo.enter_context(sealed_memory.listen(directory, self._socket_name))
+            self._events = sealed_memory.Waits()
+            self._events.add(self._listening)
+            undo.pop_all()
         self._guard = threading.RLock()
         self._readers: dict[int, _ConnectedReader] = {}
         self._newest: _Outgoing | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._is_open, self._is_served = True, False
+        self._is_open, self._is_served, self._accept_again_s = True, False, math.inf
         self.number = 0
         """Number of the newest value; 0: none yet."""
 
@@ -159,6 +172,9 @@ class BlackboardWriter:
     def serve(self) -> None:
         """Admit new readers, who get the newest value at once, and let go those that are gone. Never waits."""
         with self._guard:
+            if self._is_open and time.monotonic() >= self._accept_again_s:
+                self._accept_again_s = math.inf
+                self._events.add(self._listening)
             for descriptor in self._events.readable() if self._is_open else ():
                 if descriptor == self._listening.fileno():
                     self._accept()
@@ -178,8 +194,9 @@ class BlackboardWriter:
 
         def run() -> None:
             while self._is_open:
-                if sealed_memory.wait_readable(self._events, _LOOK_FOR_END_S):
-                    self.serve()
+                with suppress(ValueError):  # another thread has closed the writer just now
+                    sealed_memory.wait_readable(self._events, _LOOK_FOR_END_S)
+                self.serve()
 
         thread = threading.Thread(target=run, name="blackboard", daemon=True)
         thread.start()
@@ -203,16 +220,24 @@ class BlackboardWriter:
             os.close(self._held)
 
     def _accept(self) -> None:
-        with suppress(BlockingIOError):
-            while True:
-                connection, _ = self._listening.accept()
-                connection.setblocking(False)
-                if not sealed_memory.is_own(connection):
-                    connection.close()
-                    continue
-                self._readers[connection.fileno()] = _ConnectedReader(connection)
-                self._events.add(connection)
-                self._hear(connection.fileno())
+        while True:
+            try:
+                connection = sealed_memory.accept(self._listening)
+            except BlockingIOError:
+                return
+            except OSError as error:  # no descriptors are left: who connects waits
+                log.warning("no further reader for now: %s", error)
+                self._events.remove(self._listening.fileno())
+                self._accept_again_s = time.monotonic() + ACCEPT_AGAIN_S
+                if self._loop is not None:
+                    self._loop.call_later(ACCEPT_AGAIN_S, self.serve)
+                return
+            if not sealed_memory.is_own(connection):
+                connection.close()
+                continue
+            self._readers[connection.fileno()] = _ConnectedReader(connection)
+            self._events.add(connection)
+            self._hear(connection.fileno())
 
     def _hear(self, descriptor: int) -> None:
         """Take the two sockets of a new reader, or notice the end of one."""

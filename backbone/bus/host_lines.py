@@ -21,7 +21,8 @@ from backbone.operating_system import local_sockets
 from backbone.waiting import settle
 from backbone.wire import MAX_MESSAGE_BYTES
 
-MOST_PACKET_BYTES = 65_536  # chosen: three of them fit into a socket as the system makes it (net.core.wmem_default)
+# chosen: three of them fit into a socket as the system makes it; where net.core.wmem_default is less, they are shorter
+MOST_PACKET_BYTES = 65_536
 MOST_WAITING_BYTES = 2 * MAX_MESSAGE_BYTES  # chosen: a peer that is stopped costs no more
 MOST_AT_ONCE = 32  # chosen: packets of one line before the rest of the event loop has its turn
 ACCEPT_AGAIN_S = 1.0  # chosen: as long as asyncio's own servers wait (asyncio.constants.ACCEPT_RETRY_DELAY)
@@ -41,9 +42,9 @@ class Kind(IntEnum):
     NO_INBOX = 3  # no component got the question
 
 
-def packets_of(number: int, kind: Kind, body: bytes) -> Iterator[bytes]:
-    """Yield the packets of a message."""
-    most = MOST_PACKET_BYTES - _PACKET.size
+def packets_of(number: int, kind: Kind, body: bytes, most_bytes: int = MOST_PACKET_BYTES) -> Iterator[bytes]:
+    """Yield the packets of a message, none of them longer than ``most_bytes``."""
+    most = most_bytes - _PACKET.size
     for at in range(0, max(1, len(body)), most):
         part = body[at : at + most]
         yield _PACKET.pack(number, kind | (_MORE if at + most < len(body) else 0)) + part
@@ -76,13 +77,13 @@ class Gathering:
             return number, Kind(kind), part
         parts = self._parts.setdefault(number, [])
         parts.append(part)
-        self._bytes += len(part)
+        self._bytes += len(packet)  # with its head: parts may be empty, and are kept all the same
         if self._bytes > MOST_WAITING_BYTES:
             raise ValueError(f"{self._bytes} bytes of messages that are not whole")
         if kind & _MORE:
             return None
         body = b"".join(self._parts.pop(number))
-        self._bytes -= len(body)
+        self._bytes -= len(body) + len(parts) * _PACKET.size
         return number, Kind(kind), body
 
 
@@ -102,6 +103,7 @@ class HostLine:
     ) -> None:
         self._socket, self._took, self._ended = connected, took, ended
         self._loop = asyncio.get_running_loop()
+        self._most_packet_bytes = min(MOST_PACKET_BYTES, local_sockets.most_packet_bytes(connected))
         self._came = Gathering()
         self._waiting: deque[bytes] = deque()
         self._waiting_bytes = 0
@@ -113,7 +115,7 @@ class HostLine:
         """Send a message, later if the peer has no time now. A line whose peer takes nothing for long ends."""
         if not self.is_open:
             return
-        for packet in packets_of(number, kind, body):
+        for packet in packets_of(number, kind, body, self._most_packet_bytes):
             self._waiting.append(packet)
             self._waiting_bytes += len(packet)
         if not self._is_full:

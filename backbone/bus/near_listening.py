@@ -49,6 +49,10 @@ class SendersHeard:
         """Record that it fell."""
         self._standing.discard(source)
 
+    def stands(self, source: str) -> bool:
+        """Return whether the sender's token stands."""
+        return source in self._standing
+
     def gave(self, source: str) -> None:
         """Record that a value came by the sender's board."""
         self._near.add(source)
@@ -115,6 +119,7 @@ class NearListening(LatestSample):
         self._readers: dict[str, BlackboardReader] = {}
         self._had_boards: set[str] = set()
         self._look_again_s: dict[str, float] = {}
+        self._will_look: set[str] = set()
         self._is_open = True
         self._network: Entity | None = declare(self)
         self.tokens: Entity | None = None
@@ -158,10 +163,24 @@ class NearListening(LatestSample):
             if len(self._look_again_s) >= MOST_SENDERS:
                 self._look_again_s.clear()
             self._look_again_s[source] = self._loop.time() + LOOK_EACH_S
+            self._look_later(source)
             return
         self._readers[source] = found
         self._had_boards.add(source)
         self._loop.add_reader(found, self._take, source)
+
+    def _look_later(self, source: str) -> None:
+        """Look again for a board that was here: values too long for the network come by it alone."""
+        if source not in self._had_boards or source in self._will_look:
+            return
+
+        def look() -> None:
+            self._will_look.discard(source)
+            if self._is_open and self._senders.stands(source):
+                self._look(source)
+
+        self._will_look.add(source)
+        self._loop.call_later(LOOK_EACH_S, look)
 
     def _take(self, source: str) -> None:
         try:
@@ -172,6 +191,7 @@ class NearListening(LatestSample):
                 self._look_again_s[source] = self._loop.time() + LOOK_EACH_S
             self._leave(source)
             self._mend()
+            self._look_later(source)
             return
         if value is None:
             return

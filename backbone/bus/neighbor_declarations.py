@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import logging
 from collections.abc import Callable
 
 from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Answer, LifeListener, Listener, Overhearer
 from backbone.keys import Conversation, key
-from backbone.wire import Accepts, Envelope, Message, kinds_of, write
+from backbone.wire import Accepts, Envelope, Message, OversizedMessage, UnwritableMessage, kinds_of, write
 
 TakeBack = Callable[[], None]
+
+log = logging.getLogger(__name__)
 
 
 class Declaring(BusBase):
@@ -116,10 +119,15 @@ class Overheard(NeighborDeclaration):
         return conversation is self._conversation and self._of in ("", address)
 
     def arrived(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
-        """Deliver a publication in a step of its own, unless too many wait."""
+        """Deliver a publication in a step of its own, unless too many wait, or its bytes cannot be made."""
         if not self.hears(address, conversation):
             return
-        raw = write(envelope)
+        try:
+            raw = write(envelope)
+        except (OversizedMessage, UnwritableMessage) as refusal:  # its sender and its listeners need no bytes
+            log.info("not overheard: %s", refusal)
+            self.dropped += 1
+            return
         if self._waiting + len(raw) > self._most:
             self.dropped += 1
             return

@@ -23,7 +23,7 @@ from backbone.bus.bus_base import quoted
 from backbone.bus.declared import Together
 from backbone.bus.host_boards import HostBoards
 from backbone.bus.host_copies import HostCopies, copies_for
-from backbone.bus.host_lines import HostQuestion, lines_for
+from backbone.bus.host_lines import lines_for
 from backbone.bus.inbox import (
     EachSample,
     LatestSample,
@@ -147,7 +147,7 @@ class ZenohBus(LifeBus):
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""
         asked_key = key(self._mission, address, Conversation.ASK)
-        answered = self.open_question()
+        answered, ends_s = self.open_question(), self._loop.time() + within_s
         self.asked += 1
         try:
             payload, came = write(self.envelope(question)), cast("Came", NoInbox)
@@ -156,7 +156,7 @@ class ZenohBus(LifeBus):
         finally:
             self.end_question(answered)
         if came is NoInbox:
-            came = await self._query(address, asked_key, payload, within_s)
+            came = await self._query(address, asked_key, payload, ends_s - self._loop.time())
         try:
             return read_answer(came, address, question, reply, within_s)
         except MalformedMessage:
@@ -190,21 +190,22 @@ class ZenohBus(LifeBus):
         lines = self.ways.lines
         host = lines.name if lines is not None else ""
 
-        def asked(came: zenoh.Query) -> None:
-            self.start(self._answer(reader, answer, Query(came, own, inbox, host)))
+        def asked(question: Asked) -> None:
+            answering = self.start(self._answer(reader, answer, question))
+            answering.add_done_callback(lambda _done: question.drop())  # also if it was cancelled before it began
+
+        def asked_by_query(came: zenoh.Query) -> None:
+            asked(Query(came, own, inbox, host))
 
         def asked_directly(sample: zenoh.Sample) -> None:
             if (question := DirectQuestion.of(self._session, self._mission, sample)) is None:
                 self.unreadable += 1
             else:
-                self.start(self._answer(reader, answer, question))
-
-        def asked_on_line(question: HostQuestion) -> None:
-            self.start(self._answer(reader, answer, question))
+                asked(question)
 
         direct = self._session.declare_subscriber(inbox, lambda sample: self.push(asked_directly, sample))
-        near = lines.serve(inbox, asked_on_line) if lines is not None else None
-        queries = self._session.declare_queryable(own, lambda came: self.push(asked, came))
+        near = lines.serve(inbox, asked) if lines is not None else None
+        queries = self._session.declare_queryable(own, lambda came: self.push(asked_by_query, came))
         return self._declare(Together(direct, near, queries))
 
     async def _answer(self, reader: Reader[Message], answer: Answer, asked: Asked) -> None:
@@ -221,8 +222,6 @@ class ZenohBus(LifeBus):
             log.info("a reply of %s was not sent: %s", self.source, error)
         except Exception as bug:  # the reply cannot be encoded
             self.on_bug(bug)
-        finally:
-            asked.drop()
 
     def _write_reply(self, envelope: Envelope[Message]) -> bytes:
         try:

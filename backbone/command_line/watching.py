@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import asyncio
 import json
-import signal
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from backbone.addresses import COMPONENT_DATABASE
 from backbone.bus.interface import Bus, Clock, Overhearing
 from backbone.command_line.connection import connected
-from backbone.command_line.key_facts import ask_facts, with_facts
+from backbone.command_line.key_facts import TrafficRow, ask_facts, with_facts
+from backbone.command_line.listening import until_ended
 from backbone.command_line.message_lines import (
     TrafficTable,
     field_of,
@@ -34,6 +34,7 @@ from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import heard_now
 from backbone.recording.translation import Translated
 from backbone.spoken import counted
+from backbone.waiting import first_of, set_within
 from backbone.wire import Message
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
@@ -62,49 +63,55 @@ class Watched:
 
 
 async def watch(where: Where, wanted: Watched) -> ExitCode:
-    """Print messages as they come, until a signal, the time or the number ends it."""
-    ended, shown = asyncio.Event(), 0
+    """Print messages as they come, until a signal, the time, the number or the end of the mission ends it."""
+    enough, shown = asyncio.Event(), 0
 
     def heard(key: str, message: Translated, at_s: float) -> None:
         nonlocal shown
-        if ended.is_set():
+        if enough.is_set():
             return
         for line in _lines(key, message, at_s, wanted):
             show([line])
             shown += 1
         if wanted.most is not None and shown >= wanted.most:
-            ended.set()
+            enough.set()
 
-    async with _listening(where, wanted.keys, heard) as (_bus, _clock, _subscribed), _until(ended, wanted.for_s):
-        await ended.wait()
+    async with (
+        connected(where) as (bus, clock),
+        overhearing(bus, clock, wanted.keys, heard),
+        until_ended(bus, wanted.for_s) as ended,
+    ):
+        await first_of(ended.wait(), enough.wait())
     return ExitCode.DONE
 
 
 async def top(where: Where, wanted: Watched, *, once: bool) -> ExitCode:
     """Print rates and sizes of keys each second, or once, the busiest first, and what their listeners did not get."""
-    ended, traffic = asyncio.Event(), TrafficTable()
+    traffic = TrafficTable()
 
     def heard(key: str, message: Translated, _at_s: float) -> None:
         traffic.add(key, message.source, message.schema, message.size_bytes)
 
-    async with _listening(where, wanted.keys, heard) as (bus, clock, subscribed), _until(ended, wanted.for_s):
-        while not ended.is_set():
-            traffic.rows.clear()
-            began_s = clock.now_s()
-            for_s = wanted.for_s if once and wanted.for_s is not None else LOOK_EACH_S
-            await clock.sleep_s(for_s * clock.rate)
-            heard_rows = traffic.busiest((clock.now_s() - began_s) / clock.rate)
-            facts = await ask_facts(bus)
-            rows = with_facts(heard_rows, facts, bus.mission, wanted.keys)
-            show(map(json.dumps, rows) if wanted.as_json else [*traffic_lines(rows), ""])
-            if facts.silent:
-                say(f"without the counts of {', '.join(sorted(facts.silent))}, which did not answer")
-            if once:
-                ended.set()
-            await clock.sleep_s(ANSWERS_HEARD_S * clock.rate)
+    async with connected(where) as (bus, clock), overhearing(bus, clock, wanted.keys, heard) as subscribed:
+        async with until_ended(bus, wanted.for_s) as ended:
+            while not ended.is_set():
+                traffic.rows.clear()
+                began_s = clock.now_s()
+                await set_within(ended, None if once else LOOK_EACH_S)
+                heard_rows = traffic.busiest((clock.now_s() - began_s) / clock.rate)
+                await _show_rates(bus, heard_rows, wanted)
+                await clock.sleep_s(ANSWERS_HEARD_S * clock.rate)
         if dropped := sum(one.dropped for one in subscribed):
             say(f"incomplete: {counted(dropped, 'message')} came too fast")
     return ExitCode.DONE
+
+
+async def _show_rates(bus: Bus, heard: Sequence[TrafficRow], wanted: Watched) -> None:
+    facts = await ask_facts(bus)
+    rows = with_facts(heard, facts, bus.mission, wanted.keys)
+    show(map(json.dumps, rows) if wanted.as_json else [*traffic_lines(rows), ""])
+    if facts.silent:
+        say(f"without the counts of {', '.join(sorted(facts.silent))}, which did not answer")
 
 
 async def mission_classes(bus: Bus, trouble: Callable[[str], None] = say) -> dict[str, type[Message]]:
@@ -135,14 +142,6 @@ def _lines(key: str, message: Translated, at_s: float, wanted: Watched) -> Itera
         told = {"at_s": heard.at_s, "key": heard.key, "value": value}
         shown = value if isinstance(value, str) else json.dumps(value)
         yield json.dumps(told) if wanted.as_json else f"{heard.at_s:10.3f} s  {short_key(heard.key)}  {shown}"
-
-
-@asynccontextmanager
-async def _listening(
-    where: Where, keys: tuple[str, ...], heard: Callable[[str, Translated, float], None]
-) -> AsyncIterator[tuple[Bus, Clock, list[Overhearing]]]:
-    async with connected(where) as (bus, clock), overhearing(bus, clock, keys, heard) as subscribed:
-        yield bus, clock, subscribed
 
 
 @asynccontextmanager
@@ -179,17 +178,3 @@ async def overhearing(
     finally:
         for one in subscribed:
             one.close()
-
-
-@asynccontextmanager
-async def _until(ended: asyncio.Event, for_s: float | None) -> AsyncIterator[None]:
-    """Set the event at a signal, or after so many seconds of the machine."""
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, ended.set)
-    timer = loop.call_later(for_s, ended.set) if for_s is not None else None
-    try:
-        yield
-    finally:
-        if timer is not None:
-            timer.cancel()

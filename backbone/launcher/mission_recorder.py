@@ -105,6 +105,7 @@ class MissionRecorder:
         """
         path = first_free(self._path)
         command = ["-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
+        self._reading = None
         self._process = process = await asyncio.create_subprocess_exec(
             *(sys.executable, *command, *self._options),
             stdin=PIPE,
@@ -118,11 +119,11 @@ class MissionRecorder:
         except TimeoutError:
             said = f"it did not begin within {BEGUN_WITHIN_S:g} s"
         self._reading = asyncio.create_task(_last_line(process), name="what the recorder says")
-        assert process.stdout is not None  # noqa: S101  a pipe
-        self._watching = asyncio.create_task(watch(process.stdout, self._silent), name="whether the recorder responds")
         if not said.startswith("records to"):
             await self.end()
             raise RecorderFailed(f"the recorder did not begin: {said.strip() or 'it ended without a word'}")
+        assert process.stdout is not None  # noqa: S101  a pipe
+        self._watching = asyncio.create_task(watch(process.stdout, self._silent), name="whether the recorder responds")
 
     async def keep(self) -> None:
         """Start the recorder again whenever it ended, until cancelled."""
@@ -173,7 +174,9 @@ class MissionRecorder:
 
     async def _ended(self) -> str:
         """Return the last line that it said, or its exit code, when it has ended."""
-        assert self._process is not None and self._reading is not None  # noqa: S101, PT018  it was begun
+        assert self._process is not None  # noqa: S101  it was begun
+        if self._reading is None:  # its begin was broken off
+            return f"exit code {await self._process.wait()}"
         last = await asyncio.shield(self._reading)
         return last or f"exit code {await self._process.wait()}"
 
@@ -183,9 +186,9 @@ class MissionRecorder:
         if is_silent:
             pid = self._process.pid
             remedy = f"Wake it by 'kill -CONT {pid}', or 'kill -9 {pid}': then the recording goes on in a further file."
-            doing = "messages wait for it, as far as there is room"
+            doing = "its recording stands still, and messages wait for it as far as there is room"
             self._absence = Absence(NAME, self._clock.now_s(), "it does not respond", doing, remedy)
-            self.on_changed(f"its recorder does not respond; {doing}")
+            self.on_changed(f"its recorder does not respond: {doing}")
         else:
             self._absence = None
             self.on_changed("its recorder responds again")

@@ -220,6 +220,8 @@ class Offering:
         source = f"{Subsystem.BACKBONE}/{name}"
         try:
             clock = await clock_elsewhere(offered.mission, offered.endpoint, source, offered.secret)
+            launch = _launch(offered, name, clock)
+            creator, recorder = KeptCreator(launch, offered), recorder_of_host(offered, clock)
             config = client_config(offered.endpoint, offered.secret)
             bus = await ZenohBus.open_when_up(offered.mission, source, clock, config)
         except HubUnreachable as error:
@@ -227,8 +229,6 @@ class Offering:
                 f"a hub listens at {offered.endpoint} and does not let this machine in: the secret is missing or not "
                 "the mission's (--secret-file), or the hub is just starting"
             ) from error
-        launch = _launch(offered, name, clock)
-        creator, recorder = KeptCreator(launch, offered), recorder_of_host(offered, clock)
         offer = self._current = MachineOffer(launch, bus, clock, creator, self._is_in_the_mission, recorder)
         try:
             await offer.run()

@@ -34,12 +34,11 @@ class RecorderSigns:
 
 
 async def watch(signs: asyncio.StreamReader, silent: Callable[[bool], None]) -> None:
-    """Call ``silent(True)`` when no signs come any more, and ``silent(False)`` when they come again; return at the end.
+    """Call ``silent(True)`` when no signs come, and ``silent(False)`` when they come again; return at the end.
 
-    The first sign is awaited without limit: a process that begins is watched by who began it.
+    When: once the recorder has said that it listens; before, who began it limits the time.
     """
-    late = 0
-    line = await signs.readline()
+    late, line = 0, b"\n"
     while line:
         try:
             async with asyncio.timeout(LATE_S):

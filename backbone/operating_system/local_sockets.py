@@ -13,6 +13,7 @@ import sys
 
 IS_POSSIBLE = sys.platform == "linux"
 _PEER = struct.Struct("iII")  # struct ucred, unix(7): pid, user, group
+_BESIDE_PACKET_BYTES = 32  # Linux, net/unix/af_unix.c, unix_dgram_sendmsg: a longer packet is refused (EMSGSIZE)
 _NAME_BYTES = 12  # chosen: no other process takes the same name by chance
 
 
@@ -67,6 +68,11 @@ def accept(listening: socket.socket) -> socket.socket:
         made.close()
         raise
     return made
+
+
+def most_packet_bytes(connected: socket.socket) -> int:
+    """Return the length of the longest packet that this end can send, however much waits."""
+    return connected.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF) - _BESIDE_PACKET_BYTES
 
 
 def require_own(connected: socket.socket) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine
 from typing import Protocol
 
 from backbone.bus.interface import Clock
@@ -11,7 +11,6 @@ from backbone.rc_manager.context_switch import ContextSwitch
 from backbone.rc_manager.rc_watch import RcWatch
 from backbone.rc_manager.switch_times import SwitchTimes
 from backbone.scheduling.events import ConnectArc, Event, Freed, Opened, OpenFailed, RevokeArc
-from backbone.scheduling.requests import RcUse
 from backbone.waiting import end_tasks
 
 
@@ -55,13 +54,9 @@ class ArcSwitches:
         """Return numbers and times of switches."""
         return self._times.statistics()
 
-    def connect(self, order: ConnectArc, uses: Callable[[], Mapping[str, RcUse]]) -> None:
-        """Connect the ARC to its RCs.
-
-        Args:
-            uses: Returns how the ARC uses each RC, when it is its turn.
-        """
-        self.begin(order.arc, lambda: self._connect(order, uses()))
+    def connect(self, order: ConnectArc) -> None:
+        """Connect the ARC to its RCs."""
+        self.begin(order.arc, lambda: self._connect(order))
 
     def revoke(self, order: RevokeArc) -> None:
         """Take the RCs from the ARC."""
@@ -81,8 +76,8 @@ class ArcSwitches:
 
         self._under_way[arc] = self._service.start_task(in_turn(), f"switch {arc}")
 
-    async def _connect(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> None:
-        failed = await self._context_switch.connect(order, uses)
+    async def _connect(self, order: ConnectArc) -> None:
+        failed = await self._context_switch.connect(order)
         if failed is None:
             self._times.granted(order.epochs, order.arc, order.settle_s, self._service.clock.now_s())
             self._service.happened(Opened(order.arc))

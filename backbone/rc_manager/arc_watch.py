@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 from collections import Counter
-from collections.abc import Coroutine, Iterable, Iterator, Mapping
+from collections.abc import Coroutine, Iterable, Iterator
 from typing import Protocol
 
 from backbone.bus.interface import Bus, Clock
@@ -17,7 +17,7 @@ from backbone.rc_manager.context_switch import in_pool
 from backbone.rc_manager.messages import AskRequest, Beat, CurrentRequest, Done, TakePath
 from backbone.rc_manager.recovery import Recovery
 from backbone.scheduling.events import Departed, Event
-from backbone.scheduling.requests import PathNode, RcUse, Scheduled, SchedulingRequest
+from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest
 from backbone.scheduling.views import RequestAttributes
 from backbone.wire import Envelope
 
@@ -57,8 +57,6 @@ class ArcWatch:
 
     def __init__(self, service: ArcService, switches: ArcSwitches, recovery: Recovery) -> None:
         self._service, self._switches, self._recovery = service, switches, recovery
-        self.uses: dict[str, Mapping[str, RcUse]] = {}
-        """ARC → how it uses each of its RCs."""
         self._beats = Beats(service.clock.rate)
         self._requesting: Counter[str] = Counter()
 
@@ -75,27 +73,29 @@ class ArcWatch:
         """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
         return self._requesting.total() > 0
 
-    def remember(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
-        """Know the ARC from now on: it asks for these RCs."""
-        self.uses[request.arc] = next(uses for uses in request.alternatives if set(uses) == set(rcs))
-        self._beats.heard(request.arc, self._service.clock.now_s())
+    @property
+    def known(self) -> list[str]:
+        """The ARCs that ask for RCs."""
+        return [*self._beats.heard_s]
+
+    def remember(self, arc: str) -> None:
+        """Know the ARC from now on: it asks for RCs."""
+        self._beats.heard(arc, self._service.clock.now_s())
 
     def forget(self, arc: str) -> bool:
         """Know the ARC no longer, and expect no beats; return whether it was known."""
-        self._beats.forget(arc)
-        return self.uses.pop(arc, None) is not None
+        return self._beats.forget(arc)
 
     def end_silent(self) -> None:
         """End the requests of ARCs that hang. When: every ``RENEW_EVERY_S``."""
         for arc, silent_s in self._beats.look(self._service.clock.now_s()).items():
             log.warning("%s has not beaten for %.1f s", arc, silent_s)
-            self.uses.pop(arc, None)
             self._service.happened(Departed(arc, "silent"))
 
     def heard_beat(self, envelope: Envelope[Beat]) -> None:
         """Take in a beat; one of an ARC that is not known leads to a question for its request."""
         arc = envelope.body.arc
-        if arc in self.uses:
+        if arc in self._beats.heard_s:
             self._beats.heard(arc, self._service.clock.now_s())
         elif arc not in self._switches and not self._requesting[arc]:
             self._switches.begin(arc, lambda: self._meet(arc))
@@ -103,7 +103,7 @@ class ArcWatch:
     async def _meet(self, arc: str) -> None:
         """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
         current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
-        if current is None or arc in self.uses or self._requesting[arc] or self._service.admit_again(current):
+        if current is None or arc in self._beats.heard_s or self._requesting[arc] or self._service.admit_again(current):
             return
         try:
             await self._service.request(current.request)  # its own question was lost, or is still on its way

@@ -21,19 +21,20 @@ class Beats:
 
     Attributes:
         rate: Seconds of the clock per second of the machine.
+        heard_s: ARC → when it beat last.
     """
 
     rate: float = 1.0
-    _heard_s: dict[str, float] = field(default_factory=dict)
+    heard_s: dict[str, float] = field(default_factory=dict)
     _looked_s: float | None = None
 
     def heard(self, arc: str, now_s: float) -> None:
         """Note a beat, or a request, of the ARC."""
-        self._heard_s[arc] = now_s
+        self.heard_s[arc] = now_s
 
-    def forget(self, arc: str) -> None:
-        """Expect no more beats of the ARC."""
-        self._heard_s.pop(arc, None)
+    def forget(self, arc: str) -> bool:
+        """Expect no more beats of the ARC; return whether any were."""
+        return self.heard_s.pop(arc, None) is not None
 
     def look(self, now_s: float) -> dict[str, float]:
         """Return the ARCs that hang, with the seconds of the machine since their last beat, and forget them.
@@ -44,9 +45,9 @@ class Beats:
         paused_s = 0.0 if self._looked_s is None else max(0.0, now_s - self._looked_s - LOOK_MOST_S * self.rate)
         self._looked_s = now_s
         if paused_s:
-            self._heard_s = {arc: min(now_s, at_s + paused_s) for arc, at_s in self._heard_s.items()}
-        silent = {arc: (now_s - at_s) / self.rate for arc, at_s in self._heard_s.items()}
+            self.heard_s = {arc: min(now_s, at_s + paused_s) for arc, at_s in self.heard_s.items()}
+        silent = {arc: (now_s - at_s) / self.rate for arc, at_s in self.heard_s.items()}
         hung = {arc: silent_s for arc, silent_s in silent.items() if silent_s > BEAT_MISSED_S}
         for arc in hung:
-            del self._heard_s[arc]
+            del self.heard_s[arc]
         return hung

@@ -66,18 +66,17 @@ class ContextSwitch:
         """Return whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
         return arc in self._given_back
 
-    async def connect(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
+    async def connect(self, order: ConnectArc) -> str | None:
         """Connect all RCs to the ARC and order it to open its gate, or undo all of it.
 
         Args:
             order: Instruction of the schedule manager.
-            uses: The ARC's use of each RC; exclusive for missing ones.
 
         Returns:
             None: the gate is open. Else the RC that failed, empty if it was the ARC; the ARC holds nothing.
         """
         settled_s = self._clock.now_s() + order.settle_s
-        failed = await self._connect_rcs(order, uses)
+        failed = await self._connect_rcs(order)
         if failed is None and await self._open_gate(order, settled_s):
             return None
         close = CloseGate("failed", failed or order.arc, 0.0, -1.0)
@@ -130,13 +129,13 @@ class ContextSwitch:
         """Disconnect all at once; wait until each confirms or its lease is over."""
         await self._disconnect(holds, reason, math.inf)
 
-    async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
+    async def _connect_rcs(self, order: ConnectArc) -> str | None:
         """Connect all RCs at once; return the name of one that failed, or None."""
         lease_s = LEASE_S * self._clock.rate
         epochs = dict(order.epochs)
 
         async def connect(rc: str, epoch: int) -> None:
-            question = Connect(order.arc, epoch, lease_s, uses.get(rc, RcUse()), epochs, order.ranks.get(rc, 0))
+            question = Connect(order.arc, epoch, lease_s, order.uses.get(rc, RcUse()), epochs, order.ranks.get(rc, 0))
             await self._bus.ask(in_pool(rc), question, Connected, within_s=RC_REPLY_S)
 
         outcomes = await asyncio.gather(*(connect(rc, epoch) for rc, epoch in epochs.items()), return_exceptions=True)

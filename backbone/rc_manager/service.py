@@ -220,14 +220,16 @@ class RcManager(Component[RcManagerParameters]):
             self._arcs.tell_paths(self.answers.attributes(node).requests)
 
     def admit_again(self, current: CurrentRequest) -> bool:
-        """Admit a request with the RCs that were chosen for it before, unless one of them is gone."""
-        is_whole = bool(current.rcs) and self._resources.keys() >= {*current.rcs}
-        if is_whole:
+        """Admit a request with the RCs chosen for it before, unless one is gone or they are no alternative."""
+        chosen = {*current.rcs}
+        is_whole = bool(chosen) and self._resources.keys() >= chosen
+        is_right = is_whole and any(wish.keys() == chosen for wish in current.request.alternatives)
+        if is_right:
             self._admit(current.request, tuple(current.rcs))
-        return is_whole
+        return is_right
 
     def _admit(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
-        self._arcs.remember(request, rcs)
+        self._arcs.remember(request.arc)
         self.happened(Requested(request, rcs))
 
     # ------------------------------------------------------------------ decide, then do
@@ -248,8 +250,8 @@ class RcManager(Component[RcManagerParameters]):
             case WakeAt(at_s=at_s):
                 self._wake_at_s = at_s
                 self._wake.set()
-            case ConnectArc(arc=arc):
-                self._switches.connect(instruction, lambda: self._arcs.uses.get(arc, {}))
+            case ConnectArc():
+                self._switches.connect(instruction)
             case RevokeArc():
                 self._switches.revoke(instruction)
             case RenewLeases():
@@ -276,7 +278,7 @@ class RcManager(Component[RcManagerParameters]):
             self.shares.know(resource.name, began_s)
             self.happened(rc_known(resource, found.rcs.get(resource.name)), began_s)
         for at_s, event in adopted:
-            self._arcs.remember(event.request, tuple(event.epochs))
+            self._arcs.remember(event.request.arc)
             self.happened(event, at_s)
         for arc, current in found.arcs.items():
             if not found.holds_rightly(arc):
@@ -337,7 +339,7 @@ class RcManager(Component[RcManagerParameters]):
         """Catch up with what happened while this process had no link."""
         await self._hardware.compare()
         names = await self._recovery.present()
-        for name in [*sorted(self._rcs.up), *self._arcs.uses]:
+        for name in [*sorted(self._rcs.up), *self._arcs.known]:
             if name not in names:
                 self._disappeared(name)
         for rc in sorted(names & set(self._resources)):

@@ -81,7 +81,7 @@ class ArcEvents:
             return
         place_in_tree = self._place(request)
         self._trace.introduce_nodes(self._tree.path(place_in_tree))
-        is_another = _chosen(known.request, tuple(known.uses)) != _chosen(request, event.rcs)
+        is_another = known.request.uses_of(known.uses) != request.uses_of(event.rcs)
         if is_another or known.place_in_tree != place_in_tree:
             self._successors[request.arc] = event
             self._depart(request.arc, "self")
@@ -308,7 +308,7 @@ class ArcEvents:
     def _add(self, event: Requested) -> ArcEntry:
         request, now_s = event.request, self._decision.now_s
         longest_s = self._longest_s(request.minimum_runtime_s)
-        chosen = _chosen(request, event.rcs)
+        chosen = request.uses_of(event.rcs)
         place_in_tree = self._place(request)
         path = self._tree.path(place_in_tree)
         uses = self._packet_times.counted(request.arc, chosen)
@@ -352,8 +352,3 @@ class ArcEvents:
 
     def _record_idle(self, name: str, cause: str) -> None:
         self._trace.record("idle", cause, arc=name)
-
-
-def _chosen(request: SchedulingRequest, rcs: Sequence[str]) -> dict[str, RcUse]:
-    """Return the alternative of these RCs."""
-    return next((dict(wish) for wish in request.alternatives if wish.keys() == {*rcs}), {rc: RcUse() for rc in rcs})

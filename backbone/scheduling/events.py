@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from backbone.ranges import FEW, MANY, Duration, Epoch, Instant, Mention, Priority, RunTime, Share, Text
-from backbone.scheduling.requests import MeasuredPackets, SchedulingRequest
+from backbone.scheduling.requests import MeasuredPackets, RcUse, SchedulingRequest
 from backbone.scheduling.trace import Line
 from backbone.wire import Message
 
@@ -211,6 +211,7 @@ class ConnectArc:
         settle_s: Longest settling time of the set.
         until_s: End of the minimum run time if the grant came right after settling.
         ranks: Sharable RC → place of this ARC among its holders by user priority, 0 first.
+        uses: RC → how the ARC uses it, as it declared; exclusively for missing ones.
     """
 
     arc: str
@@ -218,6 +219,7 @@ class ConnectArc:
     settle_s: float
     until_s: float
     ranks: Mapping[str, int] = field(default_factory=dict)
+    uses: Mapping[str, RcUse] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from enum import StrEnum
 from typing import Annotated
 
@@ -98,6 +99,10 @@ class SchedulingRequest(Message, frozen=True):
     maximum_runtime_s: RunTime = 0.0
     idle: bool = False
     stops_at_once: bool = False
+
+    def uses_of(self, rcs: Collection[str]) -> Mapping[str, RcUse]:
+        """Return the alternative of these RCs; exclusive uses if it is none."""
+        return next((wish for wish in self.alternatives if wish.keys() == {*rcs}), {rc: RcUse() for rc in rcs})
 
 
 class RequestState(StrEnum):

@@ -53,7 +53,14 @@ class Switching:
         cause = "it is next, and all its RCs are free (rule 3)"
         self._transitions.trace.record("connect", cause, arc=arc.name, epoch=dict(arc.epochs))
         self._decision.instructions.append(
-            ConnectArc(arc.name, dict(arc.epochs), arc.settle_s, now_s + arc.length_s, ranks)
+            ConnectArc(
+                arc.name,
+                dict(arc.epochs),
+                arc.settle_s,
+                now_s + arc.length_s,
+                ranks,
+                arc.request.uses_of(arc.uses),
+            )
         )
 
     def ranks(self, arc: ArcEntry) -> dict[str, int]:

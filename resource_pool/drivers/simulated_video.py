@@ -61,7 +61,7 @@ class SimulatedFramegrabber:
         self._world: Subscription | None = None
         self._frequency = ""
         self._deliver: Callable[[Picture], None] | None = None
-        self._is_drawing = self._is_new = False
+        self._is_drawing = self._is_new = self._is_closed = False
         self._taking: set[asyncio.Task[None]] = set()
         self._next_s = -math.inf
         self._pace = PicturePace(site.parameters.frame_rate_hz)
@@ -84,8 +84,12 @@ class SimulatedFramegrabber:
         world = await meet_world(self._site)
         support, backend = await choosing
         lasts = isinstance(asyncio.get_running_loop(), VirtualLoop)
+
+        def make() -> None:  # also if nobody waits any more: ``close`` comes after it in the thread
+            self._studio = _Studio(world, support, backend, lasts)
+
         try:
-            self._studio = await run(self._thread, _Studio, world, support, backend, lasts)
+            await run(self._thread, make)
         except Exception:  # mujoco's import raises errors of many kinds where OpenGL is missing
             forget(self._site.folder)
             raise
@@ -109,9 +113,17 @@ class SimulatedFramegrabber:
         if self._world is not None:
             self._world.close()
         await end_tasks(*self._taking)
+        if self._is_closed:
+            return
+        self._is_closed = True
+        try:
+            await asyncio.get_running_loop().run_in_executor(self._thread, self._put_away)
+        finally:
+            self._thread.shutdown(wait=False)
+
+    def _put_away(self) -> None:
         if self._studio is not None:
-            await asyncio.get_running_loop().run_in_executor(self._thread, self._studio.close)
-        self._thread.shutdown()
+            self._studio.close()
 
     def _world_moved(self, envelope: Envelope[WorldState]) -> None:
         state = envelope.body

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from fake_resource_pool import FakePlacer
@@ -18,7 +18,6 @@ from resource_pool.arc_client import Frame
 ARC = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
 MADE: list[Any] = []
 """Implementations that a test's own class was made to."""
-Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
 
 
 async def stop(placer: FakePlacer, name: str) -> None:

@@ -6,8 +6,8 @@ import subprocess
 import sys
 
 import pytest
-from behaviors_of_a_placer import ARC, Run, node, root
-from fake_resource_pool import FakePlacer
+from behaviors_of_a_placer import ARC, node, root
+from fake_resource_pool import FakePlacer, Run
 
 from backbone.errors import Refusal
 from backbone.placer.messages import NoHost

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from behaviors_of_a_placer import ARC, Run, node, root
-from fake_resource_pool import FakePlacer
+from behaviors_of_a_placer import ARC, node, root
+from fake_resource_pool import FakePlacer, Run
 
 from backbone.keys import Conversation
 from resource_pool.arc_client import EmergencyStopped, StopState

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from behaviors_of_a_placer import ARC, Run, Spectator, node, root
-from fake_resource_pool import FakePlacer
+from behaviors_of_a_placer import ARC, Spectator, node, root
+from fake_resource_pool import FakePlacer, Run
 
 from backbone.launcher.messages import BranchTaken, TakeBranch
 from backbone.mission.behavior_orders import behavior_order

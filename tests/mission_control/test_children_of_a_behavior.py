@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from behaviors_of_a_placer import ARC, Parent, Run, node, root, stop
-from fake_resource_pool import FakePlacer
+from behaviors_of_a_placer import ARC, Parent, node, root, stop
+from fake_resource_pool import FakePlacer, Run
 
 from mission_control.children import Decision
 from mission_control.messages import BehaviorStatus

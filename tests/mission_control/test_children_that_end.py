@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from behaviors_of_a_placer import ARC, Parent, Run, node, root, stop
-from fake_resource_pool import FakePlacer
+from behaviors_of_a_placer import ARC, Parent, node, root, stop
+from fake_resource_pool import FakePlacer, Run
 
 from backbone.placer.messages import NoHost
 from mission_control.children import Decision

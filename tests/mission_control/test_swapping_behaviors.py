@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from behaviors_of_a_placer import ARC, MADE, Run, node, root
-from fake_resource_pool import FakeArc, FakePlacer
+from behaviors_of_a_placer import ARC, MADE, node, root
+from fake_resource_pool import FakeArc, FakePlacer, Run
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

@@ -9,7 +9,8 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
 import pytest
 from free_ports import free_port
@@ -22,6 +23,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
 
 CAMERA = "/robots/scout1/camera"
 SEEN_WITHIN_S = 30.0
+ENDED_WITHIN_S = 30.0
 
 
 @pytest.fixture(scope="module")
@@ -110,3 +112,26 @@ def test_a_port_that_is_taken_is_refused(mission: RunningMission) -> None:
         for command in ("bridge", "metrics"):
             done = mission.command("scout-backbone", command, "--port", str(port), "--mission", mission.name)
             assert (done.returncode, "--port" in done.stderr) == (2, True), done.stderr
+
+
+@pytest.mark.thorough
+def test_who_looks_at_a_mission_ends_with_it_and_says_so(tmp_path: Path) -> None:
+    ports = [["bridge", "--port", str(free_port())], ["metrics", "--port", str(free_port())]]
+    with mission_up() as running, ExitStack() as stack:
+        lookers = []
+        for number, words in enumerate([*ports, ["watch", "*/world/bodies"], ["watch", "--rate"]]):
+            said = tmp_path / f"said-{number}"
+            command = [str(BIN / "scout-backbone"), *words, "--mission", running.name]
+            output = stack.enter_context(said.open("wb"))
+            looker = subprocess.Popen(command, env=running.environment, stdout=output, stderr=subprocess.STDOUT)
+            stack.callback(looker.wait, 10)
+            stack.callback(looker.kill)
+            lookers.append((looker, said))
+        until_s = time.monotonic() + SEEN_WITHIN_S
+        while not all(said.stat().st_size for _looker, said in lookers):
+            assert time.monotonic() < until_s, lookers
+            time.sleep(0.2)
+        assert running.down() == 0
+        for looker, said in lookers:
+            assert looker.wait(ENDED_WITHIN_S) == 0, said.read_text()
+            assert f"{running.name} has ended" in said.read_text()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +13,9 @@ import pytest
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.keys import Conversation
+from backbone.waiting import end_tasks
 from backbone.wire import Envelope
+from resource_pool.drivers import simulated_video
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated_video import GrabberOptions, SimulatedFramegrabber
 from resource_pool.drivers.world_messages import AskWorld, WorldModel, WorldState
@@ -173,3 +176,30 @@ async def test_it_can_be_closed_before_it_was_opened_and_twice() -> None:
     studio = Studio()
     await studio.driver.close()
     await studio.close()
+
+
+async def test_closed_while_it_opens_it_closes_its_renderer_and_holds_nobody_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begun, may_go_on, log = threading.Event(), threading.Event(), list[str]()
+
+    class SlowStudio:
+        def __init__(self, *_given: object) -> None:
+            begun.set()
+            may_go_on.wait(5.0)
+            log.append("made")
+
+        def close(self) -> None:
+            log.append("closed")
+
+    monkeypatch.setattr(simulated_video, "_Studio", SlowStudio)
+    studio = Studio()
+    opening = asyncio.create_task(studio.driver.open())
+    await asyncio.to_thread(begun.wait, 5.0)
+    await end_tasks(opening)
+    closing = asyncio.create_task(studio.close())
+    await asyncio.sleep(0.05)
+    assert log == [], "the event loop goes on meanwhile"
+    may_go_on.set()
+    await closing
+    assert log == ["made", "closed"]

@@ -143,6 +143,7 @@ class ArcClaim:
         except Refusal as refusal:
             self._controls.disconnect()
             self._arc, self._keeping, self.is_asking = None, None, False
+            self._hear_no_more()
             self._claim_refused(refusal)
 
     def _kind_found(self, wished: TeleoperationParameters, kind: str) -> None:
@@ -179,9 +180,7 @@ class ArcClaim:
             keeping.cancel()
             await asyncio.wait({keeping})
         confirmed = await self._let_go(arc, reason, for_good=for_good)
-        if self._frames is not None:
-            self._frames.close()
-            self._frames = None
+        self._hear_no_more()
         if self.is_asking:
             self.is_asking, self.given_back = False, confirmed
             self._record_given_back(reason, confirmed=confirmed, wanted=wanted)
@@ -206,9 +205,14 @@ class ArcClaim:
         self._arc, self.rests = None, False
         return confirmed
 
+    def _hear_no_more(self) -> None:
+        self._ear.close()
+        if self._frames is not None:
+            self._frames.close()
+            self._frames = None
+
     def _record_given_back(self, reason: str, *, confirmed: bool, wanted: bool) -> None:
         console = self._console
-        self._ear.close()
         self._controls.record_drive_end(self.holding, reason)
         console.answers.ended(True, reason)
         robot, self.holding = self.holding or console.parameters.robot or ANY_ROBOT, ""

@@ -13,10 +13,10 @@ def packet_lines(arc: ArcEntry) -> list[str]:
 
 
 def _lines(arc: ArcEntry) -> Iterator[str]:
-    declared = next((wish for wish in arc.request.alternatives if wish.keys() == arc.uses.keys()), {})
+    declared = arc.request.uses_of(arc.uses)
     counts = "the longer time counts as soon as its slice ends, or another needs the room"
     for rc in arc.shares:
-        for number, usage in enumerate(declared[rc].streams if rc in declared else ()):
+        for number, usage in enumerate(declared[rc].streams):
             takes_s = arc.measured[rc][number].packet_us / 1e6
             if takes_s > usage.packet_time_s:
                 what = f"its {usage.kind} packets" if usage.kind else "its packets"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import os
+import socket
 import tempfile
 import threading
 from pathlib import Path
@@ -34,6 +35,32 @@ def test_all_readers_get_a_value_whole_and_cannot_change_it(folder: Path, size: 
         assert (got.number, bytes(got.data)) == (1, value)
         assert got.data.readonly
         assert not np.frombuffer(got.data, np.uint8).flags.writeable
+        assert reader.newest() is None
+        reader.close()
+    writer.close()
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_reader_whose_socket_has_little_room_gets_every_value_too(
+    folder: Path, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where net.core.wmem_default is small."""
+    writer, value, ample = BlackboardWriter(folder, "room"), os.urandom(size), BlackboardReader(folder, "room")
+    make = sealed_memory.packet_pair
+
+    def small_pair() -> tuple[socket.socket, socket.socket]:
+        pair = make()
+        for one in pair:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)  # the system takes its least
+        return pair
+
+    monkeypatch.setattr(sealed_memory, "packet_pair", small_pair)
+    readers = [ample, BlackboardReader(folder, "room")]
+    for number in (1, 2, 3):
+        writer.put(value)
+        if number != 2:
+            assert [(got.number, bytes(got.data)) for got in map(taken, readers)] == [(number, value)] * 2
+    for reader in readers:
         assert reader.newest() is None
         reader.close()
     writer.close()

@@ -179,3 +179,24 @@ def test_answers_in_progress_are_cancelled_and_waited_for_by_close(on_bus: Runne
                 await asking
 
     on_bus(law)
+
+
+def test_a_question_that_comes_as_its_component_leaves_ends_without_an_answer(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        async with pair(net, echo) as (asker, server):
+            for _ in range(10):  # by queries, and then by a way of its own
+                await asker.ask(SERVER, Echo(), Echoed, within_s=ASK_S)
+                await net.clock.sleep_s(0.01)
+            start = server.start
+
+            def leave_first(work: Any) -> Any:
+                closing.append(asyncio.create_task(server.close()))
+                return start(work)
+
+            closing: list[asyncio.Task[None]] = []
+            server.start = leave_first
+            with pytest.raises(NoResponder):
+                await asker.ask(SERVER, Echo(), Echoed, within_s=ASK_S)
+            await asyncio.gather(*closing)
+
+    on_bus(law)

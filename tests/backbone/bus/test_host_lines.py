@@ -71,6 +71,14 @@ def test_a_message_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -
         gathering.take(part)
 
 
+def test_messages_that_only_begin_are_refused_however_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(host_lines, "MOST_WAITING_BYTES", 1000)
+    gathering = Gathering()
+    heads = [next(packets_of(number, Kind.QUESTION, b"ab", 10))[:9] for number in range(1000)]  # each: more follows
+    with pytest.raises(ValueError, match="not whole"):
+        list(map(gathering.take, heads))
+
+
 @pytest.fixture
 async def server() -> AsyncIterator[HostLines]:
     lines = HostLines()
@@ -112,6 +120,36 @@ async def test_questions_of_any_length_are_answered_in_their_order(server: HostL
     sent = [b"", b"a", bytes(8 << 20), *(os.urandom(length) for length in range(0, 300_000, 7919))]
     assert await asyncio.gather(*(ask(way, payload) for payload in sent)) == sent
     assert came == sent
+
+
+@pytest.mark.parametrize("small", ["connect", "accept"])
+async def test_sockets_with_little_room_carry_messages_of_any_length(
+    small: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where net.core.wmem_default is small; the other side's socket is as the system makes it."""
+    make = getattr(local_sockets, small)
+
+    def made(of: object) -> socket.socket:
+        one: socket.socket = make(of)
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)  # the system takes its least
+        return one
+
+    monkeypatch.setattr(local_sockets, small, made)
+    server, asker = HostLines(), HostLines()
+    came: list[int] = []
+
+    def note(question: HostQuestion) -> None:
+        came.append(len(question.payload))
+        echo(question)
+
+    server.serve(INBOX, note)
+    way, sent = way_from(asker, server.name), [os.urandom(length) for length in (0, 4_000, 9_000, 70_000, 300_000)]
+    try:
+        assert await asyncio.gather(*(ask(way, payload) for payload in sent)) == sent
+        assert came == [*map(len, sent)]
+    finally:
+        asker.close()
+        server.close()
 
 
 async def test_a_question_that_is_dropped_or_that_nobody_takes_ends(server: HostLines, asker: HostLines) -> None:

@@ -11,7 +11,7 @@ from backbone.bus.clock import NothingLeftToHappen, VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation
-from backbone.wire import Envelope, Message
+from backbone.wire import MAX_MESSAGE_BYTES, Envelope, Message
 
 
 class Picture(Message, frozen=True):
@@ -114,3 +114,19 @@ def test_two_components_that_wait_for_each_other_are_found_at_once() -> None:
 
     with pytest.raises(NothingLeftToHappen):
         run_virtual(main())
+
+
+def test_a_message_that_is_too_long_to_be_overheard_reaches_its_listeners_all_the_same() -> None:
+    async def scene() -> None:
+        network, clock = LocalNetwork(), VirtualClock()
+        sender, listener = network.join("resource_pool/a", clock), network.join("resource_pool/b", clock)
+        heard, overheard = list[int](), list[str]()
+        listener.subscribe(sender.source, Conversation.OUTPUTS, Picture, lambda e: heard.append(len(e.body.pixels)))
+        ear = listener.overhear(Conversation.OUTPUTS, lambda key, _raw: overheard.append(key), 2 * MAX_MESSAGE_BYTES)
+        for size in (MAX_MESSAGE_BYTES + 1, 1):
+            sender.publish(sender.source, Conversation.OUTPUTS, Picture(bytes(size)))
+        await clock.sleep_s(1.0)
+        assert heard == [MAX_MESSAGE_BYTES + 1, 1]
+        assert (len(overheard), ear.dropped) == (1, 1)
+
+    run_virtual(scene())

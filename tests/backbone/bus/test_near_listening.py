@@ -1,11 +1,21 @@
-"""What a listener of large values decides: whether it needs the network, and which values are new."""
+"""What a listener of large values decides: whether it needs the network, which values are new, when it looks again."""
 
 from __future__ import annotations
 
+import errno
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bus_laws import ASKER, SERVER, Heard, until_known
+from hosts_with_boards import AT, SAID, Map, host, sending, until
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.blackboard import sealed_memory
+from backbone.bus import near_listening
 from backbone.bus.near_listening import IN_FLIGHT_S, MOST_SENDERS, NewestOnly, SendersHeard
+from backbone.wire import MAX_MESSAGE_BYTES
 
 SOURCES = st.sampled_from(["a", "b", "c"])
 
@@ -63,3 +73,29 @@ def test_very_many_senders_are_not_remembered() -> None:
         assert order.admits(f"sender-{number}", 7, 1.0, 0.0)
     assert order.admits("sender-0", 1, 0.5, 0.0)
     assert not order.admits(f"sender-{2 * MOST_SENDERS - 1}", 7, 1.0, 0.0)
+
+
+async def test_a_listener_that_its_sender_let_go_hears_values_too_long_for_the_network_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As when the system has too many descriptors under way."""
+    send_packet, refused = sealed_memory.send, list[int]()
+
+    def refuse_once(to: Any, parts: Any, descriptors: Any = ()) -> None:
+        if len(descriptors) == 1 and not refused:
+            refused.append(1)
+            raise OSError(errno.ETOOMANYREFS, "too many descriptors under way")
+        send_packet(to, parts, descriptors)
+
+    monkeypatch.setattr(near_listening, "LOOK_EACH_S", 0.2)
+    async with host(folder) as near:
+        sender, listener = near.join(SERVER), near.join(ASKER)
+        heard, sent = Heard(), list[int]()
+        listener.subscribe(AT, SAID, Map, heard, latest=True)
+        await until_known(listener, sender)
+        send = sending(sender, sent, MAX_MESSAGE_BYTES + 1)
+        await until(lambda: len(heard.all) > 0, "the first value", send)
+        monkeypatch.setattr(sealed_memory, "send", refuse_once)
+        await until(lambda: bool(refused), "the listener is let go", send)
+        let_go = len(sent)
+        await until(lambda: heard.all[-1].body.number > let_go, "a later value", send)

@@ -16,6 +16,7 @@ from bus_laws import Echo, Echoed, TooLoud
 from free_ports import free_endpoint
 
 from backbone.bus import zenoh_questions
+from backbone.bus.answers import Came, NoInbox
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Answer
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
@@ -109,6 +110,23 @@ async def test_after_two_answers_there_is_a_way_and_all_answers_are_as_by_querie
         with pytest.raises(NoResponder):
             await ask(asker, "bug")
         assert asker.ways.way_to(SERVER) is not None
+
+
+async def test_a_question_that_goes_a_second_way_has_no_more_time_than_was_given(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def nobody_has_the_inbox_any_more(*_asked: object) -> Came:
+        await asyncio.sleep(0.8)
+        return NoInbox
+
+    loop = asyncio.get_running_loop()
+    async with serving(endpoint), joined(endpoint, ASKER) as asker:
+        await on_the_way(asker)
+        monkeypatch.setattr(asker.ways, "ask", nobody_has_the_inbox_any_more)
+        began_s = loop.time()
+        with pytest.raises(ReplyTimeout, match="within 1 s"):
+            await ask(asker, "slow", 1.0)
+        assert loop.time() - began_s < 1.5
 
 
 async def test_whoever_is_asked_beyond_the_most_ways_makes_none_change(

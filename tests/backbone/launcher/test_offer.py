@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -26,8 +27,10 @@ from backbone.creator.messages import (
     offer_name,
 )
 from backbone.launcher import offer as offers
-from backbone.launcher.offer import Ending, MachineOffer
+from backbone.launcher.kept_creator import Offered
+from backbone.launcher.offer import Ending, MachineOffer, Offering
 from backbone.naming import Subsystem
+from backbone.run_files import RunFolderUnusable
 
 CUT_OFF_S = 0.1
 WITHIN_S = 5.0
@@ -183,3 +186,26 @@ async def test_a_creator_that_falls_is_absent_until_it_is_back_and_ends_nothing(
         state = await scene.tester.ask("backbone/offer-far", AskState(), ComponentState, within_s=WITHIN_S)
         assert [absence.name for absence in state.absent] == ["creator-far"]
         assert not scene.life.done()
+
+
+async def test_a_machine_whose_folder_cannot_be_made_keeps_no_bus_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    network, opened = LocalNetwork("night"), list[LocalBus]()
+
+    async def clock_there(*_where: object) -> MissionClock:
+        return MissionClock.started_now()
+
+    class Opening:
+        @staticmethod
+        async def open_when_up(_mission: str, source: str, clock: Clock, _config: object) -> LocalBus:
+            opened.append(network.join(source, clock))
+            return opened[-1]
+
+    def refuse(*_given: object) -> None:
+        raise RunFolderUnusable("the disc is full")
+
+    for name, fake in [("clock_elsewhere", clock_there), ("ZenohBus", Opening), ("recorder_of_host", refuse)]:
+        monkeypatch.setattr(offers, name, fake)
+    offering = Offering(Offered("night", "unixsock-stream/nowhere", "far", record=Path("far.mcap")), print)
+    with pytest.raises(RunFolderUnusable):
+        await offering.run()
+    assert [one.source for one in opened if not one.closed] == []

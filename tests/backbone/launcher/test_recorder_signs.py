@@ -26,7 +26,11 @@ def watched(pauses_s: list[float]) -> list[tuple[bool, float]]:
 
 
 def test_one_that_gives_signs_in_time_is_never_silent() -> None:
-    assert watched([20.0, *[EACH_S] * 50]) == []
+    assert watched([EACH_S] * 50) == []
+
+
+def test_one_that_hangs_before_its_first_sign_is_told_too() -> None:
+    assert watched([60.0, EACH_S]) == [(True, MOST_LATE * LATE_S), (False, 60.0)]
 
 
 def test_one_late_sign_is_not_told() -> None:

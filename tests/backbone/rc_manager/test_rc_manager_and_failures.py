@@ -57,6 +57,20 @@ def test_an_arc_that_no_longer_beats_loses_its_rcs(pool: Any) -> None:
     run_virtual(main())
 
 
+def test_an_arc_that_reports_rcs_it_cannot_have_asked_for_harms_nobody(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            odd, sound = await here.arc("odd"), await here.arc("sound")
+            odd.request, odd.rcs = request("odd", "left", "radio"), ["left"]
+            await here.clock.sleep_s(3.0)
+            assert set(odd.epochs) == {"left", "radio"}, "it was asked for its request, and got what that says"
+            await sound.ask_for(request("sound", "left", "radio"))
+            await here.clock.sleep_s(6.0)
+            assert sound.is_open
+
+    run_virtual(main())
+
+
 def test_an_rc_that_dies_takes_only_its_own_arc_along(pool: Any) -> None:
     async def main() -> None:
         async with pool() as here, here.beside(here.manager()):

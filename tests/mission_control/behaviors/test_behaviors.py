@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from itertools import pairwise
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from fake_resource_pool import FakeArc, FakePlacer
+from fake_resource_pool import FakeArc, FakePlacer, Run, with_placer
 
-from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_order
@@ -21,26 +19,14 @@ from mission_control.behaviors.watch_for_motion import WatchForMotion
 from mission_control.messages import BehaviorStatus, MotionSeen
 from resource_pool.messages import WantLonger, WantRuntime
 
-Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
 FRAME_S = 1 / 30
 SIZE = {"width_px": 320, "height_px": 240}
 
 
 @pytest.fixture
 def placer_world(local_mission: Any) -> Run:
-    def run(scene: Callable[[FakePlacer], Awaitable[None]]) -> None:
-        async def main() -> None:
-            async with local_mission("iros2001") as network:
-                classes = {"watch": WatchForMotion, "surveillance": Surveillance, "skeleton": Skeleton}
-                placer = FakePlacer(network, VirtualClock(), classes)
-                try:
-                    await scene(placer)
-                finally:
-                    await placer.close()
-
-        run_virtual(main())
-
-    return run
+    classes = {"watch": WatchForMotion, "surveillance": Surveillance, "skeleton": Skeleton}
+    return with_placer(local_mission, classes)
 
 
 def watcher(scout: str, maximum_runtime_s: float = 0.0, **parameters: Any) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from fake_resource_pool import FakePlacer
-from trees_of_components import FAILURE, SUCCESS, Battery, Run, is_running, node, root
+from fake_resource_pool import FakePlacer, Run
+from trees_of_components import FAILURE, SUCCESS, Battery, is_running, node, root
 
 from backbone.keys import Conversation
 from mission_control.behaviors.condition import Comparison, MessageConditionParameters

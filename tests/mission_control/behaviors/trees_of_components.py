@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from typing import Any
 
 from fake_resource_pool import FakePlacer
@@ -24,9 +23,6 @@ from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus
 
 ARC = {"kind": "drive", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
 SUCCESS, FAILURE = BehaviorStatus.SUCCESS, BehaviorStatus.FAILURE
-
-
-Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
 
 
 class Leaf(Behavior[Any]):

@@ -1,0 +1,86 @@
+"""A writer of a board that runs out of descriptors, or is closed by another thread, neither spins nor breaks."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import socket
+import threading
+from pathlib import Path
+
+import pytest
+from taking import WITHIN_S, Count
+
+from backbone.blackboard import sealed_memory
+from backbone.blackboard import writer as writers
+from backbone.blackboard.reader import BlackboardReader
+from backbone.blackboard.sealed_memory import Waits
+from backbone.blackboard.writer import BlackboardWriter
+
+
+@pytest.mark.parametrize("how", ["loop", "thread", "put"])
+async def test_without_descriptors_a_newcomer_waits_and_its_writer_does_not_spin(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    accept, refusals = sealed_memory.accept, list[int]()
+
+    def refuse(_listening: socket.socket) -> socket.socket:
+        refusals.append(1)
+        raise OSError(errno.EMFILE, "no descriptors")
+
+    monkeypatch.setattr(writers, "ACCEPT_AGAIN_S", 0.3)
+    monkeypatch.setattr(sealed_memory, "accept", refuse)
+    writer = BlackboardWriter(folder, "room")
+    thread = writer.serve_in_thread() if how == "thread" else None
+    if how == "loop":
+        writer.serve_in_loop()
+    writer.put(b"first")
+    reader = BlackboardReader(folder, "room")
+    for _ in range(3):
+        if how == "put":
+            writer.put(b"first")
+        await asyncio.sleep(0.05)
+    assert len(refusals) == 1
+    monkeypatch.setattr(sealed_memory, "accept", accept)
+    if how == "put":
+        await asyncio.sleep(0.3)
+        writer.put(b"first")
+    assert bytes((await asyncio.wait_for(reader.next(), WITHIN_S)).data) == b"first"
+    reader.close()
+    writer.close()
+    if thread is not None:
+        await asyncio.to_thread(thread.join, WITHIN_S)
+
+
+def test_a_writer_that_is_closed_while_its_thread_looks_ends_that_thread(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wait, bugs = sealed_memory.wait_readable, list[object]()
+    writer = BlackboardWriter(folder, "room")
+
+    def close_then_wait(one: socket.socket | Waits, within_s: float) -> bool:
+        writer.close()
+        return wait(one, within_s)
+
+    monkeypatch.setattr(sealed_memory, "wait_readable", close_then_wait)
+    monkeypatch.setattr(threading, "excepthook", bugs.append)
+    thread = writer.serve_in_thread()
+    thread.join(WITHIN_S)
+    assert (thread.is_alive(), bugs) == (False, [])
+
+
+@pytest.mark.parametrize("fails", ["Waits", "listen", "fcntl.flock"])
+def test_a_writer_that_could_not_be_opened_leaves_its_place_and_no_descriptor(
+    folder: Path, descriptors: Count, monkeypatch: pytest.MonkeyPatch, fails: str
+) -> None:
+    def refuse(*_given: object) -> None:
+        raise OSError(errno.EMFILE, "no descriptors")
+
+    folder.mkdir(mode=0o700)
+    before = descriptors()
+    with monkeypatch.context() as patched:
+        patched.setattr(f"backbone.blackboard.sealed_memory.{fails}", refuse)
+        with pytest.raises(OSError, match="no descriptors"):
+            BlackboardWriter(folder, "room")
+    assert descriptors() == before
+    BlackboardWriter(folder, "room").close()

@@ -1,0 +1,106 @@
+"""Commands that listen to a mission end with it, say so, and outlast a hub that was restarted."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from contextlib import asynccontextmanager
+
+import pytest
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.interface import LinkListener, Subscription
+from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.command_line import watching
+from backbone.command_line.listening import GONE_AFTER_S, until_ended
+from backbone.command_line.watching import Watched
+from backbone.command_line.where import Where
+from backbone.launcher.endings import ExitCode
+
+SELF = "ui_console/cli-1"
+ANY = Where(None, None, None)
+UP, DOWN = True, False
+FOR_HOURS_S = 10_000.0
+
+
+class LinkedBus(LocalBus):
+    """A bus whose link to a hub changes when the test says so: pairs of time and state."""
+
+    def __init__(self, link: Sequence[tuple[float, bool]]) -> None:
+        super().__init__(LocalNetwork("night"), SELF, VirtualClock())
+        self._link = link
+
+    def watch_link(self, listener: LinkListener) -> Subscription:
+        for at_s, is_up in self._link:
+            asyncio.get_running_loop().call_at(at_s, listener, is_up)
+        return self.watch_alive("nobody/*", lambda _address, _alive: None)
+
+
+async def lasted_s(bus: LocalBus, for_s: float | None = None) -> float:
+    async with until_ended(bus, for_s) as ended:
+        await ended.wait()
+    return VirtualClock().now_s()
+
+
+@pytest.mark.parametrize(
+    ("link", "ends_s"),
+    [
+        ([(0.0, UP), (20.0, DOWN)], 20.0 + GONE_AFTER_S),
+        ([(0.0, UP), (20.0, DOWN), (20.0 + 0.9 * GONE_AFTER_S, UP), (60.0, DOWN)], 60.0 + GONE_AFTER_S),
+        ([(0.0, UP), (20.0, DOWN), (22.0, DOWN)], 22.0 + GONE_AFTER_S),
+        ([], GONE_AFTER_S),
+    ],
+    ids=["it ends", "its hub was restarted", "told twice", "it had ended before"],
+)
+def test_a_command_ends_and_says_so_once_the_hub_was_away_for_seconds(
+    link: list[tuple[float, bool]], ends_s: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    async def play() -> float:
+        return await lasted_s(LinkedBus(link))
+
+    assert run_virtual(play()) == pytest.approx(ends_s)
+    assert capsys.readouterr().err == "night has ended, or its hub cannot be reached\n"
+
+
+def test_a_command_ends_after_its_time_and_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    async def play() -> float:
+        return await lasted_s(LinkedBus([(0.0, UP)]), 100.0)
+
+    assert run_virtual(play()) == pytest.approx(100.0)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_bug_of_a_listener_ends_the_command() -> None:
+    async def play() -> None:
+        bus = LinkedBus([(0.0, UP)])
+        asyncio.get_running_loop().call_later(3.0, lambda: bus.on_bug(ValueError("bug")))
+        await lasted_s(bus)
+
+    with pytest.raises(ValueError, match="bug"):
+        run_virtual(play())
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda: watching.watch(ANY, Watched(())),
+        lambda: watching.top(ANY, Watched(()), once=False),
+        lambda: watching.top(ANY, Watched((), for_s=FOR_HOURS_S), once=True),
+    ],
+    ids=["watch", "watch --rate", "top --for"],
+)
+def test_who_watches_a_mission_ends_with_it(
+    command: Callable[[], Awaitable[ExitCode]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @asynccontextmanager
+    async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
+        yield LinkedBus([(0.0, UP), (20.0, DOWN)]), VirtualClock()
+
+    async def play() -> float:
+        async with asyncio.timeout(FOR_HOURS_S / 2):
+            assert await command() is ExitCode.DONE
+        return VirtualClock().now_s()
+
+    monkeypatch.setattr(watching, "connected", connected)
+    assert run_virtual(play()) == pytest.approx(20.0 + GONE_AFTER_S, abs=1.0)
+    assert "night has ended" in capsys.readouterr().err

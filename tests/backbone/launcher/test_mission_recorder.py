@@ -1,0 +1,81 @@
+"""A recorder whose begin is broken off leaves no process behind, and its end goes well."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from backbone.bus.clock import MissionClock
+from backbone.launcher import mission_recorder
+from backbone.launcher.mission_recorder import MissionRecorder
+from backbone.waiting import end_tasks
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(60)]
+
+WITHIN_S = 20.0
+PLAYED = """#!/bin/sh
+cd {folder}
+echo $$ >> pids
+{words}
+trap '' TERM
+touch hangs
+while :; do sleep 0.1; done
+"""
+FALLS_ONCE = "test -e fell || { touch fell; echo records to night.mcap >&2; echo the disc is gone >&2; exit 1; }"
+
+
+def played(folder: Path, words: str, monkeypatch: pytest.MonkeyPatch) -> MissionRecorder:
+    """Return a recorder whose process is a script that, after these words, hangs and ignores the order to end."""
+    script = folder / "recorder"
+    script.write_text(PLAYED.format(folder=folder, words=words))
+    script.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(script))
+    monkeypatch.setattr(mission_recorder, "ENDED_WITHIN_S", 0.5)
+    return MissionRecorder("night", folder / "night.mcap", MissionClock.started_now(), [])
+
+
+async def until_it_hangs(folder: Path) -> None:
+    until_s = time.monotonic() + WITHIN_S
+    while not (folder / "hangs").exists():
+        assert time.monotonic() < until_s
+        await asyncio.sleep(0.05)
+
+
+def left(folder: Path) -> list[int]:
+    """End what is left, and return it."""
+    pids = [pid for pid in map(int, (folder / "pids").read_text().split()) if psutil.pid_exists(pid)]
+    for pid in pids:
+        os.kill(pid, signal.SIGKILL)
+    return pids
+
+
+async def test_one_whose_first_begin_is_broken_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = played(tmp_path, "", monkeypatch)
+    beginning = asyncio.create_task(recorder.begin())
+    await until_it_hangs(tmp_path)
+    await end_tasks(beginning)
+    try:
+        await recorder.end()
+    finally:
+        assert left(tmp_path) == []
+
+
+async def test_one_that_fell_and_whose_next_begin_is_broken_off(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder = played(tmp_path, FALLS_ONCE, monkeypatch)
+    await recorder.begin()
+    keeping = asyncio.create_task(recorder.keep())
+    await until_it_hangs(tmp_path)
+    await end_tasks(keeping)
+    try:
+        await recorder.end()
+    finally:
+        assert left(tmp_path) == []
