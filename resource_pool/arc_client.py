@@ -335,8 +335,8 @@ class ArcClient:
         """Give the RCs back and end the ARC. Idempotent."""
         try:
             await self._bus.ask(self.address, Release(reason), Accepted, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            log.info("%s did not answer the release: %s", self.arc, error)
+        except (LinkError, Refusal) as error:
+            log.info("%s did not release its RCs, and is stopped: %s", self.arc, error)
         try:
             await self._bus.ask(PLACER, StopComponent(self.arc, reason), Ended, within_s=START_TIME_S)
         except Refusal as refusal:

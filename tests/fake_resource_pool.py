@@ -63,6 +63,7 @@ class FakeArc:
         self.epoch, self.granted = 0, False
         self.commands: list[tuple[float, int, Message]] = []
         self.refusal: Refusal | None = None
+        self.release_refusal: Refusal | None = None
         self.require: Callable[[Any], None] = lambda command: None  # raises what its robot would
         self.released = ""
         self.is_idle = self.stays = False  # stays: holds on to its RCs although it is told to rest
@@ -105,6 +106,8 @@ class FakeArc:
 
     async def _answer(self, asked: Envelope[Any]) -> Message:
         match asked.body:
+            case Release() if self.release_refusal is not None:
+                raise self.release_refusal
             case Release(reason=reason):
                 self.granted, self.released = False, reason
                 return Accepted()

@@ -46,3 +46,20 @@ def test_a_claim_that_is_refused_closes_what_it_opened(placer_world: Any, beside
             assert len(pictures) == 1
 
     placer_world(scene)
+
+
+def test_a_robot_is_given_back_also_if_its_arc_refuses_the_release(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        events: list[ConsoleEvent] = []
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, events.append)) as driven:
+            driven.take()
+            await placer.wait(lambda: driven.is_held)
+            [arc] = placer.arcs.values()
+            arc.release_refusal = Refusal("another component owns this ARC")
+            await driven.give_back(for_good=True)
+            assert not driven.is_held
+            assert arc.name in placer.stopped
+            assert not heard(placer)
+
+    placer_world(scene)
