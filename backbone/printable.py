@@ -16,7 +16,7 @@ from backbone.printable_text import printable
 
 Value = TypeVar("Value")
 
-WITHOUT_TEXT = (type(None), bool, int, float, bytes, memoryview)  # most values are: they are known before all others
+WITHOUT_TEXT = (type(None), bool, int, float, bytes, memoryview)  # most values have these types
 
 
 def printable_all(value: Value) -> Value:

@@ -73,7 +73,7 @@ Bulk = Annotated[memoryview, Meta(max_length=MOST_BULK_BYTES)]
 EXACT = 2**53  # up to here integers are exact in a double, a JSON trace and JavaScript
 
 Epoch = Annotated[int, Meta(ge=0, le=EXACT)]
-"""Fencing number of a connection; ``most_epoch`` in ``rc_manager.messages`` says which are plausible now."""
+"""Fencing number of a connection; ``most_epoch`` in ``rc_manager.messages`` returns the highest plausible one."""
 Count = Annotated[int, Meta(ge=0, le=EXACT)]
 """A count, or a number in a sequence."""
 Number = Annotated[int, Meta(ge=-EXACT, le=EXACT)]

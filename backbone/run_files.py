@@ -22,7 +22,7 @@ from backbone.operating_system.process_starts import started_s
 FILE_NAME = "run.json"
 KEPT = ".kept"  # no legal name of a mission
 ENDED = ".ended-"  # the folder of an ending mission is renamed to .<mission>.ended-<pid of the zygote that removes it>
-TRIAL_BYTES = 1 << 16  # chosen: what a mission writes until all is ready, logs included
+TRIAL_BYTES = 1 << 16  # chosen: a mission writes so much until it is ready, logs included
 
 
 class RunFile(msgspec.Struct, frozen=True):

@@ -110,7 +110,7 @@ class OversizedMessage(Refusal):
 
 
 class UnwritableMessage(Refusal):
-    """The message has a whole number of more than 64 bits, which no bytes of the wire can say."""
+    """The message has a whole number of more than 64 bits, which MessagePack cannot encode."""
 
     code = "wire.unwritable"
     remedy = "Give a smaller number."
@@ -168,7 +168,7 @@ def kinds_of(accepts: Accepts) -> tuple[type[Message], ...]:
 
 
 def refuse_oversized(length: int, most_bytes: int = MAX_MESSAGE_BYTES, what: str = "message") -> None:
-    """Return if a message may have this length; called before its bytes are copied out of the bus.
+    """Return if a message may have this length. Call it before the bytes are copied out of the bus.
 
     Raises:
         OversizedMessage: The message is longer than ``most_bytes``.

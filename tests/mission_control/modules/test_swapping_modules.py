@@ -327,7 +327,7 @@ def test_a_further_optional_input_is_fed(stage: Stage, play: Play) -> None:
 def test_classes_of_values_must_stay_as_they_are(stage: Stage, play: Play) -> None:
     async def scene() -> None:
         stage.edit("    number: int\n    who", "    number: float\n    who")
-        with pytest.raises(ValuesChanged, match="declares Count otherwise"):
+        with pytest.raises(ValuesChanged, match="declares Count differently"):
             await stage.swap()
 
     play(scene)
