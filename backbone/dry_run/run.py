@@ -68,7 +68,7 @@ class Claimed:
         turns: Grants until the end of the dry run.
         first_grant_s: Mission time of the first grant; None: no grant.
         worst_wait_s: Longest wait, including a wait at the end.
-        why: Its state at the end with the reason; None: it was refused.
+        why: Its state at the end, with the reason; None: it was refused.
     """
 
     arc: str
@@ -97,7 +97,7 @@ class DryRun:
         claimed: The requests of its behaviors in the order of the file.
         timetable: The slices of all ARCs.
         trace: Every decision, in the RC manager's format.
-        last: The dry run of the last branch, which finds its resources free; None: the mission has none.
+        last: The dry run of the last branch, with all its resources free; None: the mission has none.
         last_name: Name of its root; empty: none.
     """
 

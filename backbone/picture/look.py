@@ -1,7 +1,7 @@
-"""Look at a mission from outside: ask the core services, and take their answers into a picture.
+"""Look at a mission from outside: ask the core services, and make a picture of their answers.
 
-A question without an answer never makes the picture look whole: the service that did not answer is absent, and the
-picture's ``problems`` name the gaps.
+A picture with gaps never seems whole: a service that did not answer is absent, and the picture's ``problems`` name the
+gaps.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ async def look(
     """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of their answers.
 
     Args:
-        before: The picture to update: an absence keeps its begin, and if the nameserver does not answer the picture
+        before: The picture to update: an absence keeps its begin, and if the nameserver does not answer, the picture
             stays as it was, marked as stale. None: a new one.
         schedule: False: only check that the RC manager answers.
         listed: Called with the nameserver's answer, which comes first.
@@ -94,7 +94,7 @@ async def types_of(bus: Bus) -> list[TypeCount]:
 
 
 def _gone_stale(picture: MissionPicture, silence: Absence, now_s: float) -> None:
-    """Leave the picture as it was, but for the time and the nameserver's absence."""
+    """Mark the picture as stale, and set the nameserver's absence; the rest stays as it was."""
     picture.stale_since_s = picture.at_s if picture.stale_since_s is None else picture.stale_since_s
     others = (absence for absence in picture.missed if absence.name != silence.name)
     picture.missed = (*_remembered([silence], picture.missed), *others)

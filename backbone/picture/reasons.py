@@ -1,4 +1,4 @@
-"""``why`` and ``story``: ask the components concerned, and put their answers in order."""
+"""``why`` and ``story``: ask the components that know about a name, and put their answers in order."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Reasons:
         placement: The placer's answer, if it placed it.
         component: The component's own report, if there is one.
         absence: Its absence, if it is wanted and absent.
-        led_to: If the name is a message's: the events that the message led to.
-        remarks: Further facts: of a host, of a person, of a message that led to nothing.
+        led_to: If the name is the id of a message: the events that the message led to.
+        remarks: Further facts about a host, about a person, or about a message that led to nothing.
         people: The person at each console; the answer names persons.
     """
 
@@ -58,7 +58,7 @@ class Reasons:
 
     @property
     def is_known(self) -> bool:
-        """Whether there is any reason."""
+        """True if there is a reason."""
         return any((self.why, self.placement, self.component, self.absence, self.led_to, self.remarks))
 
     def lines(self, now_s: float) -> list[str]:

@@ -31,7 +31,7 @@ class PlacementRecord:
         reasons: One line a host.
         unwanted: True from the order to stop it.
         suspect: True while the placer must ask its creator whether it still runs.
-        lost: True from the loss of its host until it has another; it may return with the old host.
+        lost: True from the loss of its host until it has another host; it may return with the old one.
         missing_since_s: Mission time from which on it is missing; negative: it is not missing.
         cause: Why it is missing.
         doing: What the placer does to start it again.
@@ -76,7 +76,7 @@ class PlacementRecord:
 
 @dataclass(frozen=True, slots=True)
 class PlaceAgain:
-    """Start this component again, which is missing."""
+    """Start this missing component again."""
 
     name: str
 

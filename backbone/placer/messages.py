@@ -47,7 +47,7 @@ class ReviseStart(Message, frozen=True):
 
     Attributes:
         parameters: All of them; the running component keeps its own.
-        class_path: Of its next life; empty: as before.
+        class_path: Class path from its next start on; empty: as before.
     """
 
     name: Mention

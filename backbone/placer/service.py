@@ -63,8 +63,8 @@ class PlacerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters of ``Placer``.
 
     Attributes:
-        packs: Number of shared processes a host into which components without a process are packed; 0: none; None:
-            only components of a type that has many.
+        packs: Number of shared processes of each host into which components without a process are packed; 0: none;
+            None: only types with many components share processes.
     """
 
     packs: Annotated[int, msgspec.Meta(ge=0, le=MOST_PACKS)] | None = None
@@ -290,7 +290,7 @@ class Placer(Component[PlacerParameters]):
             self._begin_later(self._meetings.look_again, "look again")
 
     def _enqueue(self, begin: Callable[[], None]) -> None:
-        """Queue this for ``serve``, because events arrive before the component serves."""
+        """Queue this call for ``serve``, because events arrive before the component serves."""
         self._queue.put_nowait(begin)
 
     def _begin(self, work: Work, name: str) -> None:
