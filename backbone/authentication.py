@@ -15,7 +15,7 @@ from backbone.errors import Refusal
 
 SOCKET_NAME, SECRET_NAME = "hub.sock", "secret"
 SOCKET = "unixsock-stream/"
-"""Begin of an endpoint that is a unix socket, so its links cannot leave the host."""
+"""Prefix of an endpoint that is a unix socket, so its links cannot leave the host."""
 LONGEST_SOCKET_PATH = 107  # linux/un.h: sun_path has 108 bytes, of which the last one is 0
 USER = "scout"  # the one user of today's hubs; certificates will name hosts and people
 SECRET_BYTES = 32  # chosen: 256 bits cannot be guessed

@@ -1,4 +1,4 @@
-"""Deadlines: which repeated messages are late. Pure; times are seconds of the mission."""
+"""Deadlines: detects late repeated messages. Pure; times are seconds of the mission."""
 
 from __future__ import annotations
 

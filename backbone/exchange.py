@@ -87,7 +87,7 @@ class Swapped(Message, frozen=True):
         is_proved: True: the new part does the work. False: the old part does.
         cause: Why the old part came back, or could not be kept; empty: the new part has proved itself.
         keeps_state: True if the new part went on with the state of the old one.
-        warming_s: Mission time from the begin of the exchange to the switch; without a switch, to the end.
+        warming_s: Mission time from the start of the exchange to the switch; without a switch, to the end.
         proving_s: Mission time from the switch to the end.
         rounds: Rounds of a module, commands of a behavior or calls of a driver while it proved itself.
         remark: Advice to the operator; empty: none.

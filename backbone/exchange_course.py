@@ -47,7 +47,7 @@ class ExchangeCourse:
 
     Args:
         changed: Called after each change of the phase.
-        now_s: Time of its begin.
+        now_s: Time of its start.
 
     Attributes:
         cause: Why the old one came back, or could not be kept; empty: neither happened.

@@ -13,8 +13,8 @@ from functools import lru_cache
 from backbone.naming import IllegalName
 
 ROOT = "scout"
-_ANY = "+"  # stands for * in the key of a token, which has none
-_SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # a legal segment of a key expression, or * for any one
+_ANY = "+"  # replaces * in the key of a token, which cannot contain *
+_SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # a legal segment of a key expression, or * for any segment
 
 
 class Conversation(StrEnum):
@@ -28,14 +28,14 @@ class Conversation(StrEnum):
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
     TELEMETRY = "telemetry"  # states of RCs and hosts
     BODIES = "bodies"  # states of all bodies of a simulated world, once a frame
-    MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without one
+    MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without a command
     REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
-    READINGS = "readings"  # what the hardware measures, by name
-    POSES = "poses"  # where a localizer believes robots to be
+    READINGS = "readings"  # measurements of the hardware, by name
+    POSES = "poses"  # believed places of robots, from a localizer
     SIGHTINGS = "sightings"  # landmarks that behaviors see in robots' pictures
     FRAMES = "frames"  # pictures
     OUTPUTS = "outputs"  # values that an execution unit's modules produce for others
-    VIEWS = "views"  # debug views of a behavior, during a look
+    VIEWS = "views"  # debug views of a behavior, while a person looks at them
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each
     SCHEDULE = "schedule"  # the RC manager's decisions and leases

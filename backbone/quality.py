@@ -74,7 +74,7 @@ QUALITY: dict[Conversation, Quality] = {
     Conversation.OPERATORS: Quality(reliable=True, most_bytes=SOME_BYTES),
     Conversation.SCHEDULE: Quality(reliable=True),
     # Repeated: the next message replaces a dropped one.
-    Conversation.ALIVE: _SMALL,  # tokens have no messages; a recording has one for each begin and end of a token
+    Conversation.ALIVE: _SMALL,  # tokens have no messages; a recording has one for each start and end of a token
     Conversation.TELEMETRY: Quality(),
     Conversation.MOTIONS: _SMALL,
     Conversation.REPLIES: _SMALL,

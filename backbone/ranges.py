@@ -141,7 +141,7 @@ def wildness(value: object, depth: int = 0) -> str:
     """
     match value:
         case str() if len(value) <= LONGEST_DOCUMENT:
-            return ""  # the commonest first: a message holds thousands
+            return ""  # the most common values first: a message holds thousands
         case None | bool() | Enum():
             return ""
         case float() if not -1e18 <= value <= 1e18:

@@ -117,7 +117,7 @@ def send(to: socket.socket, parts: Sequence[bytes | memoryview], descriptors: Se
 
 
 def receive(source: socket.socket, most_bytes: int) -> tuple[bytes, list[int]]:
-    """Return one packet and its descriptors, which are closed when another program begins; b"": the sender is gone.
+    """Return one packet and its descriptors, which no other program inherits; b"": the sender is gone.
 
     Raises:
         OSError: There is no packet now (``BlockingIOError``), or the socket is broken.
@@ -135,14 +135,14 @@ def receive(source: socket.socket, most_bytes: int) -> tuple[bytes, list[int]]:
 
 
 def peek(undelivered_at: socket.socket, length: int) -> bytes:
-    """Return the begin of the oldest packet that waits in a socket, and leave it there; b"": none waits."""
+    """Return the first bytes of the oldest packet that waits in a socket, and leave it there; b"": none waits."""
     with contextlib.suppress(OSError):
         return undelivered_at.recv(length, socket.MSG_PEEK)
     return b""
 
 
 def take_back(undelivered_at: socket.socket, length: int) -> bytes:
-    """Return the begin of the oldest packet that waits in a socket and drop it; the system closes its descriptors."""
+    """Drop the oldest packet that waits in a socket, and return its first bytes; the system closes its descriptors."""
     with contextlib.suppress(OSError):
         return undelivered_at.recv(length)
     return b""

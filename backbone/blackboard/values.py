@@ -1,4 +1,4 @@
-"""A value on its way: a header, and its bytes behind it or in a sealed memory file beside it. Pure.
+"""Packet of a value: a header, and the value's bytes behind it or in a sealed memory file beside it. Pure.
 
 A small value travels in the packet, which is cheaper than a memory file; a large one does not, because each reader
 would copy it.

@@ -16,7 +16,7 @@ class TooLate:
 
 
 class NoInbox:
-    """No component got the question, because none has the inbox any more."""
+    """No component got the question, because no component has this inbox any more."""
 
 
 Came = bytes | type[TooLate] | type[NoInbox] | None

@@ -72,10 +72,10 @@ class SentBoard:
         """Put the value on the board; return whether the board was opened for it."""
         is_new = self._writer is None and len(raw) >= self._least_bytes and self._open()
         if self._writer is not None:
-            self._writer.keeps = len(raw) > MAX_MESSAGE_BYTES  # a listener may learn of the board by this value
+            self._writer.keeps = len(raw) > MAX_MESSAGE_BYTES  # too long for the network: later listeners get it, too
             try:
                 self._writer.put(raw)
-            except OSError as error:  # neither memory nor descriptors are left: listeners turn to the network
+            except OSError as error:  # neither memory nor descriptors are left: listeners use the network
                 log.warning("no board on this host for now: %s", error)
                 self._try_again_s = self._loop.time() + LOOK_EACH_S
                 self.close()

@@ -23,7 +23,7 @@ from backbone.waiting import settle
 from backbone.wire import MAX_MESSAGE_BYTES
 
 MOST_PACKET_BYTES = 65_536  # chosen: three of them fit the default buffer of a socket (net.core.wmem_default)
-MOST_WAITING_BYTES = 2 * MAX_MESSAGE_BYTES  # chosen: a peer that is stopped costs no more
+MOST_WAITING_BYTES = 2 * MAX_MESSAGE_BYTES  # chosen: a stopped peer costs at most this memory
 MOST_AT_ONCE = 32  # chosen: packets of one line before the rest of the event loop has its turn
 ACCEPT_AGAIN_S = 1.0  # chosen: as long as asyncio's own servers wait (asyncio.constants.ACCEPT_RETRY_DELAY)
 _PACKET = struct.Struct("<QB")

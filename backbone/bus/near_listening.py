@@ -22,7 +22,7 @@ from backbone.errors import Refusal
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, Envelope, Message, Reader
 
 IN_FLIGHT_S = 1.0  # chosen: the longest time for which a value may be on its way while a newer one overtakes it
-MOST_SENDERS = 64  # chosen: of one key; a key has one sender at a time, and any bytes may arrive
+MOST_SENDERS = 64  # chosen: for one key; it has one sender at a time, but any process may invent senders
 
 
 log = logging.getLogger(__name__)
@@ -93,10 +93,10 @@ class NewestOnly:
 
 
 class NearListening(LatestSample):
-    """One such subscription; it is called with each sample from the network.
+    """A subscription to one key; it is called with each sample from the network.
 
     Args:
-        key: Of the publications.
+        key: Key of the publications.
         declare: Declares the network's subscription with this receiver.
     """
 

@@ -91,7 +91,7 @@ class Component(Generic[P_co]):
     def before_bus(cls, launch: Launch) -> None:
         """Prepare the process.
 
-        When: at the begin of a new process, before the event loop and before any bus is open.
+        When: at the start of a new process, before the event loop and before any bus is open.
         What: fork a zygote, which is impossible later.
         Not: anything that needs other components.
         """
@@ -265,7 +265,7 @@ class Component(Generic[P_co]):
             self._bug = bug
             self.feedback = complaint(bug)
             self.story.note(self.name, f"failed: {self.feedback}")
-            is_refusal = isinstance(bug, BackboneError)  # its detail says more than a traceback
+            is_refusal = isinstance(bug, BackboneError)  # its detail is clearer than a traceback
             log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_refusal else bug)
         self._end.set()
 
@@ -332,7 +332,7 @@ class Component(Generic[P_co]):
                     if connected:
                         await self._serve_until_end()
                 finally:
-                    self._end.set()  # also when it is killed: later messages begin no work
+                    self._end.set()  # also if it is killed, so that later messages start no work
                     self._group = None
                 for task in self._tasks:
                     task.cancel()

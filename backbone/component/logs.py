@@ -28,7 +28,7 @@ from backbone.printable_text import printable_lines
 LOG_BYTES = 1 << 20  # chosen: a day of an honest component; together with the former file, two days
 LINE_BYTES = 8192  # chosen: a long traceback; a longer line quotes a hostile message
 LOOK_EVERY_BYTES = LOG_BYTES // 16
-LOOK_EVERY_S = 5.0  # chosen: limits the output of C libraries too; they write some megabytes meanwhile at worst
+LOOK_EVERY_S = 5.0  # chosen: also limits the output of C libraries, which write at most some megabytes in this time
 ENDED_KEPT = 32  # chosen: of ended consoles; more than a person reads
 FOLDER_BYTES = 64 << 20  # chosen: a mission of 30 components with two full files each
 TIDY_EVERY_S = 10.0  # chosen: a mission of 400 components starts in less, and tidies once

@@ -1,7 +1,7 @@
 """Messages to a shared process. Only the creator that started the process sends them.
 
-A component in such a process is its *member*. Each admission has a number, its *life*: a name that is admitted again
-after its end begins another life.
+A component in such a process is its *member*. Each admission has a number, its *life*. If a name is admitted again
+after its end, another life begins.
 """
 
 from __future__ import annotations

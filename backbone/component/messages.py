@@ -11,7 +11,7 @@ from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid
 from backbone.wire import Message
 
 MESSAGES_DROPPED, DEADLINES_MISSED = "dropped ", "deadlines missed "
-"""Begins of the names of statistics; a key without ``scout/<mission>/`` follows."""
+"""Prefixes of names of statistics; a key without ``scout/<mission>/`` follows."""
 
 
 class LifeState(StrEnum):

@@ -26,9 +26,9 @@ from backbone.ranges import (
 from backbone.wire import Message
 
 TYPE = "creator"
-READY_WITHIN_S = 10.0  # chosen: silence, not time: a starting process that imports, renders or waits for others beats
+READY_WITHIN_S = 10.0  # chosen: of silence; a starting process beats while it imports, renders or waits for others
 CUT_OFF_ENDS_WITHIN_S = (
-    7.0  # chosen: a link counts as cut after 2 s, a cut-off host ends all after 3 s, which takes 2 s
+    7.0  # chosen: 2 s until a link counts as cut, 3 s until a cut-off host ends all, 2 s until all have ended
 )
 START_MOST_S = 180.0  # chosen: a start that is not ready by then has failed, even if it shows signs of life
 

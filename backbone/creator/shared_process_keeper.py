@@ -66,7 +66,7 @@ class SharedProcessKeeper:
         Args:
             zygote: Forks and signals the processes.
             clock: Deadlines are in seconds of the machine.
-            supervision: Gets each member's begin and end.
+            supervision: Gets the start and the end of each member.
             launch_of: Name of a kept component → its launch.
             report: Carries out what supervision decides about a member.
             task: Runs work under a name; the caller cancels it at the end.

@@ -25,8 +25,8 @@ from enum import StrEnum
 
 from backbone.creator.supervision import TERM_S, describe
 
-SERVES_WITHIN_S = 10.0  # chosen: silence; opening a session takes 15 ms, or 5 s in vain
-ADMITS_WITHIN_S = 5.0  # chosen: silence; an answer takes a millisecond
+SERVES_WITHIN_S = 10.0  # chosen: of silence; a session opens within 15 ms, or fails after 5 s
+ADMITS_WITHIN_S = 5.0  # chosen: of silence; an answer takes a millisecond
 NEVER_S = math.inf
 
 
@@ -262,7 +262,7 @@ class SharedProcesses:
         return self._and_wake(instructions)
 
     def observed(self, pid: int, silent_s: float, now_s: float) -> list[ProcessInstruction]:
-        """Record the silence of this process: its deadlines count from the begin of the silence."""
+        """Record the silence of this process: its deadlines count from the start of the silence."""
         for one in self._all.values():
             if one.pid != pid:
                 continue

@@ -46,7 +46,7 @@ from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHer
 from backbone.creator.silence import SHOWN_AFTER_S
 
 TERM_S = 0.5  # chosen: like EndProcess.term_s, for ends without an order
-LEAVE_S = 0.15  # chosen: from leaving the bus to the end of a process takes 10 ms, on a busy machine ten times that
+LEAVE_S = 0.15  # chosen: a process ends 10 ms after it has left the bus, on a busy machine after ten times that
 NEVER_S = math.inf
 
 
@@ -87,7 +87,7 @@ class Supervised:
         pid: Its process, 0 while there is none.
         last_end: How it last ended, for people; empty if it never ended.
         silent_s: Duration of a ready process's silence.
-        absent_since_s: Time of its end or of the begin of its silence; negative while it is ready and responds.
+        absent_since_s: Time of its end or of the start of its silence; negative while it is ready and responds.
     """
 
     name: str

@@ -43,7 +43,7 @@ from backbone.waiting import settle
 
 log = logging.getLogger(__name__)
 
-FORK_TRIES = 2  # chosen: a zygote killed while it forks is replaced once; a second time is no accident
+FORK_TRIES = 2  # chosen: a zygote that is killed while it forks is replaced once; a second kill is no accident
 _answer_decoder = msgspec.msgpack.Decoder(Answer)
 
 

@@ -51,7 +51,7 @@ class LiveHardware:
     """
 
     def __init__(self, bus: Bus, note: Callable[[str, str], object]) -> None:
-        """Begin with none.
+        """Begin without RCs.
 
         Args:
             note: Subject, event → the mission's log.

@@ -32,7 +32,7 @@ from backbone.spoken import counted
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
 
-COMPARE_EVERY_S = 20.0  # chosen: every known change is compared at once; this is for the unknown ones
+COMPARE_EVERY_S = 20.0  # chosen: every known change is compared at once; this finds unknown changes
 
 
 class DependencyDatabaseParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -107,7 +107,7 @@ class Loads:
 def loads(
     components: Iterable[ComponentState], schedule: Schedule | None, first: LoadReading, then: LoadReading
 ) -> Loads:
-    """Return the loads between two readings; a component that began meanwhile counts from its begin."""
+    """Return the loads between two readings; a component that started between them counts from its start."""
     present = list(components)
     processes = sorted(_processes(present, first, then), key=lambda one: (-one.cores, one.host, one.pid))
     silent = sorted(

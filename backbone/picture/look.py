@@ -29,7 +29,7 @@ from backbone.wire import Message
 
 LOOK_TIME_S = 0.8  # chosen: a hung service is shown within 1 s; a starved one answers sooner
 TYPES_WITHIN_S = 4.0  # chosen: the component database waits 3 s for the nameserver
-NAMES_SHOWN = 8  # chosen: a line of a terminal
+NAMES_SHOWN = 8  # chosen: they fit a line of a terminal
 
 
 async def look(
@@ -44,7 +44,7 @@ async def look(
     """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of their answers.
 
     Args:
-        before: The picture to update: an absence keeps its begin, and if the nameserver does not answer, the picture
+        before: The picture to update: an absence keeps its start, and if the nameserver does not answer, the picture
             stays as it was, marked as stale. None: a new one.
         schedule: False: only check that the RC manager answers.
         listed: Called with the nameserver's answer, which comes first.

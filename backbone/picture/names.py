@@ -33,7 +33,7 @@ def names_in(picture: MissionPicture, types: Iterable[TypeCount] = ()) -> Missio
 
 
 def is_behavior(at: str, kind: str) -> bool:
-    """Return whether the component is a behavior; an execution unit of the same subsystem is none."""
+    """Return whether the component is a behavior; an execution unit of the same subsystem is not a behavior."""
     return at.startswith(f"{Subsystem.MISSION_CONTROL}/") and kind != EXECUTION_UNIT
 
 

@@ -110,7 +110,7 @@ class AskedName:
 
     Attributes:
         name: Name of the component, request or resource.
-        message: The message meant, ``<address>#<number>``; empty: none.
+        message: Id of the meant message, ``<address>#<number>``; empty: none.
     """
 
     name: str
@@ -254,7 +254,7 @@ async def _looked(bus: Bus, clock: Clock) -> MissionPicture:
 
 
 def _question(address: str, asked: AskedName) -> AskStory:
-    """Ask the component itself for its whole story, the others for events about it; for a message all components."""
+    """Return the question for one component: the named component gets a question for its whole story."""
     if asked.message:
         return AskStory(asked.message)
     return AskStory() if component_of(address) == asked.name else AskStory(asked.name)

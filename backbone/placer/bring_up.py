@@ -20,7 +20,7 @@ from backbone.placer.placement_book import PlacementBook
 
 CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
 OLD_LIFE_S = 5.0  # chosen: longer than any lease that keeps tokens of a lost host's components
-SPAWN_TRIES = 3  # chosen: two creators may die for other reasons; a third dies of the order
+SPAWN_TRIES = 3  # chosen: two creators may die for other reasons; if a third dies, the order is the reason
 
 
 class BringUp:
@@ -96,7 +96,7 @@ class BringUp:
         return started(record)
 
     async def _unfenced(self, record: PlacementRecord) -> None:
-        """Return when no silent host can run the component any more, or when it has returned with its host."""
+        """Return when no silent host can run the component any more, or when the component and its host are back."""
         name = record.spawn.name
         while record.phase is PlacementPhase.STARTING and not record.unwanted:
             until_s = self._book.fenced_until_s(name, self._clock.now_s())

@@ -28,7 +28,7 @@ class PlacementRecord:
         host: The host on which it runs or starts; empty: none.
         pid: Its process; 0 if unknown.
         since_s: Mission time of the last decision about it.
-        reasons: One line a host.
+        reasons: One line for each host.
         unwanted: True from the order to stop it.
         suspect: True while the placer must ask its creator whether it still runs.
         lost: True from the loss of its host until it has another host; it may return with the old one.

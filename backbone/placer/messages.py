@@ -33,7 +33,7 @@ class Started(Message, frozen=True):
     """Answer to ``Start``: the component is ready.
 
     Attributes:
-        reasons: One line a host: why it was chosen or not.
+        reasons: One line for each host: why it was chosen or not.
     """
 
     address: Mention
@@ -84,7 +84,7 @@ class Placement(Message, frozen=True):
 
     Attributes:
         requester: Address of its owner.
-        reasons: One line a host: why it was chosen or not.
+        reasons: One line for each host: why it was chosen or not.
     """
 
     name: Mention

@@ -22,7 +22,7 @@ from itertools import chain, count
 from backbone.creator.messages import Spawn
 
 MOST_PACKS = 64  # chosen: more than any host's processors here; with more packs, own processes would be as good
-MEMBERS_MOST = 64  # chosen: twice as many as the missions here have; a hang or a kill of the process ends no more
+MEMBERS_MOST = 64  # chosen: twice as many as the missions here have; a hang or kill of the process ends at most these
 _PREFIX = "packed--"  # chosen: legal, and unlike any name in a mission file
 _LONGEST = 56  # chosen: the longest legal name less the number of a part
 WANTS_PACK = f"{_PREFIX}0"

@@ -66,7 +66,7 @@ class Choice:
 
     Attributes:
         host: The host's name.
-        reasons: One line a host, sorted by host: why it was chosen or not.
+        reasons: One line for each host, sorted by host: why it was chosen or not.
     """
 
     host: str

@@ -56,7 +56,7 @@ from backbone.placer.placement_book import PlacementBook
 from backbone.wire import Envelope, Message, UnknownMessage
 
 AGAIN_PAUSES_S = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)  # chosen: before each try to place a missing component again
-COMPARE_EVERY_S = 5.0  # chosen: wishes without an owner are rare: the owner and the placer died at the same time
+COMPARE_EVERY_S = 5.0  # chosen: a wish without an owner is rare; its owner and the placer died at the same time
 
 
 class PlacerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

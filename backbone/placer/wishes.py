@@ -27,7 +27,7 @@ from backbone.waiting import first_of
 log = logging.getLogger(__name__)
 
 PAUSE_FIRST_S, PAUSE_MOST_S = 0.2, 5.0  # chosen: a restarted placer is back within the first few; machine seconds
-COMPARE_EVERY_S = 20.0  # chosen: every known cause triggers a comparison at once; this is for the unknown ones
+COMPARE_EVERY_S = 20.0  # chosen: every known cause triggers a comparison at once; this covers unknown causes
 REPLY_TIME_S = 1.0  # chosen: the placer answers in milliseconds
 START_WITHIN_S = START_MOST_S + 10.0  # chosen: the placer's own limit and a moment
 SLOW_START_S = 1.5  # chosen: most starts take less than one; health names an absent component within 2 s
