@@ -45,7 +45,9 @@ def socket_endpoint(directory: Path) -> str:
     path = directory.absolute() / SOCKET_NAME
     length = len(os.fsencode(path))
     if length > LONGEST_SOCKET_PATH:
-        raise SocketPathTooLong(f"{path} has {length} bytes, and {LONGEST_SOCKET_PATH} are possible", length=length)
+        raise SocketPathTooLong(
+            f"{path} has {length} bytes, but at most {LONGEST_SOCKET_PATH} are possible", length=length
+        )
     return f"{SOCKET}{path}"
 
 

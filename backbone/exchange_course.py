@@ -144,7 +144,7 @@ class ExchangeCourse:
 def remark_on_file(component: str, old: str, new: str) -> str:
     """Return a remark on the file of an old class that is back; empty if the new class is in another file."""
     is_same = old.partition(":")[0] == new.partition(":")[0]
-    return f"a new start of {component} reads the file as it is now" if is_same else ""
+    return f"the next start of {component} uses the present file" if is_same else ""
 
 
 def class_path_of(one: object) -> str:

@@ -240,7 +240,7 @@ def _check_private(directory: Path) -> None:
     # All users can write into the folder for temporary files, so another user may have created this folder first.
     found = directory.lstat()
     if found.st_uid != os.getuid() or found.st_mode & 0o022 or directory.is_symlink():
-        raise UnsafeDirectory(f"{directory} is not this user's alone", directory=str(directory))
+        raise UnsafeDirectory(f"{directory} is not private to this user", directory=str(directory))
 
 
 def _read(path: Path) -> RunFile | None:

@@ -89,7 +89,7 @@ def require_short(length: int, most_bytes: int) -> None:
         ValueTooLong: The value is longer than ``most_bytes``.
     """
     if length > most_bytes:
-        raise ValueTooLong(f"a value of {length} bytes, and {most_bytes} are admitted", bytes=length)
+        raise ValueTooLong(f"a value of {length} bytes, but at most {most_bytes} are admitted", bytes=length)
 
 
 def read_header(packet: bytes, descriptors: int, most_bytes: int) -> tuple[int, int]:

@@ -58,7 +58,7 @@ class KeptComponents(dict[str, Kept]):
         """
         kept = self.get(name)
         if kept is None:
-            raise NotHere(f"no {name} here", name=name)
+            raise NotHere(f"no component {name} runs here", name=name)
         class_path = class_path or kept.order.class_path
         kept.launch = msgspec.structs.replace(kept.launch, parameters=parameters, class_path=class_path)
         kept.order = msgspec.structs.replace(kept.order, parameters=parameters, class_path=class_path)

@@ -150,7 +150,7 @@ class ProcessKeeper:
         """
         one = self._supervision.find(name)
         if one is None:
-            raise self._kept.failure(name) or NotHere(f"no {name} here", name=name)
+            raise self._kept.failure(name) or NotHere(f"no component {name} runs here", name=name)
         if one.end is not None:
             raise self._kept.failed(name, f"is {one.phase}; {one.last_end}")
         if one.phase is Phase.READY:
@@ -318,7 +318,7 @@ class ProcessKeeper:
     async def _ask_to_stop(self, kept: Kept, within_s: float) -> None:
         try:
             if self._bus is None:
-                raise NoProcess("there is no bus to ask on")
+                raise NoProcess("there is no bus for the request")
             stop = Stop(kept.end_reason, kept.launch.incarnation)
             await self._bus.ask(kept.launch.address, stop, Stopping, within_s=within_s)
         except BackboneError as error:

@@ -176,8 +176,8 @@ class Creator(Component[CreatorParameters]):
         """
         if (order.type, order.class_path, order.subsystem) not in self._allowed:
             raise UnlistedType(
-                f"{order.name[:MAX_NAME_LENGTH]}: {order.subsystem} {order.type[:MAX_NAME_LENGTH]} is not run as "
-                f"{order.class_path[:LONGEST_CLASS_PATH]} here"
+                f"{order.name[:MAX_NAME_LENGTH]}: {order.subsystem} {order.type[:MAX_NAME_LENGTH]} with class "
+                f"{order.class_path[:LONGEST_CLASS_PATH]} is no type of this mission"
             )
         legal(order.name)
         if order.process:

@@ -153,7 +153,7 @@ class Supervision:
         """
         one = self._all.get(name)
         if one is None:
-            raise NotHere(f"no {name} here", name=name)
+            raise NotHere(f"no component {name} runs here", name=name)
         if one.end is not None:
             end = one.end
             end.ordered = True

@@ -59,7 +59,7 @@ class Inventory:
 
     def _refuse_contradictions(self, wanted: FindRcs) -> None:
         if not wanted.roles:
-            raise NoSuchHardware("no kind of hardware is asked for", role="")
+            raise NoSuchHardware("the question names no kind of hardware", role="")
         for what, roles in (("wish", wanted.wish), ("features", wanted.features)):
             for role in roles:
                 if role not in wanted.roles:

@@ -136,7 +136,7 @@ def _lacks(listing: Components, processes: Iterable[ProcessState]) -> list[str]:
     if running:
         lines.append(f"the list is incomplete: running and not registered yet: {_count(running)}")
     elif not listing.complete and not lines:
-        lines.append("the list may be incomplete: the nameserver began a moment ago and components still come back")
+        lines.append("the list may be incomplete: the nameserver has just started, and components still register again")
     return lines
 
 

@@ -233,7 +233,7 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> FoundEvents:
     absent = [each for each in picture.health.absent if each.name not in named]
     missing += [f"{each.name}: it is absent, {each.cause}" for each in absent]
     if not listing.complete:
-        missing.append("the nameserver began a moment ago: components may be missing in its list")
+        missing.append("the nameserver has just started: components may be missing in its list")
     return printable_all(FoundEvents(sorted(events, key=lambda event: event.at_s), missing, picture.people))
 
 

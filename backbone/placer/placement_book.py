@@ -269,7 +269,7 @@ class PlacementBook:
             return []
         known = self._hosts[host]
         known.view = replace(known.view, alive=False)
-        instructions: list[Instruction] = [Note(host, "lost its creator and all it ran")]
+        instructions: list[Instruction] = [Note(host, "lost its creator and all its components")]
         for record in self.records():
             if record.host != host:
                 continue

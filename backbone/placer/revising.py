@@ -17,5 +17,5 @@ async def revise_start(bus: Bus, order: ReviseStart) -> str:
     except NotPlaced:  # started by hand
         return ""
     except (LinkError, Refusal) as error:
-        return f"a new start of {order.name} has the old class again: {error}"
+        return f"the next start of {order.name} uses the old class again: {error}"
     return ""
