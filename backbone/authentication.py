@@ -15,7 +15,7 @@ from backbone.errors import Refusal
 
 SOCKET_NAME, SECRET_NAME = "hub.sock", "secret"
 SOCKET = "unixsock-stream/"
-"""Begin of an endpoint that is a unix socket, so its links cannot leave the host."""
+"""Prefix of an endpoint that is a unix socket, so its links cannot leave the host."""
 LONGEST_SOCKET_PATH = 107  # linux/un.h: sun_path has 108 bytes, of which the last one is 0
 USER = "scout"  # the one user of today's hubs; certificates will name hosts and people
 SECRET_BYTES = 32  # chosen: 256 bits cannot be guessed
@@ -45,7 +45,9 @@ def socket_endpoint(directory: Path) -> str:
     path = directory.absolute() / SOCKET_NAME
     length = len(os.fsencode(path))
     if length > LONGEST_SOCKET_PATH:
-        raise SocketPathTooLong(f"{path} has {length} bytes, and {LONGEST_SOCKET_PATH} are possible", length=length)
+        raise SocketPathTooLong(
+            f"{path} has {length} bytes, but at most {LONGEST_SOCKET_PATH} are possible", length=length
+        )
     return f"{SOCKET}{path}"
 
 

@@ -1,4 +1,4 @@
-"""Deadlines: which repeated messages are late. Pure; times are seconds of the mission."""
+"""Deadlines: detects late repeated messages. Pure; times are seconds of the mission."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ FIRST_S = 5.0  # chosen: a mission is up within it, and a replaced component ans
 
 
 class Deadlines:
-    """Decides once when a message is missed, and once when its key is met again.
+    """Reports each missed deadline once, and once more when a message of its key comes again.
 
     Args:
         within_s: Key → seconds after a message within which the next one must come.
@@ -26,7 +26,7 @@ class Deadlines:
 
     @property
     def next_s(self) -> float:
-        """When to ask again what is missed, if no message comes until then."""
+        """Time at which to call ``newly_missed`` again, if no message comes before."""
         return min((due_s for key, due_s in self._due_s.items() if key not in self._late_since_s), default=math.inf)
 
     @property
@@ -45,7 +45,7 @@ class Deadlines:
         return None if since_s is None else now_s - since_s
 
     def newly_missed(self, now_s: float) -> list[str]:
-        """Return the keys whose deadline has passed and was not returned as missed since they were met."""
+        """Return the keys whose deadline has passed, each missed deadline once."""
         found = [key for key, due_s in self._due_s.items() if now_s >= due_s and key not in self._late_since_s]
         for key in found:
             self._miss(key)

@@ -1,8 +1,8 @@
-"""Messages of debug views: named intermediate pictures and values of a component, sent only during a look.
+"""Messages of debug views: named intermediate pictures and values of a component, sent only while a person looks.
 
 * console → behavior: ``ListViews``, ``LookAt``.
-* behavior → everybody: ``ViewPicture`` and ``ViewValue``, published under ``view_address`` (conversation ``views``)
-  during a look.
+* behavior → all subscribers: ``ViewPicture`` and ``ViewValue``, published under ``view_address`` (conversation
+  ``views``) while a person looks.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from backbone.ranges import Instant, Line, Measure, Mention, Name, PixelCount, P
 from backbone.wire import Message
 
 MOST_VIEWS = 64  # chosen: more than a person chooses from; the largest behavior has four
-LONGEST_LOOK_S = 60.0  # chosen: a looker that died costs its behavior a minute of pictures at most
+LONGEST_LOOK_S = 60.0  # chosen: a viewer that died costs its behavior a minute of pictures at most
 LOOK_FOR_S, LOOK_AGAIN_S = 5.0, 2.0  # chosen: one lost question leaves no gap; seconds of the machine
 SHOWN_EVERY_S = 0.1  # chosen: people follow ten pictures a second; seconds of the machine
 
 
 class ViewKind(StrEnum):
-    """What a view shows."""
+    """Kind of a view."""
 
     PICTURE = "picture"
     VALUE = "value"
@@ -37,9 +37,9 @@ class ViewEntry(Message, frozen=True):
     """One debug view.
 
     Attributes:
-        view: Its name, with the unit of a value that has one.
-        kind: What it shows.
-        value: The newest value; of a picture, and before the first value, empty.
+        view: Its name; for a value with a unit, with the unit.
+        kind: A picture or a value.
+        value: The newest value; empty for a picture, and before the first value.
     """
 
     view: Name
@@ -54,7 +54,7 @@ class Views(Message, frozen=True):
 
 
 class LookAt(Message, frozen=True):
-    """Look at a view for so long; to go on looking, ask again before the time is over.
+    """Ask a behavior to publish a view for this time; to go on, ask again before the time is over.
 
     Attributes:
         for_s: Seconds of the machine.
@@ -109,7 +109,7 @@ class UnknownView(Refusal):
     """The behavior has not shown a view of this name since it started."""
 
     code = "views.unknown"
-    remedy = "List its views with 'scout-console look BEHAVIOR'; one exists from the first time it is shown."
+    remedy = "List its views with 'scout-console look BEHAVIOR'; a view exists once the behavior has shown it."
 
 
 def view_address(behavior: str, view: str) -> str:

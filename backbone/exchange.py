@@ -12,21 +12,21 @@ from backbone.wire import Message
 
 PROVE_S = 5.0  # chosen: a person sees the outputs of some hundred rounds
 READY_WITHIN_S = 10.0  # chosen: a running average of 30 pictures at 5 pictures a second, and half of that again
-SILENT_S = 1.0  # chosen: many rounds of what robots live by, and short enough for one that is blind
+SILENT_S = 1.0  # chosen: many rounds of a module that robots need, and short enough for a robot without its output
 
 
 class UnknownModule(Refusal):
-    """Nothing that can be exchanged has this name."""
+    """The mission has no part of this name that can be exchanged."""
 
     code = "exchange.unknown"
     remedy = "Name a module, behavior or resource of the mission file."
 
 
 class Silent(Refusal):
-    """What is to be exchanged does not answer; nothing was changed."""
+    """The component of the part does not answer; nothing was changed."""
 
     code = "exchange.silent"
-    remedy = "See 'scout-backbone status'. Its creator replaces a process that hangs; swap again then."
+    remedy = "Run 'scout-backbone status'. The creator replaces a process that hangs; swap again afterwards."
 
 
 class ExchangeRunning(Refusal):
@@ -48,10 +48,10 @@ class SwapModule(Message, frozen=True):
 
     Attributes:
         class_path: ``package.module:Class`` of the new module; its file is read anew.
-        parameters: For the new module; what is left out is as in the old one, if both have it.
-        prove_s: Mission time for which the old one is kept after the switch; 0: it is not kept.
-        ready_within_s: Mission time after which a new one that is not ready is dropped.
-        silent_s: Mission time without an output that the old one has, after which the old one comes back.
+        parameters: Parameters of the new module; a missing one is as in the old module, if both have it.
+        prove_s: Mission time for which the old module is kept after the switch; 0: it is not kept.
+        ready_within_s: Mission time after which a new module that is not ready is dropped.
+        silent_s: If an output of the old module is missing for this mission time, the old module comes back.
         user: The person who asks.
     """
 
@@ -68,8 +68,9 @@ class SwapClass(Message, frozen=True):
     """Exchange the class of this behavior, or of this RC's driver; the answer comes when the exchange is over.
 
     Attributes:
-        class_path: As in ``SwapModule``, as are all others. A driver may also have the name of one that is built in.
-        parameters: Of the behavior; for a driver, its options.
+        class_path: ``package.module:Class`` of the new class; for a driver, also the name of a built-in driver.
+        parameters: Parameters of the behavior; for a driver, its options. The other attributes are as in
+            ``SwapModule``.
     """
 
     class_path: Line
@@ -83,13 +84,13 @@ class Swapped(Message, frozen=True):
     """Answer to ``SwapModule`` and ``SwapClass``.
 
     Attributes:
-        is_proved: True: the new one does the work. False: the old one does.
-        cause: Why the old one came back, or could not be kept; empty: the new one has proved itself.
-        keeps_state: True if the new one went on with the state of the old one.
-        warming_s: Mission time from its begin to the switch; without a switch, to the end.
+        is_proved: True: the new part does the work. False: the old part does.
+        cause: Why the old part came back, or could not be kept; empty: the new part has proved itself.
+        keeps_state: True if the new part went on with the state of the old one.
+        warming_s: Mission time from the start of the exchange to the switch; without a switch, to the end.
         proving_s: Mission time from the switch to the end.
         rounds: Rounds of a module, commands of a behavior or calls of a driver while it proved itself.
-        remark: What the operator should know besides; empty: nothing.
+        remark: Advice to the operator; empty: none.
     """
 
     is_proved: bool

@@ -1,12 +1,12 @@
-"""Course of an exchange: how far a new part of a running component has taken the place of the old one. Pure.
+"""Course of an exchange: the phases in which a new part of a running component replaces the old one. Pure.
 
 Modules, behaviors and drivers are exchanged by the same rules:
 
 * While the new part *warms*, it runs beside the old one, which does the work. While it *proves* itself, it does the
-  work, and the old one is kept. Afterwards one of the two is there alone.
-* Whatever fails in the new part ends the exchange in favor of the old one. What the old one does wrong is a bug as
+  work, and the old one is kept. Afterwards only one of the two is left.
+* If the new part fails, the exchange ends, and the old part does the work. If the old part fails, it is a bug as
   without an exchange.
-* Each phase has an end at a time.
+* Each phase has a time limit.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from backbone.exchange import Swapped
 
 T = TypeVar("T")
 UNPROVED = (Exception, SystemExit)
-"""What code that has not proved itself may raise without an end of the component."""
+"""Exceptions of unproved code that do not end the component."""
 
 
 class ExchangePhase(StrEnum):
-    """How far an exchange is."""
+    """Phase of an exchange."""
 
     WARMING = "warming"  # the old one does the work, the new one runs beside it
     PROVING = "proving"  # the new one does the work, the old one is kept
-    PROVED = "proved"  # the new one is there alone
-    RETURNED = "returned"  # the old one is there alone
+    PROVED = "proved"  # only the new one is left
+    RETURNED = "returned"  # only the old one is left
 
 
 class ExchangeRules(msgspec.Struct, frozen=True):
@@ -47,10 +47,10 @@ class ExchangeCourse:
 
     Args:
         changed: Called after each change of the phase.
-        now_s: Time of its begin.
+        now_s: Time of its start.
 
     Attributes:
-        cause: Why the old one came back, or could not be kept; empty: neither is so.
+        cause: Why the old one came back, or could not be kept; empty: neither happened.
         keeps_state: True if the new one goes on with the state of the old one.
         rounds: Rounds, commands or calls of the new one while it did the work, up to the end of the exchange.
         switched_s: Time of the switch; None: there was none.
@@ -58,7 +58,7 @@ class ExchangeCourse:
     """
 
     unready = ""
-    """What a person should know of a new one that did not become ready."""
+    """Appended to the cause if the new part did not become ready."""
 
     def __init__(self, rules: ExchangeRules, changed: Callable[[], None], now_s: float) -> None:
         self._rules, self._changed = rules, changed
@@ -69,7 +69,7 @@ class ExchangeCourse:
 
     @property
     def is_over(self) -> bool:
-        """True: only one of the two is there."""
+        """True: only one of the two is left."""
         return self.phase in (ExchangePhase.PROVED, ExchangePhase.RETURNED)
 
     @property
@@ -92,7 +92,7 @@ class ExchangeCourse:
             self.let_pass(now_s)
 
     def let_pass(self, now_s: float) -> None:
-        """Note the time."""
+        """End the present phase if its time is over."""
         if self.is_over or now_s < self.due_s:
             return
         if self.phase is ExchangePhase.PROVING:
@@ -101,11 +101,11 @@ class ExchangeCourse:
         self.fail(now_s, f"not ready within {self._rules.ready_within_s:g} s{self.unready}")
 
     def fail(self, now_s: float, cause: str) -> None:
-        """End, because the new one failed: the old one does the work."""
+        """End the exchange because the new part failed; the old part does the work."""
         self.end(ExchangePhase.RETURNED, now_s, cause)
 
     def tried(self, now_s: float, act: Callable[[], T]) -> T | None:
-        """Return what the new one returns; an exception ends the exchange."""
+        """Return the result of the new part; an exception ends the exchange."""
         try:
             return act()
         except UNPROVED as error:
@@ -113,13 +113,13 @@ class ExchangeCourse:
             return None
 
     def end(self, phase: ExchangePhase, now_s: float, cause: str = "") -> None:
-        """End, if it is not over."""
+        """End the exchange in this phase, if it is not over."""
         if not self.is_over:
             self.phase, self.cause, self.ended_s = phase, cause, now_s
             self._changed()
 
     def answer(self, now_s: float, remark: str = "") -> Swapped:
-        """Return the answer to who asked for the exchange."""
+        """Return the answer to the request for this exchange."""
         ended_s = now_s if self.ended_s is None else self.ended_s
         switched_s = ended_s if self.switched_s is None else self.switched_s
         is_proved = self.phase is ExchangePhase.PROVED
@@ -127,10 +127,11 @@ class ExchangeCourse:
         return Swapped(is_proved, self.cause, self.keeps_state, *times, self.rounds, remark)
 
     def outcome(self, old: str, new: str) -> str:
-        """Return for people how it ended.
+        """Return the outcome as a sentence for people.
 
         Args:
-            old: Class path of the old one, as ``new`` of the new one.
+            old: Class path of the old part.
+            new: Class path of the new part.
         """
         if self.phase is ExchangePhase.RETURNED:
             stays = "goes on" if self.switched_s is None else "is back"
@@ -141,20 +142,21 @@ class ExchangeCourse:
 
 
 def remark_on_file(component: str, old: str, new: str) -> str:
-    """Return what an operator should know of an old class that is back; empty if the file of the new one is another."""
+    """Return a remark on the file of an old class that is back; empty if the new class is in another file."""
     is_same = old.partition(":")[0] == new.partition(":")[0]
-    return f"a new start of {component} reads the file as it is now" if is_same else ""
+    return f"the next start of {component} uses the present file" if is_same else ""
 
 
 def class_path_of(one: object) -> str:
-    """Return where the class of a part stands, as ``package.module:Class``."""
+    """Return the class path of a part: ``package.module:Class``."""
     return f"{type(one).__module__}:{type(one).__qualname__}"
 
 
 def hand_over(old: object, new: object) -> bool:
-    """Let the new one go on with the attributes that both classes name in ``hands_over``; return whether they do.
+    """Copy the attributes that both classes name in ``hands_over`` to the new part; return whether it was done.
 
-    A copy, because the old one may come back. Values of other classes than the new one has are not handed over.
+    They are copied because the old part may come back. If a value has another class than in the new part, none is
+    copied.
     """
     names = frozenset[str](getattr(type(old), "hands_over", ()))
     if not names or names != getattr(type(new), "hands_over", None):
@@ -162,7 +164,7 @@ def hand_over(old: object, new: object) -> bool:
     values = {name: getattr(old, name) for name in sorted(names)}
     if any(_name_of(value) != _name_of(getattr(new, name)) for name, value in values.items()):
         return False
-    for name, value in copy.deepcopy(values).items():  # in one go, so that what two attributes share stays shared
+    for name, value in copy.deepcopy(values).items():  # one copy, so that two attributes still share objects
         setattr(new, name, value)
     return True
 

@@ -13,29 +13,29 @@ from functools import lru_cache
 from backbone.naming import IllegalName
 
 ROOT = "scout"
-_ANY = "+"  # stands for * in the key of a token, which has none
-_SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # a legal segment of a key expression, or * for any one
+_ANY = "+"  # replaces * in the key of a token, which cannot contain *
+_SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # a legal segment of a key expression, or * for any segment
 
 
 class Conversation(StrEnum):
     """Kind of message under a component's address, the last segment of its key."""
 
     ASK = "ask"  # questions: request/response
-    TOLD = "told"  # copies for recorders of what they cannot overhear themselves, while there is a recorder
-    FAR = "far"  # copies of all but pictures, from processes without a socket of the mission's recorder
+    TOLD = "told"  # copies of messages that recorders cannot overhear themselves, while there is a recorder
+    FAR = "far"  # copies of all but pictures, from processes without a socket to the mission's recorder
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
     COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
     TELEMETRY = "telemetry"  # states of RCs and hosts
     BODIES = "bodies"  # states of all bodies of a simulated world, once a frame
-    MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without one
+    MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without a command
     REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
-    READINGS = "readings"  # what the hardware measures, by name
-    POSES = "poses"  # where a localizer believes robots to be
+    READINGS = "readings"  # measurements of the hardware, by name
+    POSES = "poses"  # believed places of robots, from a localizer
     SIGHTINGS = "sightings"  # landmarks that behaviors see in robots' pictures
     FRAMES = "frames"  # pictures
     OUTPUTS = "outputs"  # values that an execution unit's modules produce for others
-    VIEWS = "views"  # debug views of a behavior, during a look
+    VIEWS = "views"  # debug views of a behavior, while a person looks at them
     EVENTS = "events"  # findings of a behavior or world
     OPERATORS = "operators"  # actions of people, one event each
     SCHEDULE = "schedule"  # the RC manager's decisions and leases
@@ -98,7 +98,7 @@ def key_of_sender(of: str, source: str) -> str:
 
 
 def sender_of(of: str, token: str) -> str:
-    """Return the sender of a key whose token it is.
+    """Return the sender of a key that declared this token.
 
     Example:
         >>> sender_of("scout/iros2001/backbone/by/frames", "scout/iros2001/backbone/by/frames/by/backbone/by")
@@ -108,7 +108,7 @@ def sender_of(of: str, token: str) -> str:
 
 
 def key_of_lossless(of: str, listener: str) -> str:
-    """Return the key of a listener that must get every message of these keys: of its token, and of what it is sent.
+    """Return the key of a lossless listener to these keys: its token and the messages for it have this key.
 
     Example:
         >>> key_of_lossless("scout/iros2001/resource_pool/*/frames", "1f")
@@ -118,12 +118,12 @@ def key_of_lossless(of: str, listener: str) -> str:
 
 
 def keys_of_lossless(mission: str) -> str:
-    """Return the key expression of the tokens of all such listeners."""
+    """Return the key expression of the tokens of all lossless listeners."""
     return f"{ROOT}/{mission}/**/all/*"
 
 
 def listened_to(token: str) -> str:
-    """Return the keys that such a listener gets all messages of.
+    """Return the keys to which the lossless listener with this token listens.
 
     Example:
         >>> listened_to("scout/iros2001/resource_pool/+/frames/all/1f")

@@ -18,7 +18,7 @@ class NoMoment(Refusal):
     """The text is no moment."""
 
     code = "usage.moment"
-    remedy = "Say 5m (s, m, h, d ago), 14:05 or 14:05:30 (time of day), or 123.4 (mission time, as stories show it)."
+    remedy = "Type 5m (s, m, h, d ago), 14:05 or 14:05:30 (time of day), or 123.4 (mission time, as stories show it)."
 
 
 @dataclass(frozen=True)

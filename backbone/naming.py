@@ -28,7 +28,7 @@ class Subsystem(StrEnum):
 
 
 class IllegalName(Refusal):
-    """A name does not follow the one rule."""
+    """The name breaks the rule for names."""
 
     code = "naming.illegal"
     remedy = "Use a lower-case letter, then lower-case letters, digits, '_' or '-'; at most 63 characters."
@@ -109,7 +109,7 @@ def read_claim(claim: str) -> tuple[str, str, int]:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return a remark with the known name nearest to a wrong one, to append to it; empty if none is near.
+    """Return a remark to append to an unknown name: the most similar known name; empty if no name is similar.
 
     Example:
         >>> did_you_mean("scuot1", ["scout1", "pioneer"])

@@ -1,7 +1,7 @@
 """Messages from the bus with texts that are printable; see ``printable_text``.
 
 Rules of this file: pure. ``printable_all`` is applied where messages enter the parts for people: the mission picture,
-``why`` and ``story``, and the feed of the consoles. Code behind these trusts its texts.
+``why`` and ``story``, and the feed of the consoles. The code of these parts trusts its texts.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from backbone.printable_text import printable
 
 Value = TypeVar("Value")
 
-WITHOUT_TEXT = (type(None), bool, int, float, bytes, memoryview)  # most values are: they are known before all others
+WITHOUT_TEXT = (type(None), bool, int, float, bytes, memoryview)  # most values have these types
 
 
 def printable_all(value: Value) -> Value:
-    """Return the message, dataclass, list or dictionary with every text in it one printable line; itself if all are."""
+    """Return the message, dataclass, list or dictionary with each text as one printable line; itself if all are so."""
     return with_texts(value, printable)
 
 
 def with_texts(value: Value, change: Callable[[str], str]) -> Value:
-    """Return the message, dataclass, list or dictionary with every text in it changed; itself if none is."""
+    """Return the message, dataclass, list or dictionary with every text in it changed; itself if no text changes."""
     return cast(Value, _with_texts(value, change))
 
 

@@ -1,4 +1,4 @@
-r"""Text of any origin as text for people: it cannot control a terminal, a browser or a log.
+r"""Makes text of any origin printable: it cannot control a terminal, a browser or a log.
 
 Rules of this file: pure, and quick to load, because every command prints through it. Characters that
 ``str.isprintable`` refuses become visible escapes: control characters (ESC, CR, the 8-bit CSI), format characters

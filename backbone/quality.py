@@ -32,15 +32,15 @@ class Quality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """How the messages of one key travel.
 
     Attributes:
-        reliable: True: a full queue is waited for, at most ``WAIT_BEFORE_CLOSE_US``, and then the link that does not
-            take anything is closed. False: the message is dropped for the subscribers behind a full queue.
+        reliable: True: if a queue is full, the sender waits at most ``WAIT_BEFORE_CLOSE_US``; then the blocked link is
+            closed. False: the message is dropped for the subscribers behind a full queue.
         urgency: The queue in which messages wait.
         express: True: each message leaves at once. False: messages that wait leave together.
         most_bytes: A longer message is refused.
-        most_bytes_on_host: The same for a message to listeners of the sender's host, which goes by a blackboard; 0: no
-            blackboard is used.
-        deadline_s: A unit that takes the key misses a message that does not come within so many seconds of the mission;
-            0: no message is missed.
+        most_bytes_on_host: The same limit for listeners on the sender's host, which read the message from a blackboard;
+            0: no blackboard is used.
+        deadline_s: If the next message does not come within this mission time, the units that read the key report a
+            missed deadline; 0: no deadline.
     """
 
     reliable: bool = False
@@ -64,8 +64,8 @@ class Quality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 _SMALL = Quality(most_bytes=FEW_BYTES)
 _LARGE = Quality(most_bytes_on_host=MAX_LARGE_MESSAGE_BYTES)
 QUALITY: dict[Conversation, Quality] = {
-    # Sent once: each message must arrive. Only questions and answers are express: one small message at a time has
-    # nothing to be gathered with. Without batches a queue holds two messages and dropped up to 360 of a burst of 1000.
+    # Sent once: each message must arrive. Only questions and answers are express, because a single small message gains
+    # nothing from a batch. Without batches a queue holds two messages and dropped up to 360 of a burst of 1000.
     Conversation.ASK: Quality(reliable=True, express=True),
     Conversation.COMMAND: Quality(reliable=True, urgency=Urgency.URGENT, most_bytes=FEW_BYTES),
     Conversation.LEASES: Quality(reliable=True, urgency=Urgency.URGENT),
@@ -74,7 +74,7 @@ QUALITY: dict[Conversation, Quality] = {
     Conversation.OPERATORS: Quality(reliable=True, most_bytes=SOME_BYTES),
     Conversation.SCHEDULE: Quality(reliable=True),
     # Repeated: the next message replaces a dropped one.
-    Conversation.ALIVE: _SMALL,  # tokens have no messages; a recording has one for each rise and fall
+    Conversation.ALIVE: _SMALL,  # tokens have no messages; a recording has one for each start and end of a token
     Conversation.TELEMETRY: Quality(),
     Conversation.MOTIONS: _SMALL,
     Conversation.REPLIES: _SMALL,
@@ -88,7 +88,7 @@ QUALITY: dict[Conversation, Quality] = {
     Conversation.VIEWS: _LARGE,
     Conversation.FRAMES: Quality(urgency=Urgency.LOW, most_bytes_on_host=MAX_LARGE_MESSAGE_BYTES),
     Conversation.LOG: Quality(urgency=Urgency.LOW, most_bytes=SOME_BYTES),
-    # For recorders, in a queue that they share with nothing else.
+    # For recorders, in a queue of their own.
     Conversation.TOLD: Quality(urgency=Urgency.LOWEST),
     Conversation.FAR: Quality(urgency=Urgency.LOWEST),
     Conversation.DECISIONS: Quality(urgency=Urgency.LOWEST),
@@ -96,15 +96,15 @@ QUALITY: dict[Conversation, Quality] = {
 """Conversation → quality of its keys, unless a mission file declares another one."""
 
 NEVER_DROPPED = frozenset(one for one, quality in QUALITY.items() if quality.reliable) - {Conversation.ASK}
-"""Conversations whose publications must arrive: a subscriber that takes none of them blocks senders."""
+"""Conversations whose publications must arrive: a subscriber that does not read them blocks senders."""
 LARGE = frozenset(one for one, quality in QUALITY.items() if quality.most_bytes_on_host)
 """Conversations of large values: listeners on the sender's host read them on its blackboard."""
 OF_ANY_SIZE = frozenset({Conversation.BODIES})
-"""Those of them whose small values lie on the blackboard too: few senders repeat them many times a second."""
+"""Large conversations whose small values use the blackboard too: few senders repeat them many times a second."""
 
 
 class OutputQuality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a mission file declares of the quality of one key of its modules; see ``Quality``.
+    """The quality of one key of a mission's modules, as the mission file declares it; see ``Quality``.
 
     Attributes:
         most_bytes: A longer value is refused; one that is longer than the network admits stays on its host.

@@ -73,7 +73,7 @@ Bulk = Annotated[memoryview, Meta(max_length=MOST_BULK_BYTES)]
 EXACT = 2**53  # up to here integers are exact in a double, a JSON trace and JavaScript
 
 Epoch = Annotated[int, Meta(ge=0, le=EXACT)]
-"""Fencing number of a connection; ``most_epoch`` in ``rc_manager.messages`` says which are plausible now."""
+"""Fencing number of a connection; ``most_epoch`` in ``rc_manager.messages`` returns the highest plausible one."""
 Count = Annotated[int, Meta(ge=0, le=EXACT)]
 """A count, or a number in a sequence."""
 Number = Annotated[int, Meta(ge=-EXACT, le=EXACT)]
@@ -141,7 +141,7 @@ def wildness(value: object, depth: int = 0) -> str:
     """
     match value:
         case str() if len(value) <= LONGEST_DOCUMENT:
-            return ""  # the commonest first: a message holds thousands
+            return ""  # the most common values first: a message holds thousands
         case None | bool() | Enum():
             return ""
         case float() if not -1e18 <= value <= 1e18:

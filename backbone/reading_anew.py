@@ -1,13 +1,14 @@
-"""Reading the file of a class anew, so that the code of an exchange is what stands in the file now.
+"""Reading the file of a class anew, so that an exchange uses the present code of the file.
 
 Rules of this file:
 
-* The file becomes another module object, so the code that runs keeps all that it refers to. ``importlib.reload`` would
-  put the new functions under the feet of the old class.
-* Python's cache of compiled files is not asked: it knows an edited file by its time in seconds and its length.
-* Classes of values (structs and enumerations at the top of the file) stay those that run, because other modules have
-  them. So they must be declared as before.
-* Only the named file is read anew, not what it imports.
+* The file becomes another module object, so the running code keeps everything that it refers to. ``importlib.reload``
+  would replace functions that the old class still uses.
+* Python's cache of compiled files is not used, because it recognizes an edit only by the file's length and its time in
+  whole seconds.
+* The running classes of values (structs and enumerations at the top of the file) stay in use, because other modules
+  refer to them. So the file must declare them as before.
+* Only the named file is read anew, not the files that it imports.
 """
 
 from __future__ import annotations
@@ -30,14 +31,14 @@ T = TypeVar("T")
 
 
 class WrongClass(Refusal):
-    """A class path leads to no class that can take the place."""
+    """The class path leads to no class that can replace the old one."""
 
     code = "exchange.class"
-    remedy = "Mend what the message names, and swap again."
+    remedy = "Correct the fault that the message names, and swap again."
 
 
 class ValuesChanged(Refusal):
-    """A file declares a class of values otherwise than the running mission."""
+    """The file declares a class of values differently from the running mission."""
 
     code = "exchange.values"
     remedy = "Give the changed class another name, or bring the mission down and up."
@@ -49,14 +50,14 @@ class ReadAnew(Generic[T]):
     Args:
         class_path: ``package.module:Class``.
         load: Returns the class at a path, or refuses it; imports its file.
-        wrong: What is raised if the file cannot be read.
+        wrong: Exception class for a file that cannot be read.
 
     Attributes:
         kind: The class.
 
     Raises:
         WrongClass: The file cannot be read.
-        ValuesChanged: It declares classes of values otherwise.
+        ValuesChanged: The file declares classes of values differently.
     """
 
     def __init__(self, class_path: str, load: Callable[[str], T], wrong: type[WrongClass] = WrongClass) -> None:
@@ -73,7 +74,7 @@ class ReadAnew(Generic[T]):
             raise wrong(f"{class_path}: {complaint(error)}", class_path=class_path) from error
 
     def undo(self) -> None:
-        """Let imports find again what they found before."""
+        """Let imports find the former module again."""
         if self._before is not None:
             _place(self._file, self._before)
         else:
@@ -81,7 +82,7 @@ class ReadAnew(Generic[T]):
 
 
 def _read(file: str, before: ModuleType, wrong: type[WrongClass]) -> None:
-    """Put the file as it is now in the place of what was imported before."""
+    """Import the present file in place of the module that was imported before."""
     parent = sys.modules.get(file.rpartition(".")[0])
     importlib.invalidate_caches()
     spec = importlib.machinery.PathFinder.find_spec(file, getattr(parent, "__path__", None))
@@ -102,10 +103,10 @@ def _place(file: str, module: ModuleType) -> None:
 
 
 def _keep_values(before: ModuleType, fresh: ModuleType) -> None:
-    """Let the fresh code use the classes of values that run.
+    """Let the fresh module use the running classes of values.
 
     Raises:
-        ValuesChanged: They are declared otherwise.
+        ValuesChanged: The fresh module declares them differently.
     """
     changed = []
     for name, new in vars(fresh).copy().items():
@@ -117,7 +118,7 @@ def _keep_values(before: ModuleType, fresh: ModuleType) -> None:
         setattr(fresh, name, old)
     if changed:
         raise ValuesChanged(
-            f"{fresh.__name__} declares {', '.join(changed)} otherwise than the running mission, where others have it"
+            f"{fresh.__name__} declares {', '.join(changed)} differently from the running mission, where others use it"
         )
 
 
@@ -126,7 +127,7 @@ def _is_of_values(kind: object, module: ModuleType) -> bool:
 
 
 def _declared(kind: object) -> object:
-    """Return what two declarations must have in common."""
+    """Return the part of a declaration that must not change."""
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         config = kind.__struct_config__
         fields = [

@@ -22,7 +22,7 @@ from backbone.operating_system.process_starts import started_s
 FILE_NAME = "run.json"
 KEPT = ".kept"  # no legal name of a mission
 ENDED = ".ended-"  # the folder of an ending mission is renamed to .<mission>.ended-<pid of the zygote that removes it>
-TRIAL_BYTES = 1 << 16  # chosen: what a mission writes until all is ready, logs included
+TRIAL_BYTES = 1 << 16  # chosen: a mission writes so much until it is ready, logs included
 
 
 class RunFile(msgspec.Struct, frozen=True):
@@ -240,7 +240,7 @@ def _check_private(directory: Path) -> None:
     # All users can write into the folder for temporary files, so another user may have created this folder first.
     found = directory.lstat()
     if found.st_uid != os.getuid() or found.st_mode & 0o022 or directory.is_symlink():
-        raise UnsafeDirectory(f"{directory} is not this user's alone", directory=str(directory))
+        raise UnsafeDirectory(f"{directory} is not private to this user", directory=str(directory))
 
 
 def _read(path: Path) -> RunFile | None:

@@ -1,7 +1,7 @@
 """Names of a mission that is up on this machine, in its run folder: shells complete them without asking the mission.
 
-The launcher writes the file whenever the names have changed; it goes with the run folder. A file that cannot be written
-is removed, so that no reader takes old names for present ones.
+The launcher writes the file whenever the names have changed, and removes it with the run folder. A file that cannot be
+written is removed, so that no reader gets old names.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def write(directory: Path, names: MissionNames) -> None:
 
 
 def read(mission: str | None) -> MissionNames | None:
-    """Return the names of a mission that is up on this machine; None: it has written none that can be read.
+    """Return the names of a mission that is up on this machine; None: they cannot be read.
 
     Args:
         mission: Its name; None: the only mission.
@@ -65,5 +65,5 @@ def read(mission: str | None) -> MissionNames | None:
     path = run_files.run_directory(run_files.find(mission).mission) / FILE_NAME
     try:
         return msgspec.json.decode(path.read_bytes(), type=MissionNames)
-    except (OSError, msgspec.DecodeError):  # an empty one is being written for the first time
+    except (OSError, msgspec.DecodeError):  # an empty file is being written for the first time
         return None

@@ -8,7 +8,7 @@ from typing import Any
 
 
 async def set_within(event: asyncio.Event, within_s: float | None) -> bool:
-    """Return True once the event is set, False if it is not within this machine time; None: however long it takes."""
+    """Return True once the event is set, False if it is not set within this machine time; None: no limit."""
     try:
         async with asyncio.timeout(within_s):
             return await event.wait()
@@ -17,7 +17,7 @@ async def set_within(event: asyncio.Event, within_s: float | None) -> bool:
 
 
 async def first_of(*waits: Awaitable[Any]) -> None:
-    """Return when one of these is over; the others are ended."""
+    """Return when one of these has ended; the others are cancelled."""
     tasks = [asyncio.ensure_future(wait) for wait in waits]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -26,7 +26,7 @@ async def first_of(*waits: Awaitable[Any]) -> None:
 
 
 async def first_to_end(*waits: Awaitable[Any]) -> None:
-    """Return when one of these is over, or raise what it raised; the others are ended."""
+    """Return when one of these has ended, or raise its exception; the others are cancelled."""
     tasks = [asyncio.ensure_future(wait) for wait in waits]
     try:
         done, _others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -37,14 +37,14 @@ async def first_to_end(*waits: Awaitable[Any]) -> None:
 
 
 async def end_tasks(*tasks: asyncio.Future[Any]) -> None:
-    """Cancel the tasks and return when all have ended; what they raise is not looked at."""
+    """Cancel the tasks and return when all have ended; their exceptions are ignored."""
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
 def settle(future: asyncio.Future[Any], outcome: object) -> None:
-    """Set the result of the future, or the exception, unless it is done: who waited may have been cancelled."""
+    """Set the result or the exception of the future, unless it is done: its waiter may have been cancelled."""
     if future.done():
         return
     if isinstance(outcome, BaseException):

@@ -110,7 +110,7 @@ class OversizedMessage(Refusal):
 
 
 class UnwritableMessage(Refusal):
-    """The message has a whole number of more than 64 bits, which no bytes of the wire can say."""
+    """The message has a whole number of more than 64 bits, which MessagePack cannot encode."""
 
     code = "wire.unwritable"
     remedy = "Give a smaller number."
@@ -168,14 +168,14 @@ def kinds_of(accepts: Accepts) -> tuple[type[Message], ...]:
 
 
 def refuse_oversized(length: int, most_bytes: int = MAX_MESSAGE_BYTES, what: str = "message") -> None:
-    """Return if a message may have this length; called before its bytes are copied out of the bus.
+    """Return if a message may have this length. Call it before the bytes are copied out of the bus.
 
     Raises:
         OversizedMessage: The message is longer than ``most_bytes``.
     """
     if length > most_bytes:
         raise OversizedMessage(
-            f"{what} of {length} bytes, and {most_bytes} are the most here", bytes=length, most_bytes=most_bytes
+            f"{what} of {length} bytes, but at most {most_bytes} are admitted", bytes=length, most_bytes=most_bytes
         )
 
 
@@ -234,7 +234,9 @@ class Reader(Generic[Body]):
         except _UNREADABLE as error:
             raise self._diagnose(raw, str(error)) from None
         if envelope.wire != WIRE_VERSION:
-            raise WrongVersion(f"envelope version {envelope.wire}, this is {WIRE_VERSION}", got=envelope.wire)
+            raise WrongVersion(
+                f"envelope version {envelope.wire}, but version {WIRE_VERSION} is expected", got=envelope.wire
+            )
         if type(envelope.body) in self._of_any_kind and (wild := wildness(envelope.body)):
             schema = schema_of(type(envelope.body))
             raise MalformedMessage(f"{schema}: {wild}", schema=schema)
@@ -247,7 +249,7 @@ class Reader(Generic[Body]):
             return MalformedMessage(f"not MessagePack: {complaint}")
         match outer:
             case [int(version), *_] if version != WIRE_VERSION:
-                return WrongVersion(f"envelope version {version}, this is {WIRE_VERSION}", got=version)
+                return WrongVersion(f"envelope version {version}, but version {WIRE_VERSION} is expected", got=version)
             case [_, str(), int(), int() | float(), str(), [str(schema), *_]]:
                 return self._diagnose_schema(schema, complaint)
             case _:
@@ -259,5 +261,7 @@ class Reader(Generic[Body]):
             return MalformedMessage(f"{schema}: {complaint}", schema=schema)
         for known in self._accepted:
             if known.partition("/")[0] == name:
-                return WrongVersion(f"{name} version {version}, this is {known.partition('/')[2]}", got=schema)
+                return WrongVersion(
+                    f"{name} version {version}, but version {known.partition('/')[2]} is expected", got=schema
+                )
         return UnknownMessage(f"{schema} is not answered here", schema=schema, accepted=", ".join(self._accepted))

@@ -1,6 +1,6 @@
-"""A reader of a board: it takes the newest whole value, and needs no copy of it.
+"""A reader of a board: it receives the newest whole value without a copy.
 
-It holds the memory of those values alone that it still refers to.
+It keeps only the memory of values to which it still refers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class BlackboardReader:
 
     Args:
         directory: Folder of the boards.
-        name: Of the board.
+        name: Name of the board.
         most_bytes: Longest value.
 
     Raises:
@@ -60,15 +60,15 @@ class BlackboardReader:
             way.close()
 
     def fileno(self) -> int:
-        """Return a descriptor that is readable when ``newest`` has something to return or to raise."""
+        """Return a descriptor that is readable when ``newest`` returns a value or raises an error."""
         return self._own.fileno()
 
     def newest(self) -> Value | None:
-        """Take the newest value; None: there is none since the last one that was taken. Never waits.
+        """Return the newest value; None: there is no new one since the last call. Never waits.
 
         Raises:
-            NoWriter: The writer has ended, and its last value was taken.
-            NotAValue: The packet is none of a writer.
+            NoWriter: The writer has ended, and its last value was returned.
+            NotAValue: The packet is not from a writer.
             NotSealed: The value could change under its reader.
             ValueTooLong: The value is longer than ``most_bytes``.
         """
@@ -83,7 +83,7 @@ class BlackboardReader:
         return self._value(packet, descriptors)
 
     def wait(self, within_s: float) -> Value | None:
-        """Wait, in a thread, for the next value and take it; None: none came. Otherwise as ``newest``."""
+        """Wait, in a thread, for the next value and return it; None: no value came in time. Raises as ``newest``."""
         end_s = time.monotonic() + within_s
         while (value := self.newest()) is None:
             left_s = end_s - time.monotonic()
@@ -93,7 +93,7 @@ class BlackboardReader:
         return value
 
     async def next(self) -> Value:
-        """Wait, in a task, for the next value and take it. Otherwise as ``newest``."""
+        """Wait, in a task, for the next value and return it. Raises as ``newest``."""
         loop = asyncio.get_running_loop()
         while (value := self.newest()) is None:
             ready: asyncio.Future[None] = loop.create_future()
@@ -105,7 +105,7 @@ class BlackboardReader:
         return value
 
     def close(self) -> None:
-        """Leave the board; values that were taken stay. Idempotent."""
+        """Leave the board; values that were returned stay valid. Idempotent."""
         self._connection.close()
         self._own.close()
 

@@ -1,10 +1,10 @@
-"""What the blackboard needs of the operating system: sealed memory files, and sockets that carry their descriptors.
+"""The blackboard's interface to the operating system: sealed memory files, and sockets that carry their descriptors.
 
 A *sealed memory file* is a file without a name that exists in memory only. Its content is written before it is sealed,
 and it is sealed before it is sent, so a reader never sees a part of a value, and no lock is needed. The file ends with
 its last descriptor and mapping, however its processes end.
 
-The rest of the project does not call these functions of the system. Where ``IS_POSSIBLE`` is False (a system other than
+The rest of the project does not call these functions of the system. If ``IS_POSSIBLE`` is False (a system other than
 Linux), there is no blackboard, and the bus sends everything by zenoh.
 """
 
@@ -45,7 +45,7 @@ class NotSealed(Refusal):
 
 
 class ForeignFolder(Refusal):
-    """The folder of a blackboard can be entered by other users."""
+    """Other users can enter the folder of a blackboard."""
 
     code = "blackboard.folder"
     remedy = "Name a folder of your own with mode 0700."
@@ -73,7 +73,7 @@ def mapped(descriptor: int, length: int) -> memoryview:
     The memory stays until the last view of it is gone. A process that keeps ``MOST_MAPPED`` of them gets copies.
 
     Raises:
-        NotSealed: It is not sealed, so that it might change or shrink under its reader, or has another length.
+        NotSealed: The file is not sealed, so it might change or shrink while it is read, or it has another length.
     """
     try:
         try:
@@ -117,7 +117,7 @@ def send(to: socket.socket, parts: Sequence[bytes | memoryview], descriptors: Se
 
 
 def receive(source: socket.socket, most_bytes: int) -> tuple[bytes, list[int]]:
-    """Return one packet and its descriptors, which are closed when another program begins; b"": the sender is gone.
+    """Return one packet and its descriptors, which no other program inherits; b"": the sender is gone.
 
     Raises:
         OSError: There is no packet now (``BlockingIOError``), or the socket is broken.
@@ -135,14 +135,14 @@ def receive(source: socket.socket, most_bytes: int) -> tuple[bytes, list[int]]:
 
 
 def peek(undelivered_at: socket.socket, length: int) -> bytes:
-    """Return the begin of the oldest packet that waits in a socket, which stays there; b"": none waits."""
+    """Return the first bytes of the oldest packet that waits in a socket, and leave it there; b"": none waits."""
     with contextlib.suppress(OSError):
         return undelivered_at.recv(length, socket.MSG_PEEK)
     return b""
 
 
 def take_back(undelivered_at: socket.socket, length: int) -> bytes:
-    """Return the begin of the oldest packet that waits in a socket and drop it; the system closes its descriptors."""
+    """Drop the oldest packet that waits in a socket, and return its first bytes; the system closes its descriptors."""
     with contextlib.suppress(OSError):
         return undelivered_at.recv(length)
     return b""
@@ -155,35 +155,35 @@ def close_all(descriptors: Sequence[int]) -> None:
 
 
 class Waits:
-    """A set of sockets, one of which becomes readable."""
+    """A set of sockets that a process waits for together, until one of them is readable."""
 
     def __init__(self) -> None:
         self._events = select.epoll()
 
     def fileno(self) -> int:
-        """Return a descriptor that is readable while one of them is."""
+        """Return a descriptor that is readable while one of the sockets is."""
         return self._events.fileno()
 
     def add(self, one: socket.socket) -> None:
-        """Take one in."""
+        """Add a socket."""
         self._events.register(one, select.EPOLLIN)
 
     def remove(self, descriptor: int) -> None:
-        """Leave one out; nothing happens if it is closed already."""
+        """Remove a socket, unless it is closed already."""
         with contextlib.suppress(OSError):
             self._events.unregister(descriptor)
 
     def readable(self) -> list[int]:
-        """Return the descriptors of those that are readable. Never waits."""
+        """Return the descriptors of the readable sockets. Never waits."""
         return [descriptor for descriptor, _event in self._events.poll(0)]
 
     def close(self) -> None:
-        """Wait for none any more. Idempotent."""
+        """Close the set, not its sockets. Idempotent."""
         self._events.close()
 
 
 def wait_readable(one: socket.socket | Waits, within_s: float) -> bool:
-    """Wait, in a thread, until it is readable; return whether it is."""
+    """Wait, in a thread, until a socket is readable; return whether one is."""
     waiting = select.poll()
     waiting.register(one, select.POLLIN)
     return bool(waiting.poll(within_s * 1000))
@@ -192,7 +192,7 @@ def wait_readable(one: socket.socket | Waits, within_s: float) -> bool:
 # ---------------------------------------------------------------------- the folder
 @contextlib.contextmanager
 def _place(directory: Path, name: str) -> Iterator[str]:
-    """Give a path of this name that fits a socket, however long the folder's own path is.
+    """Yield a path of this name that fits a socket, however long the folder's own path is.
 
     Raises:
         ForeignFolder: Another user could enter the folder.
@@ -211,7 +211,7 @@ def _place(directory: Path, name: str) -> Iterator[str]:
 def lock(directory: Path, name: str) -> int | None:
     """Return a descriptor that holds the lock of this name while it is open; None: another process holds it.
 
-    A lock of a process that ended, however it ended, is free. The folder is made if there is none.
+    If a process has ended, for any reason, its lock is free. The folder is made if there is none.
 
     Raises:
         ForeignFolder: Another user could enter the folder.

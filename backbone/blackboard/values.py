@@ -1,4 +1,4 @@
-"""A value on its way: a header, and its bytes behind it or in a sealed memory file beside it. Pure.
+"""Packet of a value: a header, and the value's bytes behind it or in a sealed memory file beside it. Pure.
 
 A small value travels in the packet, which is cheaper than a memory file; a large one does not, because each reader
 would copy it.
@@ -36,14 +36,14 @@ class NotAValue(Refusal):
 
 
 class WriterStands(Refusal):
-    """Another writer of this name lives."""
+    """The board of this name has a living writer."""
 
     code = "blackboard.writer"
-    remedy = "Choose another name, or end the other writer; a killed writer's place is free at once."
+    remedy = "Choose another name, or end the other writer; the name of a killed writer is free at once."
 
 
 class NoWriter(Refusal):
-    """No writer of this name lives on this host, or it has closed its place."""
+    """No writer of this name lives on this host, or the writer has closed its board."""
 
     code = "blackboard.no_writer"
     remedy = "Start the writer; then open the reader again."
@@ -62,7 +62,7 @@ class Value:
 
     Attributes:
         number: Grows by one with each value of its writer, and begins at 1.
-        data: Its bytes, read-only. They stay as long as a view of them does.
+        data: Its bytes, read-only. They stay as long as a view of them exists.
     """
 
     number: int
@@ -73,7 +73,7 @@ def files_of(name: str) -> tuple[str, str]:
     """Return the names of the socket and of the lock of a board.
 
     Raises:
-        IllegalName: It is no legal name.
+        IllegalName: The board's name is no legal name.
 
     Example:
         >>> files_of("room")
@@ -86,10 +86,10 @@ def require_short(length: int, most_bytes: int) -> None:
     """Return if a value of this length is admitted.
 
     Raises:
-        ValueTooLong: It is not.
+        ValueTooLong: The value is longer than ``most_bytes``.
     """
     if length > most_bytes:
-        raise ValueTooLong(f"a value of {length} bytes, and {most_bytes} are admitted", bytes=length)
+        raise ValueTooLong(f"a value of {length} bytes, but at most {most_bytes} are admitted", bytes=length)
 
 
 def read_header(packet: bytes, descriptors: int, most_bytes: int) -> tuple[int, int]:

@@ -1,8 +1,8 @@
 """The writer of a board: it never waits for a reader, and each reader finds the newest whole value.
 
-A reader makes a pair of sockets and gives the writer both ends' descriptors: one to send by, and a second handle of its
-own end. By that one the writer takes back what the reader has not taken yet, so the newest value is the only one that
-waits. A reader's death ends its connection, and the system frees what waited for it.
+A reader makes a pair of sockets and passes two descriptors to the writer: the end to send values to, and a second
+handle of the reader's own end. With this handle the writer removes a value that the reader has not received yet, so
+only the newest value waits. If a reader dies, its connection ends, and the system frees the value that waits for it.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class _ConnectedReader:
     undelivered: socket.socket | None = None
 
     def send(self, newest: _Outgoing) -> None:
-        """Leave the value as the only undelivered one; until it is sent, the one before it can be taken.
+        """Replace the undelivered value by this one; until then the reader can still receive the former value.
 
         Raises:
             OSError: It cannot be sent.
@@ -83,7 +83,7 @@ class _ConnectedReader:
         is_behind = bool(sealed_memory.peek(self.undelivered, 1))
         try:
             newest.send(self.way)
-        except BlockingIOError:  # the one before it fills the socket
+        except BlockingIOError:  # the former value fills the socket
             sealed_memory.take_back(self.undelivered, 1)
             newest.send(self.way)
             return
@@ -146,7 +146,7 @@ class BlackboardWriter:
         return any(reader.way is not None for reader in self._readers.values())
 
     def put(self, value: bytes | memoryview) -> int:
-        """Give all readers this value, whole, in place of those that they have not taken; return its number.
+        """Send this value to all readers, in place of values that they have not received yet; return its number.
 
         Never waits for a reader. The bytes are copied once.
 
@@ -170,7 +170,7 @@ class BlackboardWriter:
         return self.number
 
     def serve(self) -> None:
-        """Admit new readers, who get the newest value at once, and let go those that are gone. Never waits."""
+        """Admit new readers, which get the newest value at once, and remove readers that have ended. Never waits."""
         with self._guard:
             if self._is_open and time.monotonic() >= self._accept_again_s:
                 self._accept_again_s = math.inf
@@ -184,12 +184,12 @@ class BlackboardWriter:
                 self._forget()
 
     def serve_in_loop(self) -> None:
-        """Call ``serve`` whenever it has something to do, in the running event loop; close the writer there."""
+        """Call ``serve`` when readers come or go, in the running event loop; close the writer there."""
         self._is_served, self._loop = True, asyncio.get_running_loop()
         self._loop.add_reader(self._events.fileno(), self.serve)
 
     def serve_in_thread(self) -> threading.Thread:
-        """Call ``serve`` whenever it has something to do, in a thread of its own, until the writer is closed."""
+        """Call ``serve`` when readers come or go, in a thread of its own, until the writer is closed."""
         self._is_served = True
 
         def run() -> None:
@@ -203,7 +203,7 @@ class BlackboardWriter:
         return thread
 
     def close(self) -> None:
-        """Let all readers go and leave the place to another writer. Idempotent."""
+        """Disconnect all readers, and free the name for another writer. Idempotent."""
         with self._guard:
             if not self._is_open:
                 return
@@ -240,7 +240,7 @@ class BlackboardWriter:
             self._hear(connection.fileno())
 
     def _hear(self, descriptor: int) -> None:
-        """Take the two sockets of a new reader, or notice the end of one."""
+        """Receive the two sockets of a new reader, or remove a reader that has ended."""
         reader = self._readers[descriptor]
         try:
             _packet, came = sealed_memory.receive(reader.connection, 1)

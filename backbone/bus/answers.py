@@ -1,4 +1,4 @@
-"""What came of a question over zenoh, read: a reply, a refusal that is raised again, or no answer."""
+"""Reads the outcome of a question over zenoh: a reply, a refusal that is raised again, or no answer."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class TooLate:
 
 
 class NoInbox:
-    """No component got the question, because none has the inbox any more."""
+    """No component got the question, because no component has this inbox any more."""
 
 
 Came = bytes | type[TooLate] | type[NoInbox] | None
@@ -24,13 +24,13 @@ Came = bytes | type[TooLate] | type[NoInbox] | None
 
 
 def read_answer(came: Came, address: str, question: Message, reply: type[Reply], within_s: float) -> Reply:
-    """Return the reply in what came of a question.
+    """Return the reply to a question.
 
     Raises:
         Refusal: The component refused.
-        NoResponder: It is gone.
+        NoResponder: The component is gone.
         ReplyTimeout: No answer came in time.
-        MalformedMessage: The answer is another one.
+        MalformedMessage: The answer has another class than ``reply``.
     """
     what = type(question).__name__
     if came is None:
@@ -40,7 +40,7 @@ def read_answer(came: Came, address: str, question: Message, reply: type[Reply],
     try:
         body = reply_reader_of(reply).read(came).body
     except Refusal as unreadable:
-        raise MalformedMessage(f"{address} answered {what} with something else: {unreadable.detail}") from unreadable
+        raise MalformedMessage(f"{address} answered {what} with another message: {unreadable.detail}") from unreadable
     if isinstance(body, Refused):
         raise body.revive()
     return cast("Reply", body)

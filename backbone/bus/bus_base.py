@@ -108,14 +108,14 @@ class BusBase(ABC):
         return self.envelope(body)
 
     def tell(self, address: str, conversation: Conversation, *messages: Envelope[Message]) -> None:
-        """Publish copies of these messages, if a component overhears; too long ones are left out."""
+        """Publish copies of these messages, if a component overhears them; copies that are too long are left out."""
         if not self.closed and self.is_overheard(Conversation.TOLD):
             self._untold.append((address, conversation, messages))
             if len(self._untold) == 1:
                 self.tell_later(self._tell_all)
 
     def tell_later(self, act: Callable[[], None]) -> None:
-        """Call a function at once; a bus whose publications are dear calls it when more is to be told."""
+        """Call a function at once; a bus with costly publications calls it later, when more copies wait."""
         act()
 
     def _tell_all(self) -> None:
@@ -192,7 +192,7 @@ class BusBase(ABC):
 
     @abstractmethod
     def is_overheard(self, conversation: Conversation) -> bool:
-        """Return whether a component hears what this bus publishes in this conversation at its own address."""
+        """Return whether a component gets the publications of this bus in this conversation at its own address."""
 
     @abstractmethod
     def dropped(self) -> dict[str, int]:
@@ -223,6 +223,6 @@ def quoted(messages: Sequence[Envelope[Message]]) -> list[bytes]:
     try:
         written = [write(message) for message in messages]
     except (OversizedMessage, UnwritableMessage) as refusal:
-        log.info("not told: %s", refusal)
+        log.info("no copies for recorders: %s", refusal)
         return []
     return written if max(map(len, written)) <= MOST_QUOTED_BYTES else []

@@ -21,8 +21,8 @@ from backbone.errors import BackboneError
 if TYPE_CHECKING:
     from _typeshed import FileDescriptorLike
 
-LONG_WAIT_S = 0.1  # chosen: of a shorter wait the system takes half a millisecond at most
-FIRST_SHARE = 0.95  # chosen: ten times more than the system's two hundredth is left
+LONG_WAIT_S = 0.1  # chosen: the system ends a shorter wait at most half a millisecond late
+FIRST_SHARE = 0.95  # chosen: the rest is ten times as long as the system's delay
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
@@ -59,11 +59,11 @@ class MissionClock:
 
 
 class PunctualClock(MissionClock):
-    """Mission time for waits of any length that are to end in time.
+    """Mission time with waits of any length that end on time.
 
     Linux ends a wait late by up to a thousandth of its length, and by a two hundredth in a process with niceness
-    (``select_estimate_accuracy`` in ``fs/select.c``): 15 ms after three seconds. So a long wait ends early, and a short
-    one follows. Other clocks do not, because each further waking costs processor time.
+    (``select_estimate_accuracy`` in ``fs/select.c``): 15 ms after three seconds. So this clock splits a long wait into
+    one that ends early and a short rest. Other clocks do not, because each further waking costs processor time.
     """
 
     async def sleep_until_s(self, at_s: float) -> None:

@@ -1,4 +1,4 @@
-"""What a bus on a session holds of it: declarations that it can withdraw, and answers that it waits for."""
+"""Declarations of a bus on a session, which it can withdraw, and answers that it waits for."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Declaration:
     """A zenoh entity that can be withdrawn once; None if no entity was needed.
 
     Attributes:
-        receiver: What receives the samples of a subscription to one conversation; None: it is something else.
+        receiver: Receiver of the samples of a subscription to one conversation; None: another declaration.
     """
 
     def __init__(self, entity: Any, register: set[Declaration], receiver: Receiving | None = None) -> None:
@@ -33,7 +33,7 @@ class Declaration:
 
 
 class Together:
-    """Entities that are withdrawn together; None: it was not needed."""
+    """Entities that are withdrawn together; None: an entity that was not needed."""
 
     def __init__(self, *entities: Any) -> None:
         self._entities = entities
@@ -54,12 +54,12 @@ class FirstReply:
         self._bus, self._answered, self._replied = bus, answered, False
 
     def reply(self, got: Any) -> None:
-        """Take an answer; called from another thread."""
+        """Pass an answer to the loop; called from another thread."""
         self._replied = True  # exactly one component answers, so the end that follows adds nothing
         self._bus.push(self._settle, got)
 
     def end(self) -> None:
-        """Take the end of all answers; called from another thread."""
+        """Pass None to the loop if there was no answer; called from another thread after the last answer."""
         if not self._replied:
             self._bus.push(self._settle, None)
 

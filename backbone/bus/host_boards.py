@@ -19,7 +19,7 @@ from backbone.blackboard.writer import BlackboardWriter
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, MAX_MESSAGE_BYTES
 
 FOLDER = "board"
-LARGE_BYTES = 16_384  # chosen: a board is quicker at every size, but costs ten descriptors, and small outputs are many
+LARGE_BYTES = 16_384  # chosen: a board is quicker at every size, but costs ten descriptors, and most outputs are small
 LOOK_EACH_S = 1.0  # chosen: as for recorders; a look takes some 20 µs
 
 log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ class HostBoards:
 
     Args:
         directory: Folder of the mission's files on this host.
-        neighbors: Senders of this process, whose publications need none.
+        neighbors: Senders of this process; their publications need no board.
     """
 
     def __init__(self, directory: Path, neighbors: Collection[str] = frozenset()) -> None:
@@ -38,7 +38,7 @@ class HostBoards:
         self.neighbors = neighbors
 
     def board(self, key: str, source: str, least_bytes: int = LARGE_BYTES) -> SentBoard:
-        """Return where a sender leaves the large values of a key; the board is opened with the first one."""
+        """Return the board of a sender for a key; the first value of at least ``least_bytes`` opens it."""
         return SentBoard(self._directory, _name(key, source), self._loop, least_bytes)
 
     def look(self, key: str, source: str) -> BlackboardReader | None:
@@ -51,7 +51,7 @@ class HostBoards:
 
 
 class SentBoard:
-    """The board of one sender for one key, if its values are large."""
+    """The board of one sender for one key, which opens with the first large value."""
 
     def __init__(self, directory: Path, name: str, loop: asyncio.AbstractEventLoop, least_bytes: int) -> None:
         self._directory, self._name, self._loop, self._least_bytes = directory, name, loop, least_bytes
@@ -69,20 +69,20 @@ class SentBoard:
         return self._writer is not None and self._writer.has_readers
 
     def put(self, raw: bytes) -> bool:
-        """Give the readers this value; return whether the board was opened for it."""
+        """Put the value on the board; return whether the board was opened for it."""
         is_new = self._writer is None and len(raw) >= self._least_bytes and self._open()
         if self._writer is not None:
-            self._writer.keeps = len(raw) > MAX_MESSAGE_BYTES  # a listener may learn of the board by this value
+            self._writer.keeps = len(raw) > MAX_MESSAGE_BYTES  # too long for the network: later listeners get it, too
             try:
                 self._writer.put(raw)
-            except OSError as error:  # neither memory nor descriptors are left: listeners turn to the network
+            except OSError as error:  # neither memory nor descriptors are left: listeners use the network
                 log.warning("no board on this host for now: %s", error)
                 self._try_again_s = self._loop.time() + LOOK_EACH_S
                 self.close()
         return is_new and self.is_open
 
     def close(self) -> None:
-        """Let all readers go. Idempotent."""
+        """Close the board for all readers. Idempotent."""
         if self._writer is not None:
             self._writer.close()
             self._writer = None

@@ -1,10 +1,10 @@
-"""Copies for the recorder of this host: what a process sends goes to it over a unix socket, never over the network.
+"""Copies for the recorder of this host: a process sends copies of its messages over a unix socket, never by network.
 
-The recorder listens in the mission's folder on its host, which only the mission's user can enter. A copy is dropped and
-counted rather than waited for. Each copy is a header, its key and the bytes of its envelope.
+The recorder listens in the mission's folder on its host, which only the mission's user can enter. If too many copies
+wait, further copies are dropped and counted. Each copy is a header, its key and the bytes of its envelope.
 
-The recorder of the mission has another socket than the recorder of one of its other hosts: a process whose copies go to
-the first needs no further copy, see ``zenoh_far_copies``.
+The recorder of the mission has another socket than a recorder of one of the other hosts. A process whose copies go to
+the recorder of the mission needs no further copies, see ``zenoh_far_copies``.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ MISSION_SOCKET, HOST_SOCKET = "all.sock", "own.sock"  # no longer than the hub's
 PICTURES = frozenset({Conversation.FRAMES, Conversation.VIEWS})
 HEADER = struct.Struct("<IIH")
 """Length of the envelope, copies dropped so far (modulo 2³²), length of the key."""
-MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: a quarter of a second of four cameras in color, and no burden for an RC
-SMALL_BYTES = 4096  # chosen: to copy a page takes less than a second call of the system
-LOOK_EACH_S = 1.0  # chosen: a recorder that begins late misses so much of a process that speaks; a look takes 20 µs
+MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: a quarter of a second of four cameras in color; little memory for an RC
+SMALL_BYTES = 4096  # chosen: to copy a page takes less time than a second system call
+LOOK_EACH_S = 1.0  # chosen: a late recorder misses at most so much of a sending process; a look takes 20 µs
 
 log = logging.getLogger(__name__)
 
@@ -38,8 +38,8 @@ class Copy(NamedTuple):
     """A copy as it arrives.
 
     Attributes:
-        key: Of the message.
-        raw: Its envelope.
+        key: Key of the message.
+        raw: Envelope of the message.
         dropped: Copies that its sender dropped before it.
         end: Where the next copy begins.
     """
@@ -51,17 +51,17 @@ class Copy(NamedTuple):
 
 
 def header_of(key: str, raw: bytes, dropped: int = 0) -> bytes:
-    """Return what stands before the bytes of an envelope in a copy."""
+    """Return the header and the key of a copy; the bytes of the envelope follow them."""
     name = key.encode()
     return HEADER.pack(len(raw), dropped % 2**32, len(name)) + name
 
 
 def copy_at(came: bytes | bytearray, at: int) -> Copy | None:
-    """Return the copy that begins at this place; None: it is not whole yet.
+    """Return the copy that begins at this place; None: it has not arrived whole yet.
 
     Raises:
         ConnectionError: No copy begins there.
-        UnicodeDecodeError: Same.
+        UnicodeDecodeError: Its key is no text.
     """
     if len(came) - at < HEADER.size:
         return None
@@ -90,15 +90,15 @@ class HostCopies:
         self._is_full = False
         self._look_again_s = -math.inf
         self.dropped = 0
-        """Copies for which the recorder had no time."""
+        """Copies that were dropped because the recorder was too slow."""
         self.reach_mission = False
         """Whether the copies go to the recorder of the mission, not to that of one of its other hosts."""
         self._connect()
 
     def find_recorder(self) -> bool:
-        """Return whether a recorder of this host listens; looks for one from time to time.
+        """Return whether a recorder of this host listens; look for one again after ``LOOK_EACH_S``.
 
-        So a process that says nothing is not woken for it.
+        No timer looks for a recorder, so a process that sends nothing is not woken.
         """
         if self._socket is None and self._loop.time() >= self._look_again_s:
             self._connect()
@@ -138,7 +138,7 @@ class HostCopies:
                 return
 
     def _ended(self) -> None:
-        """Look for another recorder with the next message: this one, which never says anything, has ended."""
+        """Look for another recorder with the next message. A recorder sends nothing, so a readable socket has ended."""
         self._disconnect()
         self._look_again_s = -math.inf
 
@@ -170,7 +170,7 @@ class HostCopies:
             self._become_full(False)
 
     def _become_full(self, is_full: bool) -> None:
-        """Send the rest when the socket has room, if it is full."""
+        """If the socket is full, send the rest when it has room again."""
         if is_full is not self._is_full and self._socket is not None:
             self._is_full = is_full
             if is_full:
@@ -185,6 +185,6 @@ def copies_for(directory: str) -> HostCopies | None:
 
 
 def remove_socket(path: Path) -> None:
-    """Remove what a killed recorder left."""
+    """Remove the socket file that a killed recorder left."""
     with suppress(FileNotFoundError):
         path.unlink()

@@ -1,8 +1,9 @@
-"""Questions between two processes of one host, by a socket between them: no other process and no thread is woken.
+"""Questions between two processes of one host over a socket between them: no other process and no thread is woken.
 
-Each process listens at a socket, which its answers by another way name, see ``zenoh_questions``. Who asks again
-connects, and keeps this *line* for all its questions to that process; the answers come back on it. The end of a process
-ends its lines, after the answers that it had sent. Processes of other users are not let in.
+Each process listens at a socket. Its answers to queries name this socket, see ``zenoh_questions``. A process that asks
+again connects to the socket, and keeps this *line* for all its questions to the other process; the answers come back on
+the line. If a process ends, its peers first read the answers that it had sent, and then the end of the line. Processes
+of other users are rejected.
 """
 
 from __future__ import annotations
@@ -21,20 +22,20 @@ from backbone.operating_system import local_sockets
 from backbone.waiting import settle
 from backbone.wire import MAX_MESSAGE_BYTES
 
-# chosen: three of them fit into a socket as the system makes it; where net.core.wmem_default is less, they are shorter
+# chosen: three of them fit the default buffer of a socket (net.core.wmem_default); a smaller buffer gets shorter packets
 MOST_PACKET_BYTES = 65_536
-MOST_WAITING_BYTES = 2 * MAX_MESSAGE_BYTES  # chosen: a peer that is stopped costs no more
+MOST_WAITING_BYTES = 2 * MAX_MESSAGE_BYTES  # chosen: a stopped peer costs at most this memory
 MOST_AT_ONCE = 32  # chosen: packets of one line before the rest of the event loop has its turn
 ACCEPT_AGAIN_S = 1.0  # chosen: as long as asyncio's own servers wait (asyncio.constants.ACCEPT_RETRY_DELAY)
 _PACKET = struct.Struct("<QB")
 _INBOX = struct.Struct("<H")
-_MORE = 0x80  # the message goes on in the next packet of its number
+_MORE = 0x80  # the message continues in the next packet with its number
 
 log = logging.getLogger(__name__)
 
 
 class Kind(IntEnum):
-    """What a message on a line is."""
+    """Kind of a message on a line."""
 
     QUESTION = 0
     ANSWER = 1
@@ -57,17 +58,17 @@ def question_of(inbox: str, payload: bytes) -> bytes:
 
 
 class Gathering:
-    """The messages of one side of a line, made whole of their packets. Pure."""
+    """Joins the packets from one side of a line into messages. Pure."""
 
     def __init__(self) -> None:
         self._parts: dict[int, list[bytes]] = {}
         self._bytes = 0
 
     def take(self, packet: bytes) -> tuple[int, Kind, bytes] | None:
-        """Return number, kind and body of the message that is whole with this packet; None: none is.
+        """Return number, kind and body of the message that this packet completes; None: it completes none.
 
         Raises:
-            ValueError: It is no packet, or its message is longer than any.
+            ValueError: It is no packet, or the incomplete messages have more than ``MOST_WAITING_BYTES``.
         """
         if len(packet) < _PACKET.size:
             raise ValueError(f"a packet of {len(packet)} bytes")
@@ -91,7 +92,7 @@ class HostLine:
     """A connection to another process of this host.
 
     Args:
-        took: Called with each message that came: line, number, kind, body.
+        took: Called with each message from the peer: line, number, kind, body.
         ended: Called once, when no further message can come.
     """
 
@@ -112,7 +113,7 @@ class HostLine:
         self._loop.add_reader(connected, self._read)
 
     def send(self, number: int, kind: Kind, body: bytes) -> None:
-        """Send a message, later if the peer has no time now. A line whose peer takes nothing for long ends."""
+        """Send a message, as soon as the socket has room. If more than ``MOST_WAITING_BYTES`` wait, the line ends."""
         if not self.is_open:
             return
         for packet in packets_of(number, kind, body, self._most_packet_bytes):
@@ -121,7 +122,7 @@ class HostLine:
         if not self._is_full:
             self._send_waiting()
         if self._waiting_bytes > MOST_WAITING_BYTES:
-            log.warning("a process of this host takes no messages: %d bytes wait", self._waiting_bytes)
+            log.warning("a process of this host reads no messages: %d bytes wait", self._waiting_bytes)
             self.close()
 
     def close(self) -> None:
@@ -188,7 +189,7 @@ class HostQuestion:
         self.answer(payload)
 
     def drop(self) -> None:
-        """Say that there is no answer, unless there was one."""
+        """Report that there is no answer, unless one was sent."""
         if not self._is_answered:
             self._line.send(self._number, Kind.NO_ANSWER, b"")
 
@@ -203,11 +204,11 @@ class _Whole(bytes):
 
 @dataclass(slots=True)
 class _Asked:
-    """What is asked on one line.
+    """Open questions on one line.
 
     Attributes:
         waiting: Number → open question.
-        left: Called when the line has ended.
+        left: Functions to call when the line has ended.
     """
 
     waiting: dict[int, asyncio.Future[Came]] = field(default_factory=dict)
@@ -243,7 +244,7 @@ class HostLines:
         return Served(self._inboxes, inbox)
 
     def way(self, name: str, inbox: str, lost: Callable[[LineWay], None]) -> LineWay | None:
-        """Return the way to an inbox of the process that listens at this name; None: none of this host does."""
+        """Return the way to an inbox of the process that listens at this name; None: there is none."""
         line = self._asking.get(name)
         if line is None:
             try:
@@ -257,7 +258,7 @@ class HostLines:
         return way
 
     async def ask(self, line: HostLine, inbox: str, payload: bytes, answered: asyncio.Future[Came]) -> Came:
-        """Return what came of a question."""
+        """Return the outcome of a question."""
         self._number += 1
         number, waiting = self._number, self._asked[line].waiting
         waiting[number] = answered
@@ -268,7 +269,7 @@ class HostLines:
             waiting.pop(number, None)
 
     def forget(self, line: HostLine, left: Callable[[], None]) -> None:
-        """Do not call this function when the line ends."""
+        """Remove a function from those that are called when the line has ended."""
         if (asked := self._asked.get(line)) is not None and left in asked.left:
             asked.left.remove(left)
 
@@ -286,8 +287,8 @@ class HostLines:
         except BlockingIOError:
             return
         except PermissionError as error:
-            log.warning("a process of this host was not let in: %s", error)
-        except OSError as error:  # no descriptors are left: who connects waits, or goes through the hub
+            log.warning("a process of this host was rejected: %s", error)
+        except OSError as error:  # no descriptors are left: processes that connect wait, or ask through the hub
             log.warning("no further line on this host for now: %s", error)
             self._loop.remove_reader(self._listening)
             self._loop.call_later(ACCEPT_AGAIN_S, self._accept_again)
@@ -322,13 +323,13 @@ class HostLines:
 
 
 class Served:
-    """An inbox that takes questions until it is withdrawn."""
+    """An inbox that receives questions until it is withdrawn."""
 
     def __init__(self, inboxes: dict[str, Callable[[HostQuestion], None]], inbox: str) -> None:
         self._inboxes, self._inbox = inboxes, inbox
 
     def undeclare(self) -> None:
-        """Withdraw it."""
+        """Withdraw the inbox."""
         self._inboxes.pop(self._inbox, None)
 
 
@@ -344,20 +345,20 @@ class LineWay:
         self.is_open = True
 
     async def ask(self, payload: bytes, answered: asyncio.Future[Came]) -> Came:
-        """Return what came of a question."""
+        """Return the outcome of a question."""
         came = await self._lines.ask(self._line, self.inbox, payload, answered)
         if came is NoInbox:
             self.leave()
         return came
 
     def leave(self) -> None:
-        """Be lost."""
+        """Close the way and report its loss. Idempotent."""
         if self.is_open:
             self.close()
             self._lost(self)
 
     def close(self) -> None:
-        """Take no further question. Questions that wait still do."""
+        """Accept no further question; open questions still wait for their answers."""
         self.is_open = False
         self._lines.forget(self._line, self.leave)
 

@@ -1,4 +1,4 @@
-"""Inbox: what arrives in other threads is handed to the event loop, which is woken once for a whole burst."""
+"""Inbox: passes arrivals from other threads to the event loop, which is woken once for a whole burst."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from backbone.wire import MAX_MESSAGE_BYTES, Accepts, Envelope, Message, Reader,
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 
-MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: of one listener; seconds of what a component gets at its busiest
-GATHER_S = 0.05  # chosen: who overhears a mission is woken twenty times a second, however much is said
+MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: for one listener; seconds of the traffic of a busy component
+GATHER_S = 0.05  # chosen: a component that overhears a mission is woken at most twenty times a second
 
 
 class Payload(Protocol):
@@ -46,7 +46,7 @@ class Sample(Protocol):
 
 
 class InboxBus(BusBase):
-    """Base of a bus whose arrivals come in other threads. Make it inside a running event loop."""
+    """Base class of a bus whose arrivals come in other threads. Make it inside a running event loop."""
 
     def __init__(self, mission: str, source: str, clock: Clock) -> None:
         super().__init__(mission, source, clock)
@@ -86,12 +86,12 @@ class InboxBus(BusBase):
                 self.on_bug(bug)
 
     def empty_inbox(self) -> None:
-        """Forget what has arrived and is not handed over yet."""
+        """Drop the arrivals that are not handed over yet."""
         self._inbox.clear()
 
 
 class Receiving(Protocol):
-    """What receives the messages of a subscription."""
+    """Receiver of the messages of a subscription."""
 
     @property
     def of(self) -> str:
@@ -160,7 +160,7 @@ class EachSample:
 
 
 class OverheardSamples:
-    """Receives every sample of a subscriber, in order, as long as few of them wait."""
+    """Receives every sample of a subscriber, in order, as long as no more than ``most_waiting_bytes`` wait."""
 
     def __init__(self, bus: InboxBus, listener: Overhearer, most_waiting_bytes: int) -> None:
         self._bus, self._listener, self._most = bus, listener, most_waiting_bytes

@@ -2,10 +2,10 @@
 
 Three implementations of ``Bus`` pass one conformance suite: ``zenoh_bus`` between processes,
 ``local_bus`` inside one, and ``shared_bus`` for the members of a shared process. A component cannot see which of them
-it has.
+it uses.
 
 Words: a *question* goes to one address and gets exactly one reply or refusal; a *publication* goes to all subscribers;
-a *liveliness token* stands while its component lives.
+a *liveliness token* exists while its component lives.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Reply = TypeVar("Reply", bound=Message)
 Answer = Callable[[Envelope[Message]], Awaitable[Message]]
 Kind = TypeVar("Kind", bound=Message)
 Listener = Callable[[Envelope[Any]], None]
-"""A subscriber's callback. ``Bus.subscribe`` checks that it takes the kinds that it subscribes to."""
+"""A subscriber's callback. ``Bus.subscribe`` checks that it accepts the subscribed kinds of messages."""
 Overhearer = Callable[[str, bytes], None]
 LifeListener = Callable[[str, bool], None]
 LinkListener = Callable[[bool], None]
@@ -111,18 +111,18 @@ class Bus(Protocol):
         """Send the message to all present subscribers. Never waits, and needs no subscriber."""
 
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
-        """Send a message of another sender to all present subscribers, as it was: for replays."""
+        """Send a message of another sender, unchanged, to all present subscribers: for replays."""
 
     def declare_quality(self, address: str, conversation: Conversation, quality: Quality) -> None:
-        """Send the messages of this key in another quality than its conversation's; before the first of them."""
+        """Send the messages of this key in another quality than its conversation's. Call it before the first one."""
 
     def declare_publisher(self, address: str, conversation: Conversation) -> None:
-        """Declare at once what the first message of this key declares: that takes milliseconds. For some dozens."""
+        """Declare the publisher of this key now, so that its first message is quick. For a few dozen keys."""
 
     def dropped(self) -> dict[str, int]:
         """Return the number of messages that came for listeners of this bus and were not handed to them.
 
-        Keys are those subscribed to, without ``scout/<mission>/``; those without a loss are left out.
+        The keys are the subscribed keys, without ``scout/<mission>/``; keys without a loss are left out.
         """
 
     @overload
@@ -165,8 +165,8 @@ class Bus(Protocol):
             latest: Keep only the newest undelivered publication of each address (pictures, states); else all, in
                 the order of each source, as long as no more than ``MOST_WAITING_BYTES`` wait.
             lossless: Get each message that is sent while its sender knows this subscription, also one that a full queue
-                would drop; ``latest`` has no effect then. Senders keep what this listener did not acknowledge, and
-                never wait for it. Beyond ``MOST_KEPT_BYTES`` messages are lost, and ``dropped`` counts them.
+                would drop; ``latest`` has no effect then. Senders keep the unacknowledged messages, and never wait for
+                this listener. Messages beyond ``MOST_KEPT_BYTES`` are lost, and ``dropped`` counts them.
         """
 
     def overhear(
@@ -180,23 +180,24 @@ class Bus(Protocol):
     ) -> Overhearing:
         """Call ``listener(key, bytes)``, in the event loop, with each publication of a conversation, by any sender.
 
-        The bytes are not read, so messages of unknown classes and malformed ones come too. Of conversations that are
-        ``NEVER_DROPPED``, and of questions, overhear the copies in ``Conversation.TOLD``: then no sender waits for this
-        process, even if it hangs.
+        The bytes are not decoded, so messages of unknown classes and malformed ones come too. For questions, and for
+        conversations that are ``NEVER_DROPPED``, overhear the copies in ``Conversation.TOLD``: then no sender waits for
+        this process, even if it hangs.
 
         Args:
             most_waiting_bytes: Messages that arrive while so many bytes wait for the listener are dropped and counted.
-            of: Address under which they are published; empty: any. Others then make no copies.
-            lossless: Get each message, see ``subscribe``; what waits then waits at its senders.
+            of: Address of the publications; empty: any. If it is given, other senders make no copies.
+            lossless: Get each message, see ``subscribe``; waiting messages then wait at their senders.
         """
 
     def declare_alive(self, address: str) -> Subscription:
-        """Raise this component's liveliness token. Declared last, it means ready."""
+        """Declare this component's liveliness token. Declared last, it means ready."""
 
     def watch_alive(self, address: str, listener: LifeListener) -> Subscription:
-        """Call ``listener(address, alive)`` for each token that stands now and for every later change.
+        """Call ``listener(address, alive)`` for each present token and for every later change.
 
-        A token falls when its process dies or closes it, or when a link is cut; ``watch_link`` reports the own link.
+        A token ends when its process dies or withdraws it, or when a link is cut; ``watch_link`` reports this process's
+        own link.
         """
 
     def watch_link(self, listener: LinkListener) -> Subscription:
@@ -220,9 +221,9 @@ class Copies(Message, frozen=True):
     from the bus of its sender.
 
     Attributes:
-        address: Of the key of the messages.
-        conversation: Same.
-        messages: Their envelopes, as bytes.
+        address: Address in the key of the messages.
+        conversation: Conversation in this key.
+        messages: Envelopes of the messages, as bytes.
     """
 
     address: Mention

@@ -1,7 +1,7 @@
 """The bus inside one process: it delivers the objects themselves, without serialization and without copies.
 
-Each delivery is a separate step of the event loop, in the order of sending, so on a ``VirtualLoop`` the same program
-gives the same run.
+Each delivery is a separate step of the event loop, in the order of sending, so on a ``VirtualLoop`` each run of a
+program is the same.
 
 ``LocalBus`` is a complete bus, for missions in one process. ``shared_bus``, whose members also reach other processes,
 uses the same delivery between neighbors.
@@ -39,7 +39,7 @@ from backbone.wire import (
 )
 
 Answered = Callable[[Envelope[Message] | None], None]
-"""Callback with the answer to a question, or None if the component died over it."""
+"""Callback with the answer to a question, or None if the component died before it answered."""
 
 
 class LocalNetwork:
@@ -75,7 +75,7 @@ class LocalNetwork:
         listening.deliver(address, envelope)
 
     def carry_life(self, watching: Watching, address: str, alive: bool) -> None:
-        """Deliver the rise or fall of a token to one watcher."""
+        """Report a new or ended token to one watcher."""
         watching.notify(address, alive)
 
 
@@ -162,7 +162,7 @@ class Neighbor(Declaring):
         return overheard
 
     def declare_to_neighbors(self, address: str) -> NeighborDeclaration:
-        """Raise a token in this process."""
+        """Declare a token in this process."""
         tokens = self.network.tokens.setdefault(address, [])
 
         def fall() -> None:
@@ -187,7 +187,7 @@ class Neighbor(Declaring):
         return watching
 
     def is_overheard_by_neighbors(self, conversation: Conversation) -> bool:
-        """Return whether a component in this process hears this conversation of its own address."""
+        """Return whether a component in this process hears this conversation at this bus's own address."""
         network = self.network
         return any(overheard.hears(self.source, conversation) for overheard in network.overhearers) or any(
             matches(listening.pattern, self.source) for listening in network.listeners[conversation]
@@ -271,11 +271,11 @@ class LocalBus(Neighbor):
         return self.overhear_neighbors(conversation, listener, most_waiting_bytes, of, lossless=lossless)
 
     def is_overheard(self, conversation: Conversation) -> bool:
-        """Return whether a component hears this conversation of its own address."""
+        """Return whether a component hears this conversation at this bus's own address."""
         return self.is_overheard_by_neighbors(conversation)
 
     def declare_alive(self, address: str) -> NeighborDeclaration:
-        """Raise a liveliness token; see ``Bus.declare_alive``."""
+        """Declare a liveliness token; see ``Bus.declare_alive``."""
         self.require_open()
         _check(self.mission, address)
         return self.declare_to_neighbors(address)

@@ -1,9 +1,8 @@
 """Lossless delivery: the decisions of a sender and of a listener that must get every message. Pure.
 
 A sender numbers the messages of each stream, keeps them until the listener acknowledges them, and has few of them under
-way at a time. So the messages are dropped where a queue is full, as all repeated ones are, and are sent again. A
-sender never waits for a listener that hangs: what the listener does not take in time waits at the sender, up to a
-number of bytes.
+way at a time. A full queue may drop the messages, as it drops all repeated ones, because the sender sends them again. A
+sender never waits for a listener that hangs: the sender keeps the unacknowledged messages, up to a number of bytes.
 """
 
 from __future__ import annotations
@@ -15,20 +14,20 @@ from typing import NamedTuple
 
 MOST_UNDER_WAY_BYTES = 256 * 1024  # chosen: three pictures of 320 x 240; they fit the queues of a link
 MOST_KEPT_BYTES = 128 * 1024 * 1024  # chosen: 1700 of these pictures, which are two minutes of a camera
-AGAIN_S, AGAIN_MOST_S = 0.25, 2.0  # chosen: a listener that is alive answers sooner; at last as rarely as a lease
-BACK_S = 0.02  # chosen: longer than the way there and back, so one gap is answered once
-MOST_LOST = 2**40  # chosen: more than any sender sends; any bytes may arrive
-MOST_STREAMS_HEARD = 1024  # chosen: of one listener; a stream has one sender, and any bytes may arrive
+AGAIN_S, AGAIN_MOST_S = 0.25, 2.0  # chosen: a living listener answers sooner; the longest pause is a link's lease
+BACK_S = 0.02  # chosen: longer than a round trip, so that one gap is repaired once
+MOST_LOST = 2**40  # chosen: more than any sender sends; a larger number is ignored
+MOST_STREAMS_HEARD = 1024  # chosen: for one listener; a stream has one sender, but any process may invent streams
 
 
 class Parcel(NamedTuple):
     """One message under way.
 
     Attributes:
-        number: Of the message in its stream, from 1.
+        number: Number of the message in its stream, from 1.
         lost: Messages of the stream that were not sent at all, because too many bytes waited.
-        key: Of the message.
-        raw: The message.
+        key: Key of the message.
+        raw: Bytes of the message.
     """
 
     number: int
@@ -38,10 +37,10 @@ class Parcel(NamedTuple):
 
 
 class LosslessSending:
-    """What one sender has for one listener.
+    """The unacknowledged messages of one sender to one listener.
 
     Args:
-        most_bytes: What is added while so many bytes wait is lost, and counted.
+        most_bytes: A message with which more bytes would wait is lost and counted, unless it waits alone.
     """
 
     def __init__(self, most_bytes: int = MOST_KEPT_BYTES) -> None:
@@ -51,7 +50,7 @@ class LosslessSending:
         self._acknowledged = self.lost = 0
         self._pause_s, self._back_s = AGAIN_S, -math.inf
         self.again_s = math.inf
-        """When to call ``due`` again although nothing is added or acknowledged."""
+        """Time at which to call ``due`` again, if nothing is added or acknowledged before."""
 
     @property
     def waiting(self) -> int:
@@ -59,7 +58,7 @@ class LosslessSending:
         return len(self._kept)
 
     def add(self, key: str, raw: bytes) -> bool:
-        """Take a message; return False if it is lost, because too many bytes wait."""
+        """Keep a message to send; return False if it is lost, because too many bytes wait."""
         if self._kept and self._kept_bytes + len(raw) > self._most_bytes:
             self.lost += 1
             return False
@@ -68,7 +67,7 @@ class LosslessSending:
         return True
 
     def acknowledge(self, number: int, now_s: float) -> None:
-        """Forget the messages up to this number, which the listener has; the same number again tells of a gap."""
+        """Drop the messages up to this number, which the listener has; the same number again means a gap after it."""
         news = number - self._acknowledged
         if not 0 <= news <= self._under_way:
             return
@@ -85,7 +84,7 @@ class LosslessSending:
         self.again_s = now_s + AGAIN_S if self._under_way else math.inf
 
     def due(self, now_s: float) -> Iterator[Parcel]:
-        """Yield what is to be sent now."""
+        """Yield the messages to send now."""
         if now_s >= self.again_s:
             self._go_back(now_s)
             self._pause_s = min(2 * self._pause_s, AGAIN_MOST_S)
@@ -100,13 +99,13 @@ class LosslessSending:
             self.again_s = now_s + self._pause_s
 
     def _go_back(self, now_s: float) -> None:
-        """Send everything again that is not acknowledged."""
+        """Send all unacknowledged messages again."""
         self._under_way = self._under_way_bytes = 0
         self.again_s, self._back_s = math.inf, now_s + BACK_S
 
 
 class LosslessHearing:
-    """What one listener has of all streams that come to it: each message once, in the order of its stream."""
+    """The streams to one listener, which gets each message once, in the order of its stream."""
 
     def __init__(self) -> None:
         self._streams: OrderedDict[bytes, tuple[int, int]] = OrderedDict()  # stream → newest number, lost

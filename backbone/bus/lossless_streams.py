@@ -1,9 +1,9 @@
-"""Lossless delivery on a session: listeners that must get every message, and what a bus sends them.
+"""Lossless delivery on a session: listeners that must get every message, and the streams of a bus to them.
 
-Such a listener raises a token under the key that it listens to, and gets the messages at that token's key, apart from
-the publications for everybody else. A sender that sees the token sends each message of the key there, too, and keeps it
-until the listener acknowledges it; see ``lossless``. A token that falls is waited for, so a hub that begins anew costs
-no message.
+A lossless listener declares a token under the key that it listens to, and gets the messages at that token's key, apart
+from the publications for all other listeners. A sender that sees the token sends each message of the key there, too,
+and keeps it until the listener acknowledges it; see ``lossless``. If a token ends, senders keep its stream for
+``STILL_COME_S``, so a restart of the hub costs no message.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from backbone.keys import Conversation, key_of_lossless, keys_of_lossless, liste
 from backbone.quality import QUALITY, Quality
 
 STILL_COME_S = 2.0  # chosen: the lease of a link; a restarted hub is back sooner
-MOST_LISTENERS = 4096  # chosen: one for each component of the largest mission; any token may stand
+MOST_LISTENERS = 4096  # chosen: one for each component of the largest mission; a client may declare any token
 MOST_KEYS_FOUND = 256  # chosen: four times the publishers of a bus
 LEAST_SLASHES = 5  # of scout/<mission>/<subsystem>/<conversation>/all/<listener>
 _HEAD = struct.Struct("<8sQQH")  # stream, number, lost, length of the sender's inbox, which follows, and then the key
@@ -41,7 +41,7 @@ log = logging.getLogger(__name__)
 
 
 class LosslessStream:
-    """What a bus sends to one such listener.
+    """The messages of a bus to one lossless listener.
 
     Args:
         at: Key of the listener's token.
@@ -52,18 +52,18 @@ class LosslessStream:
         self.at, self.id, self.sending = at, os.urandom(8), LosslessSending()
         conversation = Conversation(listened_to(at).rpartition("/")[2])
         self._session, self._inbox, self._loop = session, inbox.encode(), asyncio.get_running_loop()
-        quality = msgspec.structs.replace(QUALITY[conversation], reliable=False)  # what is dropped is sent again
+        quality = msgspec.structs.replace(QUALITY[conversation], reliable=False)  # dropped messages are sent again
         self._wire = on_the_wire(quality)
         self._timer: asyncio.TimerHandle | None = None
 
     def send(self, key: str, raw: bytes) -> None:
         """Send a message as soon as few of the earlier ones are under way."""
         if not self.sending.add(key, raw) and self.sending.lost == 1:
-            log.warning("%s takes too little: messages for it are lost", self.at)
+            log.warning("%s is too slow: messages for it are lost", self.at)
         self._send_due()
 
     def acknowledged(self, number: int) -> None:
-        """Send more, because the listener has this one."""
+        """Send more, because the listener has the messages up to this number."""
         self.sending.acknowledge(number, self._loop.time())
         self._send_due()
 
@@ -86,15 +86,15 @@ class LosslessStreams:
     """The streams of one bus.
 
     Args:
-        only_elsewhere: True: listeners of the same session are neighbors, who get everything without it.
+        only_elsewhere: True: no streams to listeners of the same session, which get the messages as neighbors.
     """
 
     def __init__(self, bus: InboxBus, session: zenoh.Session, mission: str, own: str, *, only_elsewhere: bool) -> None:
         self._bus, self._session, self._mission = bus, session, mission
         self.inbox = new_inbox_key(mission, own, _KIND)
-        """Key at which it is told what listeners have."""
+        """Key at which listeners acknowledge messages of this bus."""
         self._own_id = session_id(session) if only_elsewhere else ""
-        self._fell_s: dict[str, float] = {}  # key of a listener's token → when it fell; infinite: it stands
+        self._fell_s: dict[str, float] = {}  # key of a listener's token → when it ended; infinite: it exists
         self._streams: dict[str, LosslessStream] = {}
         self._found: dict[tuple[str, Conversation], list[LosslessStream]] = {}
         self._by_id: dict[bytes, LosslessStream] = {}
@@ -142,7 +142,7 @@ class LosslessStreams:
 
     def _forget_fallen(self, at: str, fell_s: float) -> None:
         if self._fell_s.get(at) != fell_s:
-            return  # it stands again, or fell again
+            return  # it exists again, or ended again
         del self._fell_s[at]
         self._found.clear()
         if (stream := self._streams.pop(at, None)) is not None:
@@ -192,7 +192,7 @@ class LosslessSamples:
         return self._hearing.lost
 
     def undeclare(self) -> None:
-        """Withdraw it."""
+        """Withdraw the subscription."""
         self._token.undeclare()  # type: ignore[no-untyped-call]
         self._subscriber.undeclare()  # type: ignore[no-untyped-call]
 
@@ -225,7 +225,7 @@ class LosslessOverhearing:
         return self._samples.dropped
 
     def close(self) -> None:
-        """Withdraw it."""
+        """Withdraw the subscription."""
         self._declared.close()
 
 

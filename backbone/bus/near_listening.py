@@ -1,8 +1,9 @@
-"""A subscription to the newest large value of one key: from the blackboards of this host where it can, else by network.
+"""A subscription to the newest large value of one key: from blackboards of this host if possible, else by network.
 
-It begins at the network. Senders of a large conversation raise a token each. When every sender of the key whose token
-stands has given a value by its board, the network's subscription is withdrawn; when a board ends, or another sender
-rises, it is declared again at once. So no sender is missed for longer than a declaration takes.
+It begins with a subscription on the network. Each sender of a large conversation declares a token. When every sender
+with a token for the key has put a value on its board, the network's subscription is withdrawn. If a board ends, or
+another sender declares a token, the network's subscription is declared again at once. So no sender is missed for longer
+than a declaration takes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from backbone.errors import Refusal
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, Envelope, Message, Reader
 
 IN_FLIGHT_S = 1.0  # chosen: the longest time for which a value may be on its way while a newer one overtakes it
-MOST_SENDERS = 64  # chosen: of one key; a key has one sender at a time, and any bytes may arrive
+MOST_SENDERS = 64  # chosen: for one key; it has one sender at a time, but any process may invent senders
 
 
 log = logging.getLogger(__name__)
@@ -35,7 +36,7 @@ class Entity(Protocol):
 
 
 class SendersHeard:
-    """Decides whether the network is needed to hear all senders of a key. Pure."""
+    """Decides whether the network is needed to get the values of all senders of a key. Pure."""
 
     def __init__(self) -> None:
         self._standing: set[str] = set()
@@ -46,7 +47,7 @@ class SendersHeard:
         self._standing.add(source)
 
     def fell(self, source: str) -> None:
-        """Record that it fell."""
+        """Record that the sender's token ended."""
         self._standing.discard(source)
 
     def stands(self, source: str) -> bool:
@@ -54,16 +55,16 @@ class SendersHeard:
         return source in self._standing
 
     def gave(self, source: str) -> None:
-        """Record that a value came by the sender's board."""
+        """Record that a value came from the sender's board."""
         self._near.add(source)
 
     def ended(self, source: str) -> None:
-        """Record that its board ended."""
+        """Record that the sender's board ended."""
         self._near.discard(source)
 
     @property
     def need_network(self) -> bool:
-        """True unless every sender that stands gives its values by a board."""
+        """True unless there are senders with tokens, and all of them put their values on boards."""
         return not self._standing or not self._standing <= self._near
 
 
@@ -74,10 +75,10 @@ class _Last(NamedTuple):
 
 
 class NewestOnly:
-    """Decides which values are delivered when those of one sender come by two ways: no old ones, none twice. Pure.
+    """Decides which values to deliver if the values of one sender come by two ways: no old ones, none twice. Pure.
 
-    Numbers grow within a sender's life, and a later life has later stamps. A sender that begins anew on a host whose
-    clock is behind is heard after ``IN_FLIGHT_S``.
+    Numbers grow within a sender's life, and a later life has later stamps. If a sender restarts on a host whose clock
+    is behind, its values are delivered after ``IN_FLIGHT_S``.
     """
 
     def __init__(self) -> None:
@@ -96,10 +97,10 @@ class NewestOnly:
 
 
 class NearListening(LatestSample):
-    """One such subscription; it is called with what the network brings.
+    """A subscription to one key; it is called with each sample from the network.
 
     Args:
-        key: Of the publications.
+        key: Key of the publications.
         declare: Declares the network's subscription with this receiver.
     """
 
@@ -126,7 +127,7 @@ class NearListening(LatestSample):
         """The watch over senders' tokens, which is withdrawn with the subscription; settable."""
 
     def sender_changed(self, source: str, stands: bool) -> None:
-        """Record that a sender's token rose or fell."""
+        """Record that a sender's token began or ended."""
         if source in self._boards.neighbors or not self._is_open:
             return
         if stands:
@@ -137,7 +138,7 @@ class NearListening(LatestSample):
         self._mend()
 
     def deliver(self, envelope: Envelope[Message]) -> None:
-        """Deliver what came by the network, unless the same or a newer value came by a board."""
+        """Deliver a value from the network, unless the same or a newer value came from a board."""
         if not self._is_open:
             return
         if self._loop.time() >= self._look_again_s.get(envelope.source, 0.0):
@@ -186,7 +187,7 @@ class NearListening(LatestSample):
         try:
             value = self._readers[source].newest()
         except (Refusal, OSError) as fault:
-            if not isinstance(fault, NoWriter):  # nonsense, or no descriptors are left
+            if not isinstance(fault, NoWriter):  # an invalid board, or no descriptors are left
                 log.warning("no board of %s for now: %s", source, fault)
                 self._look_again_s[source] = self._loop.time() + LOOK_EACH_S
             self._leave(source)
@@ -216,7 +217,7 @@ class NearListening(LatestSample):
         self._senders.ended(source)
 
     def _mend(self) -> None:
-        """Have a subscription of the network if it is needed, and only then."""
+        """Declare or withdraw the network's subscription, so that it exists only while it is needed."""
         if self._senders.need_network and self._network is None:
             self._network = self._declare(self)
         elif not self._senders.need_network and self._network is not None:

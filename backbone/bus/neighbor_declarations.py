@@ -1,4 +1,4 @@
-"""What a bus declares to its neighbors in its process: each declaration hands over in a step of the loop of its own."""
+"""Declarations of a bus to its neighbors in its process. Each delivery is a separate step of the event loop."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Declaring(BusBase):
     """A bus with declarations in its process.
 
     Attributes:
-        declared: Those that stand.
+        declared: Declarations that are not withdrawn.
     """
 
     declared: list[NeighborDeclaration]
@@ -165,7 +165,7 @@ class Watching(NeighborDeclaration):
 
 @functools.lru_cache(maxsize=4096)
 def matches(pattern: str, address: str) -> bool:
-    """Return whether an address or key is meant by a pattern: ``*`` is any one segment, and one ``**`` any number."""
+    """Return whether a pattern matches an address or key: ``*`` is any one segment, and one ``**`` any number."""
     before, is_any_number, after = pattern.partition("**/")
     if is_any_number:
         begin, end = before.count("/"), after.count("/") + 1

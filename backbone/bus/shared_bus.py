@@ -4,10 +4,10 @@ Neighbors exchange the objects themselves, as on the local bus; other processes 
 difference and gets no message twice: a publication leaves the process once, for other processes, and a question to a
 neighbor never leaves the process.
 
-A session reports its own tokens unreliably: late echoes of them return from the hub, and a token that falls here is
-reported as fallen although another process holds it too. So this file reports neighbors' tokens, and asks the hub about
-an address that is or was a neighbor's. A session also drops an answer about a token that it reports in the meantime: a
-"no" counts only when the session's last report agrees.
+A session reports its own tokens unreliably: late echoes of them return from the hub, and a token that ends here is
+reported as ended although another process holds it too. So this file reports neighbors' tokens itself, and asks the hub
+about an address that is or was a neighbor's. If the session reports a token before the hub's answer, it drops this
+answer. So a "no" counts only if the session's last report agrees.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from backbone.keys import Conversation
 from backbone.quality import NEVER_DROPPED
 from backbone.wire import Accepts, Envelope, Message
 
-AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
+AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stays unnoticed
 
 
 class SharedSession:
@@ -132,7 +132,7 @@ class SharedBus(Neighbor, ZenohBus):
         return dict(Counter(Neighbor.dropped(self)) + Counter(ZenohBus.dropped(self)))
 
     def is_overheard(self, conversation: Conversation) -> bool:
-        """Return whether a component hears this conversation of its own address, here or in another process."""
+        """Return whether a component, here or in another process, hears this conversation at this bus's own address."""
         return self.is_overheard_by_neighbors(conversation) or super().is_overheard(conversation)
 
     def overhear(
@@ -150,7 +150,7 @@ class SharedBus(Neighbor, ZenohBus):
         return _BothHeard(elsewhere, here)
 
     def declare_alive(self, address: str) -> Subscription:
-        """Raise a liveliness token; see ``Bus.declare_alive``."""
+        """Declare a liveliness token; see ``Bus.declare_alive``."""
         elsewhere = super().declare_alive(address)
         return _Both(elsewhere, self.declare_to_neighbors(address))
 
@@ -182,12 +182,12 @@ class _Watch:
         self._stale: set[str] = set()
 
     def here_changed(self, address: str, stands: bool) -> None:
-        """Record that a neighbor's token rose or fell."""
+        """Record that a neighbor's token began or ended."""
         if not stands:
             self._check(address)
             return
         check = self._checks.pop(address, None)
-        if check is not None:  # it fell and rose again before the hub answered: report both
+        if check is not None:  # it ended and came back before the hub answered: report both
             check.cancel()
             self._notify(address, False)
         self._notify(address, True)
@@ -207,7 +207,7 @@ class _Watch:
         self._checks.clear()
 
     def _check(self, address: str) -> None:
-        """Ask the hub whether the token stands; if a question is open, ask again after it."""
+        """Ask the hub whether the token exists; if a question is open, ask again after it."""
         if address in self._checks:
             self._stale.add(address)
         else:

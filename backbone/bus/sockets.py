@@ -1,8 +1,8 @@
-"""Sockets of this process that are a library's: their close must not block.
+"""Sockets that a library opened in this process: closing them must not block.
 
-A TCP link of zenoh lingers: its close blocks the thread that closes it until what was sent is acknowledged, 10 s at
-most (zenoh 1.10, ``TCP_LINGER_TIMEOUT``). On a cut cable these are the few threads through which a hub receives, so
-every component waited for the cable; and a session that came back meanwhile got a link that carried nothing.
+A TCP link of zenoh lingers: its close blocks the thread that closes it until the peer has acknowledged all data, 10 s
+at most (zenoh 1.10, ``TCP_LINGER_TIMEOUT``). If a cable is cut, this blocks the few threads through which a hub
+receives. Then every component waits, and a session that connects again meanwhile gets a link without messages.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import socket
 import struct
 from pathlib import Path
 
-_NO_LINGER = struct.pack("ii", 0, 0)  # the default of the system: close returns at once, the rest is sent behind it
+_NO_LINGER = struct.pack("ii", 0, 0)  # the system's default: close returns at once, and the system sends the rest
 
 
 def close_without_waiting() -> None:
-    """Let every TCP socket that this process has now return from its close at once."""
+    """Make the close of every present TCP socket of this process return at once."""
     for entry in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(OSError), _same_socket(int(entry.name)) as same:  # no socket, or closed meanwhile
             if same.family in (socket.AF_INET, socket.AF_INET6) and same.type == socket.SOCK_STREAM:

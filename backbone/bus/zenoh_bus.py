@@ -1,8 +1,8 @@
 """The bus between processes, over Eclipse Zenoh.
 
 Zenoh's threads never run component code: they put arrivals into an inbox and wake the event loop once for a whole
-burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one, and so are those about
-tokens; other subscribers and queryables keep their one indirect thread.
+burst. Callbacks of ``get`` are direct, because zenoh would start a thread for each indirect one. Callbacks of tokens
+are direct, too. Other subscribers and queryables keep their one indirect thread.
 
 Measured: ``express`` on questions and replies only, blocking for messages that are sent once, dropping for repeated
 messages (docs/decisions/0003-zenoh-settings.md).
@@ -76,7 +76,7 @@ __all__ = ["ZenohBus", "client_config", "hub_config"]
 log = logging.getLogger(__name__)
 
 _TIMEOUT_PAYLOAD = b"Timeout"
-TELL_WITHIN_S = 0.01  # chosen: copies for recorders are made after a context switch, not in it; a death loses so much
+TELL_WITHIN_S = 0.01  # chosen: copies for recorders are made after a context switch, not in it; a crash loses so much
 
 
 class ZenohBus(LifeBus):
@@ -100,21 +100,21 @@ class ZenohBus(LifeBus):
     ) -> None:
         super().__init__(mission, source, clock, session, is_hub=is_hub)
         self.copies: HostCopies | None = None
-        """For the recorder of this host; see ``use_host``."""
+        """Copies for the recorder of this host; see ``use_host``."""
         self.far = None if shared else FarCopies(session, mission, source)
-        """For the recorder of the mission where it has no socket; settable. Same."""
+        """Copies for the recorder of the mission, if no socket leads to it; settable."""
         self.boards: HostBoards | None = None
-        """For large values to and from this host; settable before they are used."""
+        """Boards for large values to and from this host; settable before the first message."""
         self.subscribers = Subscribers(session)
         """Settable: one for all buses of a session."""
         self._shared = shared
         self._links = None if shared else watch_links(session)
         self._outlets = Outlets(session, mission, source, self.quality, only_elsewhere=shared)
         self.lossless = LosslessStreams(self, session, mission, source, only_elsewhere=shared)
-        """What it sends to listeners that must get every message."""
+        """Streams to listeners that must get every message."""
         self.ways = Ways(self, session, mission, source, only_elsewhere=shared)
-        """To whom it asks again and again."""
-        self._outlet(source, Conversation.TOLD)  # knows who overhears before the first question is answered
+        """Ways to the components that this bus asks repeatedly."""
+        self._outlet(source, Conversation.TOLD)  # so that it knows its overhearers before the first answer
 
     @classmethod
     def open(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -272,7 +272,7 @@ class ZenohBus(LifeBus):
             self._outlet(address, conversation)
 
     def is_overheard(self, conversation: Conversation) -> bool:
-        """Return whether another process hears this conversation of its own address; 0.5 µs."""
+        """Return whether another process hears this conversation at this bus's own address; 0.5 µs."""
         if self.lossless.to(self.source, conversation):
             return True
         return self._outlet(self.source, conversation).has_subscriber
@@ -318,7 +318,7 @@ class ZenohBus(LifeBus):
         return dict(counts)
 
     def _listen_near(self, boards: HostBoards, own: str, reader: Reader[Message], listener: Listener) -> NearListening:
-        """Listen to one key, by the boards of this host where its senders have some."""
+        """Listen to one key, from boards of this host if its senders have some."""
 
         def declare(receive: Callable[[zenoh.Sample], None]) -> Any:
             return self.subscribers.declare(own, receive)
@@ -343,7 +343,7 @@ class ZenohBus(LifeBus):
         *,
         lossless: bool = False,
     ) -> Overhearing:
-        """Subscribe to whole conversations, unread; see ``Bus.overhear``."""
+        """Subscribe to whole conversations, without decoding them; see ``Bus.overhear``."""
         self.require_open()
         heard = OverheardSamples(self, listener, most_waiting_bytes)
         expression = key(self._mission, of, conversation) if of else key_of_all(self._mission, conversation)

@@ -1,8 +1,8 @@
-"""Copies by network: what a process sends that reaches the recorder of its mission by no socket.
+"""Copies by network, from processes without a socket to the recorder of their mission.
 
-Such are the processes of other hosts, consoles elsewhere, and any process until it has found the socket. Nobody else
-publishes them, so the recorder is woken for no message of its own host. Pictures are left out: the recorder of their
-own host has them.
+These are processes of other hosts, consoles elsewhere, and each process until it has found the socket. Other processes
+publish no such copies, so the network brings the recorder no message of its own host. Pictures are left out, because
+the recorder of their own host has them.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from backbone.bus.host_copies import PICTURES, HostCopies, header_of
 from backbone.keys import COPIED, Conversation, key
 from backbone.quality import QUALITY
 
-GATHER_S = 0.01  # as ``zenoh_bus.TELL_WITHIN_S``: a death loses so much
-MOST_BYTES = 256 * 1024  # chosen: what gathers in 10 ms is far less; more is published at once
+GATHER_S = 0.01  # as ``zenoh_bus.TELL_WITHIN_S``: a crash loses so much
+MOST_BYTES = 256 * 1024  # chosen: far more than gathers in 10 ms; a larger amount is published at once
 
 
 class Copier(Protocol):
-    """Takes copies of messages for a recorder."""
+    """Sends copies of messages to a recorder."""
 
     def send(self, key: str, raw: bytes) -> None:
         """Send a copy, or drop it. Never waits."""
@@ -42,7 +42,7 @@ class FarCopies:
         )
 
         def changed(status: zenoh.MatchingStatus) -> None:
-            self._is_matched = bool(cast("Any", status).matching)  # zenoh's stubs say bool of the status
+            self._is_matched = bool(cast("Any", status).matching)  # zenoh's stubs declare the status as bool
 
         self._matching: Any = self._publisher.declare_matching_listener(
             zenoh.handlers.Callback(changed, indirect=False)
@@ -50,9 +50,10 @@ class FarCopies:
         self._is_matched = self._is_matched or bool(cast("Any", self._publisher.matching_status).matching)
 
     def wants(self, conversation: Conversation) -> bool:
-        """Return whether a recorder listens to this conversation, as far as is known; a new session does not know yet.
+        """Return whether to send copies of this conversation, because a recorder listens.
 
-        An output is followed by the next one soon; of others the first may be the last for long.
+        A new session does not know its recorder yet. It then copies no outputs, because the next output follows soon.
+        It copies all other conversations, because their first message may be the last one for a long time.
         """
         if conversation in PICTURES:
             return False
@@ -70,7 +71,7 @@ class FarCopies:
             self._publish()
 
     def close(self) -> None:
-        """Publish what waits, and send no more. Idempotent."""
+        """Publish the waiting copies, and send no more. Idempotent."""
         self._publish()
         self._is_open = False
 
@@ -81,7 +82,7 @@ class FarCopies:
 
 
 def copiers(host: HostCopies | None, far: FarCopies | None, conversation: Conversation) -> tuple[Copier, ...]:
-    """Return where copies of a message go: nowhere, to the recorder of this host, by network, or both."""
+    """Return the copiers for a message: none, the recorder of this host, the network, or both."""
     if conversation in COPIED:
         return ()
     near = host if host is not None and host.find_recorder() else None
@@ -92,6 +93,6 @@ def copiers(host: HostCopies | None, far: FarCopies | None, conversation: Conver
 
 
 def send_copies(copies: Sequence[Copier], key: str, raw: bytes) -> None:
-    """Send copies of a message wherever they go."""
+    """Send a copy of a message by each of these copiers."""
     for copier in copies:
         copier.send(key, raw)

@@ -1,4 +1,4 @@
-"""Who lives, on one session of zenoh: tokens of liveliness, and the session's own link to the hub."""
+"""Liveliness on one session of zenoh: tokens, and the session's own link to the hub."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from backbone.keys import Conversation, address_of, key
 
 
 class LifeBus(InboxBus):
-    """What a bus on a session declares, and the part of it that is about life.
+    """Base class of a bus on a session: its declarations, and its methods for liveliness.
 
     Args:
         is_hub: True if the session is the hub itself.
@@ -26,7 +26,7 @@ class LifeBus(InboxBus):
         self._declared: set[Declaration] = set()
 
     def declare_alive(self, address: str) -> Subscription:
-        """Raise this component's liveliness token; see ``Bus.declare_alive``."""
+        """Declare this component's liveliness token; see ``Bus.declare_alive``."""
         self.require_open()
         own = key(self._mission, address, Conversation.ALIVE)
         return self._declare(self._session.liveliness().declare_token(own))

@@ -1,4 +1,4 @@
-"""Where publications leave a bus: one zenoh publisher for each key, and the blackboard of a large conversation."""
+"""Outlets of a bus: one zenoh publisher for each key, and a blackboard for a key of a large conversation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from backbone.quality import OF_ANY_SIZE, Quality, Urgency
 from backbone.wire import Envelope, Message, refuse_oversized, write
 
 MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
-KNOWN_AFTER_S = 1.0  # chosen: the hub has told a new publisher of its subscribers by then; it takes milliseconds
+KNOWN_AFTER_S = 1.0  # chosen: a new publisher knows its subscribers by then; it takes milliseconds
 
 Receiver = Callable[[bytes], None]
 
@@ -27,7 +27,7 @@ _URGENCY = {
 
 
 def on_the_wire(quality: Quality) -> dict[str, Any]:
-    """Return a quality in zenoh's words, for a publisher or a single publication."""
+    """Return a quality as settings of zenoh, for a publisher or a single publication."""
     control = zenoh.CongestionControl
     return {
         "priority": _URGENCY[quality.urgency],
@@ -40,9 +40,9 @@ class Outlet:
     """The publisher of one key.
 
     Args:
-        known_s: When the hub has told it of the subscribers that it has from the beginning.
-        board: For listeners of its host.
-        declare_token: Lets listeners know this sender of the key.
+        known_s: Time from which the publisher knows the subscribers that were there before it.
+        board: Board for listeners on this host; None: there is none.
+        declare_token: Declares the token by which listeners find this sender of the key.
     """
 
     def __init__(
@@ -62,14 +62,14 @@ class Outlet:
         self._matching = self._watch_matching() if board is not None else None
 
     def is_heard(self, now_s: float) -> bool:
-        """Return whether the network may have a subscriber of large values. A new publisher does not know it yet."""
+        """Return whether the network may have a subscriber of large values; True while the publisher is new."""
         return self._is_matched or now_s < self._known_s
 
     def _watch_matching(self) -> Any:
-        """Be told of subscribers, because to ask for each picture takes as long as to send it."""
+        """Watch for subscribers, because to ask zenoh before each picture takes as long as to send it."""
 
         def changed(status: zenoh.MatchingStatus) -> None:
-            self._is_matched = bool(cast("Any", status).matching)  # zenoh's stubs say bool of the status
+            self._is_matched = bool(cast("Any", status).matching)  # zenoh's stubs declare the status as bool
 
         return self.publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
 
@@ -83,9 +83,9 @@ class Outlet:
         return now_s >= self._known_s and not self.has_subscriber
 
     def send(self, envelope: Envelope[Message], apart: Sequence[Receiver], now_s: float) -> None:
-        """Publish a message, and give its bytes to these others, too.
+        """Publish a message, and pass its bytes to the receivers ``apart``, too.
 
-        Of values that come repeatedly and have no listener, not even the bytes are made: the next one follows soon.
+        A repeated value without a listener is not even encoded, because the next one follows soon.
 
         Raises:
             OversizedMessage: The message is longer than its quality admits; no listener gets it.
@@ -103,7 +103,7 @@ class Outlet:
     def _send_large(
         self, board: SentBoard, envelope: Envelope[Message], apart: Sequence[Receiver], now_s: float
     ) -> None:
-        """Leave the message on the board, and send it by the network if a subscriber is there."""
+        """Put the message on the board, and publish it if the network may have a subscriber."""
         is_heard = self.is_heard(now_s)
         if not (is_heard or apart or board.is_read):
             return
@@ -120,7 +120,7 @@ class Outlet:
             send(raw)
 
     def _raise_token(self) -> None:
-        """Let listeners know this sender again, because its board was opened."""
+        """Declare the token again, so that listeners find the board that was opened."""
         if self._token is not None:
             self._token.undeclare()  # type: ignore[no-untyped-call]
         self._token = self._declare_token()
@@ -136,7 +136,7 @@ class Outlet:
 
 
 class Outlets:
-    """The outlets of one bus, those that were used last.
+    """The outlets of one bus that were used last.
 
     Args:
         quality_of: Returns the quality of the key of an address and a conversation.
@@ -172,7 +172,7 @@ class Outlets:
 
     @property
     def is_full(self) -> bool:
-        """Whether one more takes the place of another."""
+        """Whether a further outlet replaces another one."""
         return len(self._outlets) >= MOST_PUBLISHERS
 
     def close(self) -> None:
@@ -182,7 +182,7 @@ class Outlets:
         self._outlets.clear()
 
     def close_boards(self) -> None:
-        """Let the readers of all boards go; the session withdraws the rest."""
+        """Close all boards for their readers; the session withdraws the rest."""
         for outlet in self._outlets.values():
             if outlet.board is not None:
                 outlet.board.close()

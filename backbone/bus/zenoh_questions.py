@@ -1,12 +1,12 @@
 """Direct questions: a component that is asked repeatedly is asked by publication, which is quicker than a query.
 
 A query costs a third message and an entry in the hub's table of open queries. So the answer to a query names the inbox
-of the component that gave it. From the third question on the asker publishes its questions there, and the answers are
-published to the inbox of the asker. On one host questions and answers go by a line between the two processes instead,
+of the component that answered. From the third question on, the asker publishes its questions there, and the answers are
+published to the inbox of the asker. On one host questions and answers go over a line between the two processes instead,
 see ``host_lines``.
 
-* An inbox belongs to one life of one component. A component that begins anew has another one, and is found by a query.
-* The hub reports whether an inbox has its owner. When it loses the owner, open questions end without an answer, as
+* An inbox belongs to one life of one component. A restarted component has another inbox, and a query finds it.
+* The hub reports whether the owner of an inbox is there. If the owner is gone, open questions end without an answer, as
   queries do, but ``STILL_COME_S`` later, because such a report may overtake the owner's last answer.
 * While a query to a component is open, the next question is a query, too. So no question overtakes an earlier one.
 """
@@ -66,11 +66,11 @@ class OpenQuestions:
         return self._number
 
     def remove(self, number: int) -> None:
-        """Wait for this answer no more."""
+        """Stop waiting for this answer."""
         del self._waiting[number]
 
     def arrived(self, sample: zenoh.Sample) -> None:
-        """Take an answer."""
+        """Settle the question to which this answer belongs."""
         attached = b"" if sample.attachment is None else sample.attachment.to_bytes()
         if len(attached) != _NUMBER.size + 1:
             return
@@ -82,8 +82,8 @@ class DirectWay:
     """The way to the inbox of one life of a component, through the hub.
 
     Args:
-        open_questions: Of the bus, by number.
-        lost: Called when the inbox has lost its owner.
+        open_questions: Open questions of the bus, by number.
+        lost: Called when the owner of the inbox is gone.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class DirectWay:
         self._listener = publisher.declare_matching_listener(zenoh.handlers.Callback(changed, indirect=False))
 
     async def ask(self, payload: bytes, answered: asyncio.Future[Came]) -> Came:
-        """Return what came of a question."""
+        """Return the outcome of a question."""
         number = self._open.add(answered)
         self.waiting.append(answered)
         try:
@@ -117,7 +117,7 @@ class DirectWay:
             self.waiting.remove(answered)
 
     def close(self) -> None:
-        """Withdraw it. Questions that wait still do, as long as their answers can have been sent before."""
+        """Withdraw the way. Open questions wait ``STILL_COME_S`` longer, because their answers may be under way."""
         self.is_open = False
         self._listener.undeclare()  # type: ignore[no-untyped-call]
         self._publisher.undeclare()  # type: ignore[no-untyped-call]
@@ -134,7 +134,7 @@ Way = DirectWay | LineWay
 
 
 class Ways:
-    """The ways of one bus to those whom it asks again and again.
+    """The ways of one bus to the components that it asks repeatedly.
 
     Args:
         own: Address of the bus's component.
@@ -146,10 +146,10 @@ class Ways:
         self._destination = zenoh.Locality.REMOTE if only_elsewhere else zenoh.Locality.ANY
         self.questions = OpenQuestions(new_inbox_key(mission, own, "answers"))
         self.lines: HostLines | None = None
-        """To other processes of this host; settable."""
+        """Lines to other processes of this host; settable."""
         self._subscriber: zenoh.Subscriber[None] | None = None
         self._querying = Counter[str]()
-        self._answered_by: OrderedDict[str, bytes] = OrderedDict()  # address → who answered the last query
+        self._answered_by: OrderedDict[str, bytes] = OrderedDict()  # address → names in the answer to the last query
         self._ways: dict[str, Way] = {}
 
     def way_to(self, address: str) -> Way | None:
@@ -160,7 +160,7 @@ class Ways:
         return way
 
     async def ask(self, way: Way, payload: bytes, answered: asyncio.Future[Came], within_s: float) -> Came:
-        """Return what came of the question; None, too, if the bus is closed meanwhile."""
+        """Return the outcome of a question; None, too, if the bus is closed meanwhile."""
         late = asyncio.get_running_loop().call_later(max(0.0, within_s), settle, answered, TooLate)
         try:
             return await way.ask(payload, answered)
@@ -179,7 +179,7 @@ class Ways:
                 del self._querying[address]
 
     def answered(self, address: str, attached: zenoh.ZBytes | None) -> None:
-        """Note who answered a query to this address; the second answer of one life makes a way to it."""
+        """Record the inbox in an answer to a query; the second answer with one inbox makes a way to it."""
         called = b"" if attached is None or len(attached) > LONGEST_KEY else attached.to_bytes()
         inbox, _line, host = called.decode(errors="replace").partition(_ON_HOST)
         if not is_inbox(inbox, self._mission, "asked", address):
@@ -234,7 +234,7 @@ class DirectQuestion:
 
     @classmethod
     def of(cls, session: zenoh.Session, mission: str, sample: zenoh.Sample) -> DirectQuestion | None:
-        """Return the question in a sample; None: it names no asker of this mission, who could be answered."""
+        """Return the question in a sample; None: it names no inbox of this mission for its answer."""
         attached = sample.attachment
         raw = b"" if attached is None or len(attached) > LONGEST_KEY else attached.to_bytes()
         answers = raw[_NUMBER.size :].decode(errors="replace")
@@ -253,7 +253,7 @@ class DirectQuestion:
         self.answer(payload)
 
     def drop(self) -> None:
-        """Say that there is no answer, unless there was one."""
+        """Report that there is no answer, unless one was sent."""
         if not self._is_answered:
             with suppress(zenoh.ZError):  # the session is closed: the asker learns from the hub that the inbox is gone
                 self._session.put(self._answers, b"", attachment=self._number + _UNANSWERED, **_EXPRESS)
@@ -280,7 +280,7 @@ class Query:
 
 
 Asked = Query | DirectQuestion | HostQuestion
-"""A question that came, by any way."""
+"""A question that came by one of the three ways."""
 
 
 def new_inbox(mission: str, address: str) -> str:

@@ -70,7 +70,7 @@ async def open_when_up(config: zenoh.Config) -> zenoh.Session:
 
 
 def watch_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None]:
-    """Keep the close of this session's TCP links from blocking, while the result is kept."""
+    """Keep the close of this session's TCP links from blocking, as long as the caller keeps the result."""
 
     def changed(event: zenoh.LinkEvent) -> None:
         if event.kind == zenoh.SampleKind.PUT and event.link.src.startswith("tcp/"):

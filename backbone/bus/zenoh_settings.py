@@ -1,6 +1,6 @@
 """Settings of a Zenoh session, as plain data: of a client and of a hub. Pure.
 
-Measured settings: clients of one hub, no scouting, lease 2 s, but 8 s where no link leaves the host
+Measured settings: clients of one hub, no scouting, lease 2 s, but 8 s if no link leaves the host
 (docs/decisions/0003-zenoh-settings.md).
 """
 
@@ -14,7 +14,7 @@ LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses
 HOST_LEASE_MS = 8000  # chosen: a unix socket cannot be cut, and a creator replaces a hung process after 3 s
 KEEP_ALIVES = 4  # chosen: in each lease, so that three may be late
 RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
-OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine is there within this
+OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine listens within this time
 WAIT_BEFORE_CLOSE_US = 1_000_000  # chosen: the longest time for which a hung consumer may block a sender
 _QUIET = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
 _RETRY = {"period_init_ms": RETRY_FIRST_MS, "period_max_ms": RETRY_MOST_MS, "period_increase_factor": RETRY_FACTOR}

@@ -1,7 +1,7 @@
-"""The subscribers of one session: one of zenoh for each pattern of keys, however many listeners of the process it has.
+"""The subscribers of one session: one zenoh subscriber for each pattern of keys, for all listeners of the process.
 
-Each subscriber of zenoh has a thread. The members of a shared process listen to the same keys, such as the leases: one
-thread wakes for all of them.
+Each subscriber of zenoh has a thread. The members of a shared process listen to the same keys, such as the leases, so
+one thread wakes for all of them.
 """
 
 from __future__ import annotations
@@ -57,5 +57,5 @@ class Subscribed:
         self._withdraw = withdraw
 
     def undeclare(self) -> None:
-        """Withdraw it; once."""
+        """Withdraw the subscription. Call it only once."""
         self._withdraw()

@@ -1,7 +1,7 @@
-"""Abilities: what components of one class can be commanded to do, and what they report, as data.
+"""Abilities: the commands and reports of the components of one class, as data.
 
-Consoles draw controls and gauges from it, so a new kind of robot or device needs no change there. A class declares its
-commands and reports as structs; units come from the names of their fields, ranges from the types of these.
+Consoles draw controls and gauges from them, so a new kind of robot or device needs no change in the consoles. A class
+declares its commands and reports as structs; units come from the names of the fields, ranges from their types.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ UNITS = {
     "v": "V",
     "s": "s",
 }
-"""Last words of a field's name → unit for people; of several that fit, the first."""
+"""Last words of a field's name → unit for people; the first entry that fits counts."""
 
 
 UNLIMITED = 1e18  # the limit of all numbers on the bus, ``ranges.Measure``
@@ -54,8 +54,8 @@ class FieldForm(Message, frozen=True):
         unit: Its unit for people; empty: none.
         least: Smallest value, at least minus ``UNLIMITED``.
         most: Largest value, at most ``UNLIMITED``.
-        default: Its value if it is left out.
-        is_required: True if it cannot be left out.
+        default: Its value if a command leaves it out.
+        is_required: True if no command can leave it out.
         choices: Its legal values, if they are words.
         doc: Its meaning, for people.
     """
@@ -79,7 +79,7 @@ class CommandForm(Message, frozen=True):
         fields: Its fields, in their order.
         moves: True if a stopped robot refuses it.
         roles: Roles of the RCs that obey it; empty for an RC.
-        doc: What it does, for people.
+        doc: Its effect, for people.
     """
 
     word: Mention
@@ -90,12 +90,12 @@ class CommandForm(Message, frozen=True):
 
 
 class CameraForm(Message, frozen=True):
-    """The camera of a robot: where it sits, and how much of the room is in its picture.
+    """The camera of a robot: its place on the robot, and its angle of view.
 
     Attributes:
-        forward_m: Before the point that the robot's pose is of.
-        height_m: Above the floor.
-        tilt_rad: How far it looks upwards, as the robot stands.
+        forward_m: Distance in front of the point to which the robot's pose refers.
+        height_m: Height above the floor.
+        tilt_rad: Angle of its view above the horizontal while the robot stands.
         across_rad: Angle between the left edge of the picture and the right edge; the picture's pixels are square.
     """
 
@@ -113,9 +113,9 @@ class Abilities(Message, frozen=True):
         gives_pictures: True for an ARC whose owner gets pictures.
         body: Role of the RC with a body in an ARC; empty: none.
         body_class: Class path of the body of a robot's RC in a simulated world; empty: the mission file names one.
-        commands: What an RC obeys, or an ARC passes on.
+        commands: Commands that an RC obeys, or that an ARC passes on.
         reports: Fields of its reports.
-        camera: The camera of a robot, which lets consoles tell places in its picture; None: none is declared.
+        camera: The camera of a robot, from which consoles compute places in its picture; None: none is declared.
     """
 
     is_robot: bool = False

@@ -18,8 +18,8 @@ async def ask_until_answered(
 ) -> Reply:
     """Ask, and after every ``LinkError`` ask again after a growing pause.
 
-    A question counts for at most the time it may take: if this process itself was stopped meanwhile, that time is no
-    silence of the receiver.
+    A question counts for at most ``each_s``. So if this process itself was stopped meanwhile, that time does not count
+    as silence of the receiver.
 
     Args:
         question: An idempotent question.

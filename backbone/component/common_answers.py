@@ -51,10 +51,10 @@ class Answering(Protocol):
         """Return address, process and state."""
 
     def statistics(self) -> dict[str, float]:
-        """Return the counts of its own."""
+        """Return the component's own counts."""
 
     def change_parameters(self, changed: Mapping[str, object]) -> None:
-        """Put other values for these in force."""
+        """Replace the values of these parameters."""
 
     def end(self, reason: str) -> None:
         """End in good order."""
@@ -67,7 +67,7 @@ class CommonAnswers:
     """Answers for one component.
 
     Args:
-        component: Its state, clock, story and parameters are asked for; an order ends it, or changes its parameters.
+        component: The component that is asked, and that orders end or change.
     """
 
     def __init__(self, component: Answering) -> None:

@@ -2,7 +2,7 @@
 
 A component is a class with a few hooks. The shell in this file calls the hooks in their order, answers the common
 questions of every component, and declares the liveliness token last, so that the component answers as soon as its
-token stands.
+token exists.
 
 Rule: a bug ends the component. Its process exits with an error, its creator reports and restarts it.
 """
@@ -70,10 +70,10 @@ class Component(Generic[P_co]):
     is_robot: ClassVar[bool] = False
     """True for the RC of a robot, which operators can stop."""
     shares_process: ClassVar[bool] = True
-    """False for a class that computes for long; where the mission file names no process, it then has one of its own."""
+    """False for a class that computes for long: unless the mission file names a process, it has one of its own."""
     alike_most: ClassVar[int] = 0
-    """Most components of this class that share a process with each other, where a host has more of them and the mission
-    says nothing of processes; 1: each has its own; 0: the placer's default, or 1 if ``shares_process`` is False."""
+    """Most components of this class in one process, if a host has more of them and the mission file names no process;
+    1: each has its own; 0: the placer's default, or 1 if ``shares_process`` is False."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the registry itself."""
 
@@ -84,14 +84,14 @@ class Component(Generic[P_co]):
 
     @classmethod
     def abilities(cls) -> Abilities:
-        """Return what its components can be commanded to do, and what they report."""
+        """Return the commands and reports of its components."""
         return NO_ABILITIES
 
     @classmethod
     def before_bus(cls, launch: Launch) -> None:
         """Prepare the process.
 
-        When: at the begin of a new process, before the event loop and before any bus is open.
+        When: at the start of a new process, before the event loop and before any bus is open.
         What: fork a zygote, which is impossible later.
         Not: anything that needs other components.
         """
@@ -179,12 +179,12 @@ class Component(Generic[P_co]):
     def calm_s(self) -> float:
         """Return how long news wait for further news, seconds of the machine.
 
-        When: before each ``publish_news``. Override where news take long to make.
+        When: before each ``publish_news``. Override if news take long to make.
         """
         return CALM_S
 
     def publish_news(self) -> None:
-        """Publish the component's news: its state, if it is another than the one that was published last.
+        """Publish the component's news: its state, if it differs from the last published one.
 
         When: ``CALM_S`` after ``report`` or ``changed``, once for all news in between.
         """
@@ -208,11 +208,11 @@ class Component(Generic[P_co]):
         return self._state
 
     def with_parameters(self, changed: Mapping[str, object]) -> P_co:
-        """Return the parameters with other values for these, or raise ``WrongParameter``."""
+        """Return the parameters with these values replaced, or raise ``WrongParameter``."""
         return cast(P_co, _convert({**msgspec.to_builtins(self.parameters), **changed}, self.parameters_type))
 
     def change_parameters(self, changed: Mapping[str, object]) -> None:
-        """Put other values for these in force, unless they do not fit or ``parameters_changed`` refuses them."""
+        """Replace these parameters, unless the values do not fit or ``parameters_changed`` refuses them."""
         before, self.parameters = self.parameters, self.with_parameters(changed)
         try:
             self.parameters_changed()
@@ -265,7 +265,7 @@ class Component(Generic[P_co]):
             self._bug = bug
             self.feedback = complaint(bug)
             self.story.note(self.name, f"failed: {self.feedback}")
-            is_refusal = isinstance(bug, BackboneError)  # its detail says more than a traceback
+            is_refusal = isinstance(bug, BackboneError)  # its detail is clearer than a traceback
             log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_refusal else bug)
         self._end.set()
 
@@ -332,7 +332,7 @@ class Component(Generic[P_co]):
                     if connected:
                         await self._serve_until_end()
                 finally:
-                    self._end.set()  # also when it is killed: later messages begin no work
+                    self._end.set()  # also if it is killed, so that later messages start no work
                     self._group = None
                 for task in self._tasks:
                     task.cancel()
@@ -388,7 +388,7 @@ class Component(Generic[P_co]):
 
 
 AnyComponent = Component[msgspec.Struct]
-"""A component whose kind of parameters does not matter."""
+"""A component with parameters of any kind."""
 
 
 def _convert(values: dict[str, object], kind: type[msgspec.Struct]) -> msgspec.Struct:

@@ -1,4 +1,4 @@
-"""What the docstrings of a struct say of it and of its fields."""
+"""Descriptions of a struct and of its fields, from its docstrings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _ENTRY = re.compile(r"^    (\w+): (.*)$")
 
 
 def field_docs(struct: type) -> dict[str, str]:
-    """Return field → what the docstrings of a struct and its bases say of it."""
+    """Return field → its description in the docstrings of a struct and of its bases."""
     found: dict[str, str] = {}
     for base in reversed(struct.__mro__):
         _, _, section = inspect.cleandoc(base.__dict__.get("__doc__") or "").partition("Attributes:\n")

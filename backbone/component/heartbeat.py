@@ -1,8 +1,8 @@
 """Heartbeat of a process: the time stamp of a small file, which its event loop increments and its creator reads.
 
-The heartbeat does not use the bus, so a lost hub never makes a process look hung. A time stamp needs no disk space: on
-a full disk only the line with the present step is missing. A ready process that could not create its file is never
-taken as hung.
+The heartbeat does not use the bus, so a lost hub never makes a process seem hung. A time stamp needs no disk space: on
+a full disk only the line with the present step is missing. If a ready process could not create its file, it never
+counts as hung.
 
 Prior art: systemd's watchdog notifications. Here the supervisor reads at its own pace.
 """

@@ -20,7 +20,7 @@ class Launch(Message, frozen=True):
         clock_rate: Mission seconds per second of the machine.
         parameters: Values for the class's ``Parameters``.
         requester: Address of the component's owner.
-        run_directory: Folder of the mission's files on this host; gone when the mission has ended.
+        run_directory: Folder of the mission's files on this host; removed when the mission has ended.
         process: Name of the shared process; empty: a process of its own. Without a class path this is the launch of
             the shared process itself, and ``requester`` is its creator.
         incarnation: Id of this life of the component, ``<host>.<pid of the creator>.<number>``, unique in the

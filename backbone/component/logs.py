@@ -4,8 +4,9 @@ The log file is a process's standard output and error, so it also holds the last
 libraries. When the file has grown beyond ``LOG_BYTES``, it is renamed to ``NAME.log.1``, which replaces an older one,
 and the process redirects its descriptors to a new file.
 
-Each process holds a lock on its log, so a starting process distinguishes logs of living and of ended components. Of
-ended components the newest ``ENDED_KEPT`` logs stay. A line that cannot be written is lost; no process ends for it.
+Each process holds a lock on its log, so a starting process distinguishes logs of living and of ended components. The
+newest ``ENDED_KEPT`` logs of ended components stay. A line that cannot be written is lost; no process ends because of
+it.
 """
 
 from __future__ import annotations
@@ -24,10 +25,10 @@ from backbone.component.repeats import Repeats
 from backbone.operating_system.file_locks import lock_alone_nowait, lock_together
 from backbone.printable_text import printable_lines
 
-LOG_BYTES = 1 << 20  # chosen: a day of an honest component; with the one before it, two
+LOG_BYTES = 1 << 20  # chosen: a day of an honest component; together with the former file, two days
 LINE_BYTES = 8192  # chosen: a long traceback; a longer line quotes a hostile message
 LOOK_EVERY_BYTES = LOG_BYTES // 16
-LOOK_EVERY_S = 5.0  # chosen: limits the output of C libraries too; they write some megabytes meanwhile at worst
+LOOK_EVERY_S = 5.0  # chosen: also limits the output of C libraries, which write at most some megabytes in this time
 ENDED_KEPT = 32  # chosen: of ended consoles; more than a person reads
 FOLDER_BYTES = 64 << 20  # chosen: a mission of 30 components with two full files each
 TIDY_EVERY_S = 10.0  # chosen: a mission of 400 components starts in less, and tidies once

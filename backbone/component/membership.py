@@ -1,7 +1,7 @@
 """Messages to a shared process. Only the creator that started the process sends them.
 
-A component in such a process is its *member*. Each admission has a number, its *life*: a name that is admitted again
-after its end begins another life.
+A component in such a process is its *member*. Each admission has a number, its *life*. If a name is admitted again
+after its end, another life begins.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from backbone.ranges import Count, ExitCode
 from backbone.wire import Message
 
 PROCESSES = f"{Subsystem.BACKBONE}/*/*/*"
-"""Addresses of all shared processes, for watching their tokens; a token rises when its process serves."""
+"""Addresses of all shared processes, for watching their tokens; a process declares its token when it serves."""
 
 
 class BeginMember(Message, frozen=True):
@@ -28,7 +28,7 @@ class BeginMember(Message, frozen=True):
 
 
 class MemberBegun(Message, frozen=True):
-    """Answer to ``BeginMember``: the member's life has begun. Its own token rises when it is ready."""
+    """Answer to ``BeginMember``: the member's life has begun. When it is ready, it declares its own token."""
 
 
 class AwaitEnd(Message, frozen=True):

@@ -11,14 +11,14 @@ from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid
 from backbone.wire import Message
 
 MESSAGES_DROPPED, DEADLINES_MISSED = "dropped ", "deadlines missed "
-"""Begins of the names of statistics; a key without ``scout/<mission>/`` follows."""
+"""Prefixes of names of statistics; a key without ``scout/<mission>/`` follows."""
 
 
 class LifeState(StrEnum):
     """State of a component's life cycle; it only moves downwards in this list."""
 
     CONNECTING = "connecting"  # exists, does not answer yet
-    READY = "ready"  # its liveliness token stands
+    READY = "ready"  # its liveliness token exists
     DRAINING = "draining"  # finishes its work, begins none
     STOPPED = "stopped"  # left the bus in good order
     FAILED = "failed"  # ended by a bug; its process is ending
@@ -105,7 +105,7 @@ class Register(Message, frozen=True):
 
 
 class Registered(Message, frozen=True):
-    """Answer to ``Register``: the component holds the name until its liveliness token falls."""
+    """Answer to ``Register``: the component holds the name until its liveliness token ends."""
 
 
 class NameTaken(Refusal):
@@ -133,7 +133,7 @@ class MissionTime(Message, frozen=True):
 
 
 PROCESSOR_S = "processor_s"
-"""Among the statistics: processor time of the component's process with all its threads; not on virtual time."""
+"""Name of a statistic: processor time of the component's process with all its threads; missing on virtual time."""
 
 
 class AskStatistics(Message, frozen=True):

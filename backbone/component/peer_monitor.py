@@ -1,6 +1,6 @@
 """Peer monitor: whether a component on which this one depends is present, hidden for a moment, or gone.
 
-A liveliness token also falls when the link to the hub is cut, and a restarted component declares its token again
+A liveliness token also ends when the link to the hub is cut, and a restarted component declares its token again
 within moments. In both cases the peer is hidden, not gone.
 """
 
@@ -25,25 +25,25 @@ class PeerMonitor:
         self.address = address
         self._gone_after_s = gone_after_s
         self.is_there = False
-        """True while the token stands."""
+        """True while the token exists."""
         self.times_risen = 0
-        """How often the token has risen."""
+        """How often the token has appeared."""
         self._link = True
         self._changed = asyncio.Event()
         self._declared = [bus.watch_link(self._link_changed), bus.watch_alive(address, self._token_changed)]
 
     async def wait_there(self) -> None:
-        """Return when the token stands."""
+        """Return when the token exists."""
         while not self.is_there:
             await self._changed.wait()
 
     async def wait_hidden(self) -> None:
-        """Return when the token does not stand."""
+        """Return when the token does not exist."""
         while self.is_there:
             await self._changed.wait()
 
     async def wait_risen(self, times: int) -> None:
-        """Return when the token has risen ``times`` times; the first counts."""
+        """Return when the token has appeared ``times`` times; the first time counts."""
         while self.times_risen < times:
             await self._changed.wait()
 

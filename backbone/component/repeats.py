@@ -55,7 +55,7 @@ class Repeats:
         counts = []
         for place, window in list(self._windows.items()):
             if now_s < window.began_s + WINDOW_S:
-                break  # windows are in the order of their begins
+                break  # windows are in the order of their starts
             counts += self._close(place)
         while len(self._windows) > MOST_PLACES:
             counts += self._close(next(iter(self._windows)))

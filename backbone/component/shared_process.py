@@ -1,8 +1,8 @@
-"""Shared process: begins without members; its creator admits them.
+"""Shared process: it begins without members, and its creator admits them.
 
 Each member is a component with a bus, a token and a story of its own. The members share the event loop, the session to
 the hub and the pid. If a member ends, also by a bug, the others continue. If a member blocks the event loop, it blocks
-all members, and the whole process is ended.
+all members, and the creator ends the whole process.
 
 SIGTERM ends all members in good order, the last admitted first, and then the process.
 """

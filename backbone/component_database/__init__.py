@@ -1,1 +1,1 @@
-"""Which component types exist and how many of each may run."""
+"""The component types of a mission, and how many components of each may run."""

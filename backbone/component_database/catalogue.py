@@ -3,7 +3,7 @@
 Rules:
 
 * A type of multiplicity ONE may run once, all other types any number of times (RAM 2002, "Backbone").
-* Core services are never admitted; the refusal gives name and host of the running one.
+* Core services are never admitted; the refusal contains name and host of the running one.
 * The nameserver knows the running components; here they are an argument.
 """
 

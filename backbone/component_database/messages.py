@@ -32,7 +32,7 @@ class ComponentType(Message, frozen=True, tag="ComponentType/2"):
         restart: True if the creator restarts its components after every end without an order; False: the owner must ask
             for a new start.
         needs: Role → kind of RC that an ARC holds; empty if it is no ARC type.
-        abilities: What its components can be commanded to do, and what they report.
+        abilities: Commands and reports of its components.
         shares_process: Whether the placer may put its components into a process with others.
         alike_most: Most of its components that the placer puts into one process with each other; 1: none.
     """
@@ -98,7 +98,7 @@ class CoreService(Refusal):
     """Only the bring-up starts core services."""
 
     code = "component_database.core"
-    remedy = "Core services start with 'scout-backbone up' and are restarted by it."
+    remedy = "Nothing to do: 'scout-backbone up' starts core services, and restarts them."
 
 
 class RunningUnknown(Refusal):

@@ -30,7 +30,7 @@ class ComponentDatabaseParameters(msgspec.Struct, frozen=True, forbid_unknown_fi
     """The component types of the mission file.
 
     Attributes:
-        types: In the form of ``msgspec.to_builtins``.
+        types: The types, in the form of ``msgspec.to_builtins``.
     """
 
     types: list[ComponentType] = []

@@ -1,4 +1,4 @@
-"""Alarm: wakes a keeper of processes at the time that its decisions named last."""
+"""Alarm: wakes a keeper of processes at the time that its last decision named."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from backbone.bus.interface import Clock
 
 
 class Alarm:
-    """Rings once at the time that was set last; each later time takes the place of the one before.
+    """Rings once at the time that was set last; each later time replaces the former one.
 
     Args:
         clock: Times are in seconds of the machine.

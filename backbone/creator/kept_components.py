@@ -1,4 +1,4 @@
-"""KeptComponents: the components of a process keeper, and who waits for their starts and ends.
+"""KeptComponents: the components of a process keeper, and the callers that wait for their starts and ends.
 
 Rule of this file: each waiting caller gets an outcome, or waits on because the component is started again.
 """
@@ -19,7 +19,7 @@ from backbone.creator.messages import NotHere, ProcessEnded, RestartPolicy, Spaw
 from backbone.waiting import settle
 
 Report = ReportReady | ReportStartFailed | ReportEnded | ReportLeft | ReportFell
-"""What supervision reports of the start and the end of a component."""
+"""Supervision's reports of the start and the end of a component."""
 
 
 @dataclass
@@ -51,14 +51,14 @@ class KeptComponents(dict[str, Kept]):
             del self[name]
 
     def revise(self, name: str, parameters: dict[str, Any], class_path: str) -> None:
-        """Let the next start have these parameters and, if it is given, this class.
+        """Use these parameters and, if it is given, this class from the next start on.
 
         Raises:
             NotHere: No component of this name is here.
         """
         kept = self.get(name)
         if kept is None:
-            raise NotHere(f"no {name} here", name=name)
+            raise NotHere(f"no component {name} runs here", name=name)
         class_path = class_path or kept.order.class_path
         kept.launch = msgspec.structs.replace(kept.launch, parameters=parameters, class_path=class_path)
         kept.order = msgspec.structs.replace(kept.order, parameters=parameters, class_path=class_path)
@@ -68,7 +68,7 @@ class KeptComponents(dict[str, Kept]):
         kept = self.get(name)
         return kept.launch if kept is not None else None
 
-    # ------------------------------------------------------------------ who waits
+    # ------------------------------------------------------------------ waiting callers
     async def wait_ready(self, name: str) -> int:
         """Return the pid of a starting component when it is ready.
 
@@ -80,13 +80,13 @@ class KeptComponents(dict[str, Kept]):
         return await ready
 
     def ended(self, name: str) -> asyncio.Future[ProcessEnded]:
-        """Return the end to come of a component."""
+        """Return the future of a component's end."""
         ended: asyncio.Future[ProcessEnded] = asyncio.get_running_loop().create_future()
         self._ending.setdefault(name, []).append(ended)
         return ended
 
     def settle(self, report: Report) -> None:
-        """Tell all who wait for what supervision reports."""
+        """Return supervision's report to all callers that wait for it."""
         name = report.name
         match report:
             case ReportReady(pid=pid):
@@ -109,7 +109,7 @@ class KeptComponents(dict[str, Kept]):
         return start_failed(name, how, self.launch_of(name))
 
     def failure(self, name: str) -> StartFailed | None:
-        """Return why a component did not start whose start no caller awaited."""
+        """Return why a component did not start, if no caller waited for its start."""
         return self._failures.get(name)
 
 

@@ -26,15 +26,15 @@ from backbone.ranges import (
 from backbone.wire import Message
 
 TYPE = "creator"
-READY_WITHIN_S = 10.0  # chosen: silence, not time: a starting process that imports, renders or waits for others beats
+READY_WITHIN_S = 10.0  # chosen: of silence; a starting process beats while it imports, renders or waits for others
 CUT_OFF_ENDS_WITHIN_S = (
-    7.0  # chosen: a link counts as cut after 2 s, a cut-off host ends all after 3 s, which takes 2 s
+    7.0  # chosen: 2 s until a link counts as cut, 3 s until a cut-off host ends all, 2 s until all have ended
 )
 START_MOST_S = 180.0  # chosen: a start that is not ready by then has failed, even if it shows signs of life
 
 
 class RestartPolicy(Message, frozen=True):
-    """When the creator replaces a process that hangs or ended without an order.
+    """Rules by which the creator replaces a process that hangs or ended without an order.
 
     Attributes:
         restart: False: never; the owner must ask for a new start.
@@ -97,7 +97,7 @@ class ReviseSpawn(Message, frozen=True):
 
     Attributes:
         parameters: All of them; the running process keeps its own.
-        class_path: Of its next life; empty: as before.
+        class_path: Class path from its next start on; empty: as before.
     """
 
     name: Name
@@ -144,7 +144,7 @@ class ProcessEnded(Message, frozen=True):
 
 
 class ListProcesses(Message, frozen=True):
-    """Ask which processes this creator runs."""
+    """Ask for the processes of this creator."""
 
 
 class ProcessState(Message, frozen=True):
@@ -214,7 +214,7 @@ class StartFailed(Refusal):
     """
 
     code = "creator.start_failed"
-    remedy = "Read the log lines; mend the component or its parameters and start it again."
+    remedy = "Read the log lines; correct the component or its parameters and start it again."
 
 
 class NotHere(Refusal):

@@ -1,4 +1,4 @@
-"""Modules that a creator's zygote imports beforehand: components start sooner and share the memory of what they import.
+"""Modules that a creator's zygote imports beforehand: components start sooner, and share the memory of these modules.
 
 Pure.
 """
@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from backbone.component_database.messages import ComponentType
 
 SHIPPED = ("mission_control.", "resource_pool.")
-"""Packages whose files nobody edits while a mission runs: a component that is started again gets the preloaded code."""
+"""Packages whose files are not edited while a mission runs: a restarted component gets the preloaded code."""
 
 
 def preloaded_modules(types: Iterable[ComponentType], placed: Iterable[str] = ()) -> list[str]:

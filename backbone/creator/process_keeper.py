@@ -57,7 +57,7 @@ from backbone.naming import IllegalName, component_of
 
 log = logging.getLogger(__name__)
 
-OVERLAP_S = 0.3  # chosen: ten times what an obeying component takes; a slower one delays no other
+OVERLAP_S = 0.3  # chosen: ten times longer than a component takes to end; a slower one delays no other
 _DEFAULTS = EndProcess("")
 
 
@@ -72,7 +72,7 @@ class ProcessKeeper:
 
     Attributes:
         on_fell: Called when a process ended unexpectedly.
-        on_silent: Called with name and seconds when a process shows no sign of life, and with 0 when it does again.
+        on_silent: Called with name and seconds when a process shows no sign of life, and with 0 when it responds again.
         on_changed: Called after every change of ``processes()``.
         on_bug: Called with each exception that is a bug.
     """
@@ -106,7 +106,7 @@ class ProcessKeeper:
         zygote.on_exit = self._exited
 
     def use(self, bus: Bus) -> None:
-        """From now on learn readiness and ask processes to stop over this bus."""
+        """Use this bus from now on to watch for readiness and to ask processes to stop."""
         self._bus = bus
         self._shared.use(bus)
         bus.watch_alive("*/*", self._token_changed)
@@ -134,7 +134,7 @@ class ProcessKeeper:
         """Start the process of the hub and return its pid; its readiness can be seen only after ``use``.
 
         Raises:
-            StartFailed: The system gave no process.
+            StartFailed: The system refused a process.
             AlreadyHere: A component of this name runs, starts or ends here.
         """
         forked: asyncio.Future[int] = asyncio.get_running_loop().create_future()
@@ -150,7 +150,7 @@ class ProcessKeeper:
         """
         one = self._supervision.find(name)
         if one is None:
-            raise self._kept.failure(name) or NotHere(f"no {name} here", name=name)
+            raise self._kept.failure(name) or NotHere(f"no component {name} runs here", name=name)
         if one.end is not None:
             raise self._kept.failed(name, f"is {one.phase}; {one.last_end}")
         if one.phase is Phase.READY:
@@ -165,7 +165,7 @@ class ProcessKeeper:
         """Start the component with these parameters from its next start on; its running process stays as it is.
 
         Args:
-            class_path: Of the next start; empty: as before.
+            class_path: Class path of the next start; empty: as before.
 
         Raises:
             NotHere: No component of this name is here.
@@ -318,7 +318,7 @@ class ProcessKeeper:
     async def _ask_to_stop(self, kept: Kept, within_s: float) -> None:
         try:
             if self._bus is None:
-                raise NoProcess("there is no bus to ask on")
+                raise NoProcess("there is no bus for the request")
             stop = Stop(kept.end_reason, kept.launch.incarnation)
             await self._bus.ask(kept.launch.address, stop, Stopping, within_s=within_s)
         except BackboneError as error:

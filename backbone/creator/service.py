@@ -43,7 +43,7 @@ from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, legal
 from backbone.wire import Envelope, Message
 
-LONGEST_CLASS_PATH = 200  # chosen: as much of a refused class path as a person reads
+LONGEST_CLASS_PATH = 200  # chosen: a person reads no more of a refused class path
 LOAD_EACH_S = 1.0  # HostLoad: "once a second", of the machine
 
 
@@ -52,7 +52,7 @@ class CreatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 
     Attributes:
         tags: Tags of this host, for the placer's choice.
-        preload: Modules that its zygote imports at its start, so that components need not.
+        preload: Modules that its zygote imports at its start, so that components start sooner.
         types: The mission's component types. The creator runs these, except core services, and no others.
     """
 
@@ -100,7 +100,7 @@ class Creator(Component[CreatorParameters]):
         """Watch liveliness tokens; spawn a zygote if this process could not fork one."""
         self._zygote = self._given or await Zygote.spawn_fresh(preload=self.parameters.preload)
         self._zygote.on_lost = lambda: self.publish_event(
-            self.name, "lost its zygote and with it everything it ran", LogLevel.ALARM
+            self.name, "lost its zygote and with it all its components", LogLevel.ALARM
         )
         self._keeper = ProcessKeeper(self._zygote, self.clock, self._read_vitals, self.pid)
         self._keeper.on_fell = self._component_fell
@@ -176,8 +176,8 @@ class Creator(Component[CreatorParameters]):
         """
         if (order.type, order.class_path, order.subsystem) not in self._allowed:
             raise UnlistedType(
-                f"{order.name[:MAX_NAME_LENGTH]}: {order.subsystem} {order.type[:MAX_NAME_LENGTH]} is not run as "
-                f"{order.class_path[:LONGEST_CLASS_PATH]} here"
+                f"{order.name[:MAX_NAME_LENGTH]}: {order.subsystem} {order.type[:MAX_NAME_LENGTH]} with class "
+                f"{order.class_path[:LONGEST_CLASS_PATH]} is no type of this mission"
             )
         legal(order.name)
         if order.process:

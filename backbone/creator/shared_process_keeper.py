@@ -44,7 +44,7 @@ from backbone.naming import Subsystem
 
 log = logging.getLogger(__name__)
 
-ADMIT_EACH_S = 1.0  # chosen: a thousand times what an answer takes
+ADMIT_EACH_S = 1.0  # chosen: a thousand times longer than an answer takes
 AWAIT_EACH_S = 60.0  # chosen: the question stays open until the member ends; it is repeated in case its answer was lost
 
 
@@ -66,7 +66,7 @@ class SharedProcessKeeper:
         Args:
             zygote: Forks and signals the processes.
             clock: Deadlines are in seconds of the machine.
-            supervision: Hears of each member's begin and end.
+            supervision: Gets the start and the end of each member.
             launch_of: Name of a kept component → its launch.
             report: Carries out what supervision decides about a member.
             task: Runs work under a name; the caller cancels it at the end.
@@ -79,7 +79,7 @@ class SharedProcessKeeper:
         self._talks: dict[int, set[asyncio.Task[None]]] = {}
 
     def use(self, bus: Bus) -> None:
-        """Talk to shared processes over this bus from now on."""
+        """Use this bus from now on to reach shared processes."""
         self._bus = bus
 
     def has(self, pid: int) -> bool:
@@ -91,7 +91,7 @@ class SharedProcessKeeper:
         return self._shared.pids()
 
     def wanted(self, launch: Launch) -> None:
-        """Have the component run in the process that its launch names."""
+        """Run the component in the process that its launch names."""
         self._carry_out(self._shared.wanted(launch.name, launch.process, self._now_s()))
 
     def serving(self, process: str, pid: int) -> None:
@@ -103,7 +103,7 @@ class SharedProcessKeeper:
         self._carry_out(self._shared.signalled(name, number))
 
     def observed(self, pid: int, silent_s: float, now_s: float) -> None:
-        """Note for how long the process has shown no sign of life."""
+        """Record for how long the process has shown no sign of life."""
         self._carry_out(self._shared.observed(pid, silent_s, now_s))
 
     def exited(self, pid: int, returncode: int) -> None:
@@ -156,7 +156,7 @@ class SharedProcessKeeper:
         self._carry_out(self._shared.forked(process, pid, self._now_s()))
 
     async def _share_life(self, bus: Bus, at: str, launch: Launch, life: int) -> None:
-        """Have the shared process admit the component, then wait for its end; cancelled when the process ends."""
+        """Ask the shared process to admit the component, then wait for its end; cancelled when the process ends."""
         try:
             await ask_until_answered(
                 bus, self._clock, at, BeginMember(launch, life), MemberBegun, each_s=ADMIT_EACH_S, within_s=math.inf
@@ -181,7 +181,7 @@ class SharedProcessKeeper:
 
     def _required_bus(self) -> Bus:
         if self._bus is None:
-            raise RuntimeError("a shared process serves before there is a bus to hear of it")
+            raise RuntimeError("a shared process serves before its keeper has a bus")
         return self._bus
 
     def _talk(self, pid: int, work: Coroutine[object, None, None], name: str) -> None:

@@ -25,8 +25,8 @@ from enum import StrEnum
 
 from backbone.creator.supervision import TERM_S, describe
 
-SERVES_WITHIN_S = 10.0  # chosen: silence; opening a session takes 15 ms, or 5 s in vain
-ADMITS_WITHIN_S = 5.0  # chosen: silence; an answer takes a millisecond
+SERVES_WITHIN_S = 10.0  # chosen: of silence; a session opens within 15 ms, or fails after 5 s
+ADMITS_WITHIN_S = 5.0  # chosen: of silence; an answer takes a millisecond
 NEVER_S = math.inf
 
 
@@ -94,7 +94,7 @@ class MemberGone:
 
     Attributes:
         returncode: Exit code of the member, or return code of its process.
-        how: For people.
+        how: How it ended, for people.
     """
 
     name: str
@@ -192,7 +192,7 @@ class SharedProcesses:
             return [EndMemberAlone(one.name, one.pid, name, member.life)]
         return []
 
-    # What happened
+    # Events
     def forked(self, process: str, pid: int, now_s: float) -> list[ProcessInstruction]:
         """Record that the process runs."""
         one = self._all[process]
@@ -200,7 +200,7 @@ class SharedProcesses:
         return self.serving(process, pid, now_s) if one.serving_pid == pid else self._and_wake([])
 
     def fork_failed(self, process: str, why: str) -> list[ProcessInstruction]:
-        """Record that the system gave no process."""
+        """Record that the system refused a process."""
         one = self._all.pop(process)
         return self._and_wake([MemberNotStarted(member.name, why) for member in one.members.values()])
 
@@ -262,7 +262,7 @@ class SharedProcesses:
         return self._and_wake(instructions)
 
     def observed(self, pid: int, silent_s: float, now_s: float) -> list[ProcessInstruction]:
-        """Record the silence of this process: its deadlines count from the begin of the silence."""
+        """Record the silence of this process: its deadlines count from the start of the silence."""
         for one in self._all.values():
             if one.pid != pid:
                 continue
@@ -274,7 +274,7 @@ class SharedProcesses:
         return self._and_wake([])
 
     def woken(self, now_s: float) -> list[ProcessInstruction]:
-        """Carry out what is due by ``now_s``."""
+        """Return the instructions that are due by ``now_s``."""
         instructions: list[ProcessInstruction] = []
         for one in list(self._all.values()):
             if one.deadline_s <= now_s:

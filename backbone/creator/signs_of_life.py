@@ -17,7 +17,7 @@ class Sign(NamedTuple):
     Attributes:
         pid: The process.
         silent_s: Seconds of the machine for which it has shown no sign of life.
-        beats: True if it has ever beaten.
+        beats: True if it has written a heartbeat.
     """
 
     pid: int

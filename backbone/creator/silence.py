@@ -1,4 +1,4 @@
-"""Silence: how long a process has shown no sign of life, without the time in which it could not run.
+"""Silence: the time for which a process has shown no sign of life, except time in which it could not run.
 
 Rules of this file: pure; readings of a process go in, seconds come out. The caller owns the clock.
 

@@ -9,8 +9,8 @@ Rules:
   ``shared_processes`` decides about shared processes; here each component has a process of its own.
 * A wanted component is restarted however it ended, after growing pauses, until an order ends it. If its policy is
   without restart, its owner asks for a new start. No window of a policy has more quick restarts than its limit.
-* Only the zygote's report means that a process is dead. A fallen liveliness token does not, because all tokens fall
-  when the hub dies while all components live. A risen token means ready, nothing else.
+* Only the zygote's report means that a process is dead. The end of a liveliness token does not, because all tokens end
+  when the hub dies while all components live. A new token means ready, nothing else.
 * Each ordered start gets exactly one ``ReportReady`` or ``ReportStartFailed``; each ordered end gets exactly one
   ``ReportEnded``, after the whole process tree has ended.
 * A first start that fails by itself (an exit code above 0, silence) is not repeated, because its owner decides. A
@@ -46,7 +46,7 @@ from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHer
 from backbone.creator.silence import SHOWN_AFTER_S
 
 TERM_S = 0.5  # chosen: like EndProcess.term_s, for ends without an order
-LEAVE_S = 0.15  # chosen: from leaving the bus to the end of a process takes 10 ms, on a busy machine ten times that
+LEAVE_S = 0.15  # chosen: a process ends 10 ms after it has left the bus, on a busy machine after ten times that
 NEVER_S = math.inf
 
 
@@ -54,7 +54,7 @@ class Phase(StrEnum):
     """Phase of a supervised process."""
 
     FORKING = "forking"  # ordered from the zygote, no pid yet
-    STARTING = "starting"  # runs, its token has not risen since
+    STARTING = "starting"  # runs, but its token does not exist yet
     READY = "ready"
     ENDING = "ending"  # asked or signalled
     WAITING = "waiting"  # fell, will be restarted
@@ -67,7 +67,7 @@ class _End:
     Attributes:
         ordered: False if it is ended because it did not become ready.
         stage: The last step.
-        not_heard: True if the request to stop got no answer: the process may be ending by itself.
+        not_heard: True if the request to stop got no answer, because the process may be ending by itself.
     """
 
     ask_s: float
@@ -87,7 +87,7 @@ class Supervised:
         pid: Its process, 0 while there is none.
         last_end: How it last ended, for people; empty if it never ended.
         silent_s: Duration of a ready process's silence.
-        absent_since_s: Time of its end or of the begin of its silence; negative while it is ready and responds.
+        absent_since_s: Time of its end or of the start of its silence; negative while it is ready and responds.
     """
 
     name: str
@@ -153,7 +153,7 @@ class Supervision:
         """
         one = self._all.get(name)
         if one is None:
-            raise NotHere(f"no {name} here", name=name)
+            raise NotHere(f"no component {name} runs here", name=name)
         if one.end is not None:
             end = one.end
             end.ordered = True
@@ -173,7 +173,7 @@ class Supervision:
                 one.end = _End(ask_s, term_s, ordered=True)
                 return self._and_wake(_next_stage(one, one.end, now_s))
 
-    # What happened
+    # Events
     def forked(self, name: str, pid: int, now_s: float) -> list[Instruction]:
         """Record that the process runs."""
         one = self._all[name]
@@ -184,12 +184,12 @@ class Supervision:
         return self._and_wake(self._become_ready(one) if one.token_rose else [])
 
     def fork_failed(self, name: str, why: str, now_s: float, returncode: int = 1) -> list[Instruction]:
-        """Record a failed fork: the system gave no process, or the shared process ended with this code."""
+        """Record a failed fork: the system refused a process, or the shared process ended with this code."""
         one = self._all[name]
         return self._and_wake(self._gone(one, one.failure or why, returncode, now_s))
 
     def ready(self, name: str) -> list[Instruction]:
-        """Record that the liveliness token has risen; ignored unless the component is starting."""
+        """Record the component's new liveliness token; ignored unless the component is starting."""
         one = self._all.get(name)
         if one is None or one.end is not None:
             return []
@@ -255,7 +255,7 @@ class Supervision:
         return [_absence(one, now_s) for one in self if one.absent_since_s >= 0 and not _is_ended_on_order(one)]
 
     def woken(self, now_s: float) -> list[Instruction]:
-        """Carry out what is due by ``now_s``."""
+        """Return the instructions that are due by ``now_s``."""
         instructions: list[Instruction] = []
         for one in list(self):
             if one.deadline_s <= now_s:
@@ -297,7 +297,7 @@ class Supervision:
         return [ReportReady(one.name, one.pid)]
 
     def _gone(self, one: Supervised, how: str, returncode: int, now_s: float) -> list[Instruction]:
-        """Decide what follows the end of the process."""
+        """Return the instructions after the end of the process."""
         one.pid, one.last_end, one.last_code, one.deadline_s, one.silent_s = 0, how, returncode, NEVER_S, 0.0
         was_answered, is_ordered = one.start_answered, one.end is not None and one.end.ordered
         came_from_outside = returncode <= 0 and one.end is None and not one.is_abandoned

@@ -43,7 +43,7 @@ from backbone.waiting import settle
 
 log = logging.getLogger(__name__)
 
-FORK_TRIES = 2  # chosen: a zygote killed while it forks is replaced once; a second time is no accident
+FORK_TRIES = 2  # chosen: a zygote that is killed while it forks is replaced once; a second kill is no accident
 _answer_decoder = msgspec.msgpack.Decoder(Answer)
 
 
@@ -64,7 +64,7 @@ class Forks(Protocol):
         """Send the signal to the component's process tree."""
 
     def keep_running(self) -> str:
-        """Continue the zygote if it was stopped; return what was wrong, empty: nothing."""
+        """Continue the zygote if it was stopped; return the fault, empty: none."""
 
     async def close(self) -> None:
         """End the zygote and everything it forked."""
@@ -129,7 +129,7 @@ class Zygote:
         """Start the component and return its pid.
 
         Raises:
-            NoProcess: The system gave no process, or the zygote was killed repeatedly.
+            NoProcess: The system refused a process, or the zygote was killed repeatedly.
         """
         for _ in range(FORK_TRIES):
             body = await self._living_body()
@@ -147,7 +147,7 @@ class Zygote:
         self._body.send(Kill(pid, number))
 
     def keep_running(self) -> str:
-        """Continue the zygote if it was stopped; return what was wrong, empty: nothing.
+        """Continue the zygote if it was stopped; return the fault, empty: none.
 
         A stopped zygote forks no component and reports no end, but its components continue.
         """

@@ -1,1 +1,1 @@
-"""Which hardware exists and what each kind of ARC needs."""
+"""The hardware of a mission, and the RCs that each kind of ARC needs."""

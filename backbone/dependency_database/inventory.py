@@ -2,9 +2,9 @@
 
 Rules:
 
-* A set has for each role another RC of the wanted kind, matches the wish and the features, and respects every link: an
-  RC with links to some RCs of a kind is never combined with another RC of that kind.
-* Sets are in the order of the mission file: the resources of the first role vary slowest.
+* A set has a different RC of the wanted kind for each role, matches the wish and the features, and respects every link:
+  an RC with links to some RCs of a kind is never combined with another RC of that kind.
+* The sets follow the order of the mission file: the resources of the first role vary slowest.
 * The result has at least one set; otherwise a refusal names the part of the wish that no resource matches.
 
 Source: S000, "static dependency database": all hardware available now, described right before the mission.
@@ -59,7 +59,7 @@ class Inventory:
 
     def _refuse_contradictions(self, wanted: FindRcs) -> None:
         if not wanted.roles:
-            raise NoSuchHardware("no kind of hardware is asked for", role="")
+            raise NoSuchHardware("the question names no kind of hardware", role="")
         for what, roles in (("wish", wanted.wish), ("features", wanted.features)):
             for role in roles:
                 if role not in wanted.roles:

@@ -1,15 +1,15 @@
 """Live hardware: RCs that people started in a running mission, and that the mission file does not have.
 
-Nothing of it is stored: the placer has the wish, the RC its parameters. So a restarted dependency database finds it
-again, and so does one that missed a message.
+This file stores nothing, because the placer knows which RCs are wanted, and each RC knows its parameters. So a
+dependency database finds them again after a restart, and after a lost message.
 
 Rules of this file:
 
-* An RC counts once it is ready, if the placer has it under its name and type. A component that the placer did not
-  start is a stranger, and does not count.
-* It counts until the placer has it no more. One that ended without an order comes back, and counts meanwhile.
-* Settling time, release time and features, which only a mission file states, are those of the first resource of its
-  type there.
+* An RC counts once it is ready, if the placer has placed it under its name and type. A component that the placer did
+  not start is a stranger, and does not count.
+* An RC counts until the placer no longer has it. If it ended without an order, it still counts, because it comes back.
+* Only a mission file states settling time, release time and features. An RC gets those of the first resource of its
+  type in the mission file.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ class _Sharing(msgspec.Struct, frozen=True):
 
 
 class LiveHardware:
-    """The RCs of a running mission beside those of its file.
+    """The RCs of a running mission that are not in its file.
 
     Attributes:
-        resources: Name → resource, in the order in which they were taken in.
-        is_sure: False if a component did not answer at the last comparison: it is to be repeated soon.
+        resources: Name → resource, in the order in which they were added.
+        is_sure: False if a component did not answer at the last comparison, so it must be repeated soon.
     """
 
     def __init__(self, bus: Bus, note: Callable[[str, str], object]) -> None:
-        """Begin with none.
+        """Begin without RCs.
 
         Args:
             note: Subject, event → the mission's log.
@@ -64,7 +64,7 @@ class LiveHardware:
         self._alone = asyncio.Lock()
 
     async def compare(self, declared: Sequence[Resource], kinds: Collection[str]) -> bool:
-        """Take in the RCs that are new, and let go those that are not wanted any more; return whether one was.
+        """Add new RCs, and remove RCs that are no longer wanted; return whether the resources changed.
 
         Args:
             declared: The resources of the mission file.
@@ -109,7 +109,7 @@ class LiveHardware:
             self.is_sure = False
         else:
             if resource.type != component.type:
-                self._refuse(name, f"the placer has it as a {resource.type}, it says {component.type}")
+                self._refuse(name, f"the placer has it as a {resource.type}, but it is a {component.type}")
                 return
             if self.resources.get(name) != resource:
                 self._note(name, f"can be claimed: a {resource.type} on {resource.host}, started by hand")
@@ -128,7 +128,7 @@ class LiveHardware:
     def _refuse(self, name: str, why: str) -> None:
         if self._strangers.get(name) != why:
             self._strangers[name] = why
-            self._note(name, f"is not taken in: {why}")
+            self._note(name, f"cannot be claimed: {why}")
 
 
 def resource_like(like: Resource | None, name: str, kind: str, host: str, parameters: dict[str, object]) -> Resource:

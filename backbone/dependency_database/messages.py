@@ -22,7 +22,7 @@ class Resource(Message, frozen=True, tag="Resource/2"):
         disconnect_s: Release time, seconds.
         driver: Name of its RC's driver.
         parameters: Further parameters of its RC.
-        features: Its features, which a wish may ask for (``camera``).
+        features: Its features, which a search may ask for (``camera``).
         links: The only resources with which it can be combined, by kind (a framegrabber's ``video_frequency``, a
             scout's ``command_radio``).
         process: Name of its RC's shared process; empty: a process of its own.
@@ -68,7 +68,7 @@ class FindRcs(Message, frozen=True, tag="FindRcs/2"):
 
     Attributes:
         roles: Role → kind of RC that the ARC needs for it: ``{"scout": "scout", "left_eye": "camera"}``.
-        wish: Role → name wanted for it. Roles left out: any.
+        wish: Role → name wanted for it; a role that is left out may have any RC.
         features: Role → features wanted for it.
     """
 
@@ -82,7 +82,7 @@ class RcSets(Message, frozen=True, tag="RcSets/2"):
 
     Attributes:
         sets: One entry role → name for each set, in the order of the mission file; never empty.
-        sharable: Names of the RCs among them that several ARCs may share.
+        sharable: Names of the RCs in these sets that several ARCs may share.
     """
 
     sets: Annotated[list[Annotated[dict[Mention, Mention], FEW]], MANY]
@@ -93,7 +93,7 @@ class NoSuchHardware(Refusal):
     """No set of existing RCs matches the wish; the detail names the part without a match."""
 
     code = "dependency_database.none"
-    remedy = "Wish for less, or add the hardware to the mission file."
+    remedy = "Ask for fewer names or features, or add the hardware to the mission file."
 
 
 DependencyDatabaseQuestion = AskResources | FindRcs

@@ -1,6 +1,6 @@
 """The dependency database: lists hardware and finds sets of it for ARCs.
 
-The hardware is that of the mission file, and the RCs that people started in the running mission.
+The hardware consists of the resources of the mission file, and of the RCs that people started in the running mission.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from backbone.spoken import counted
 from backbone.waiting import set_within
 from backbone.wire import Envelope, Message
 
-COMPARE_EVERY_S = 20.0  # chosen: every known change is compared at once; this is for the unknown ones
+COMPARE_EVERY_S = 20.0  # chosen: every known change is compared at once; this finds unknown changes
 
 
 class DependencyDatabaseParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The hardware of the mission file.
 
     Attributes:
-        resources: In the form of ``msgspec.to_builtins``, in the order of the mission file.
+        resources: The resources, in the form of ``msgspec.to_builtins``, in the order of the mission file.
         kinds: Types of RCs that an ARC type needs, also those without a resource.
     """
 
@@ -48,7 +48,7 @@ class DependencyDatabaseParameters(msgspec.Struct, frozen=True, forbid_unknown_f
 
 
 class DependencyDatabase(Component[DependencyDatabaseParameters]):
-    """Answers from its parameters and from what placer and RCs know, so a restart loses nothing."""
+    """Answers from its parameters and from the answers of placer and RCs, so a restart loses nothing."""
 
     parameters_type = DependencyDatabaseParameters
     accepts = DependencyDatabaseQuestion
@@ -67,7 +67,7 @@ class DependencyDatabase(Component[DependencyDatabaseParameters]):
         await self._compare()
 
     async def serve(self) -> None:
-        """Compare again at every change of a component that may be an RC, and now and then."""
+        """Compare again at every change of a component that may be an RC, and every ``COMPARE_EVERY_S``."""
         while True:
             await set_within(self._to_compare, COMPARE_EVERY_S if self._by_hand.is_sure else RECONNECT_S)
             self._to_compare.clear()

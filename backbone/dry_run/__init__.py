@@ -1,1 +1,1 @@
-"""A mission on a virtual clock, without a process: its hosts and the begin of its master schedule."""
+"""A mission on a virtual clock, without a process: its hosts and the first part of its master schedule."""

@@ -1,7 +1,7 @@
-"""Dry run of a mission: the hosts of its components, and the begin of its master schedule.
+"""Dry run of a mission: the hosts of its components, and the first part of its master schedule.
 
 A dry run starts no process. It assumes that all hosts are equal and idle, that every component comes up at once, that
-every behavior claims its ARC at the begin and keeps it, and that no console attaches. It calls the deciding code of the
+every behavior claims its ARC at the start and keeps it, and that no console attaches. It calls the deciding code of the
 placer and of the RC manager, so its result equals a mission without disturbances.
 """
 
@@ -46,7 +46,7 @@ class Placed:
 
     Attributes:
         host: Its host; empty: no host is possible.
-        reasons: The reasons of the choice or of the refusal, one line a host.
+        reasons: The reasons of the choice or of the refusal, one line for each host.
     """
 
     name: str
@@ -68,7 +68,7 @@ class Claimed:
         turns: Grants until the end of the dry run.
         first_grant_s: Mission time of the first grant; None: no grant.
         worst_wait_s: Longest wait, including a wait at the end.
-        why: Its state at the end with the reason; None: it was refused.
+        why: Its state at the end, with the reason; None: it was refused.
     """
 
     arc: str
@@ -97,7 +97,7 @@ class DryRun:
         claimed: The requests of its behaviors in the order of the file.
         timetable: The slices of all ARCs.
         trace: Every decision, in the RC manager's format.
-        last: The dry run of the last branch, which finds its resources free; None: the mission has none.
+        last: The dry run of the last branch, with all its resources free; None: the mission has none.
         last_name: Name of its root; empty: none.
     """
 
@@ -126,7 +126,7 @@ class DryRun:
 
 
 def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> DryRun:
-    """Run a mission from its begin without starting a process.
+    """Run a mission from its start without starting a process.
 
     Args:
         for_s: Mission seconds, at least 0; the last branch is tried for at most its own time.

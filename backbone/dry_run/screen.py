@@ -15,7 +15,7 @@ from rich.text import Text
 from backbone.dry_run.run import Claimed, DryRun, Placed
 from backbone.scheduling.rehearsal import Run, Timetable
 
-COLUMNS = 60  # chosen: one a second of the first minute; with names beside it fits a terminal of 100
+COLUMNS = 60  # chosen: one for each second of the first minute; with names they fit a terminal of 100 columns
 RULER_EVERY = 10
 KEYS = string.ascii_uppercase + string.ascii_lowercase
 NO_KEY = "#"

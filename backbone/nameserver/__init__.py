@@ -1,1 +1,1 @@
-"""The registered components of a mission, with host and time; runs the hub."""
+"""Registers the components of a mission, resolves their names, and runs the hub."""

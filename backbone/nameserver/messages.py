@@ -54,7 +54,7 @@ class Appeared(Message, frozen=True):
 
 
 class Disappeared(Message, frozen=True):
-    """Published when a component's liveliness token has fallen."""
+    """Published when a component's liveliness token has ended."""
 
     address: Mention
 

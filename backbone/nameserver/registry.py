@@ -1,18 +1,18 @@
 """Registry: the holder of each name, and whether it is ready.
 
-Events go in (a component registers or introduces itself, a token rises or falls), instructions come out. The caller
+Events go in (a component registers or introduces itself, a token begins or ends), instructions come out. The caller
 owns the bus and the clock.
 
-Every component has two tokens. Its *claim* rises after its registration and carries host and pid; its liveliness
-*token* rises when it is ready. A component holds its name while one of them stands. Until the claim rises, the registry
-keeps the name for ``CLAIM_WITHIN_S``. Without claims, a process that died before its readiness would block the name for
-its successor.
+Every component declares two tokens: its *claim*, with host and pid, after its registration, and its liveliness *token*
+when it is ready. A component holds its name while one of them exists. Until the claim exists, the registry keeps the
+name for ``CLAIM_WITHIN_S``. Without claims, a process that died before its readiness would block the name for its
+successor.
 
 Rules:
 
-* One name, one holder: a registration is refused while the claim or token of another component stands.
-* Truth lives at the edge: after a restart of the hub the registry is empty, tokens return by themselves, and the
-  registry asks the component of each unknown token for its state (``Introduce``).
+* One name, one holder: a registration is refused while the claim or token of another component exists.
+* The components are the only source of truth: after a restart of the hub the registry is empty, tokens return by
+  themselves, and the registry asks the component of each unknown token for its state (``Introduce``).
 * Only the token means readiness, never a component's own state.
 """
 
@@ -63,7 +63,7 @@ class _Entry:
         given_s: Mission time of the registration.
         claims: Processes with a claim to the name; two only after a restart of the hub.
         tokens: Addresses under which a component of this name is ready.
-        announced: True if ``Appeared`` was published since its token rose.
+        announced: True if ``Appeared`` was published for its present token.
     """
 
     state: ComponentState | None = None
@@ -80,7 +80,7 @@ class Registry:
         hub_since_s: Mission time at which the hub began to listen.
         reconnect_s: Mission seconds after that in which components of an earlier hub may reconnect; 0 without an
             earlier hub.
-        claim_within_s: Mission seconds for which a name is kept until its holder's claim rises.
+        claim_within_s: Mission seconds for which a name is kept until its holder declares its claim.
     """
 
     def __init__(self, hub_since_s: float, reconnect_s: float, claim_within_s: float = CLAIM_WITHIN_S) -> None:
@@ -114,7 +114,7 @@ class Registry:
         entry.state, entry.given_s = newcomer, now_s
 
     def claim_changed(self, address: str, host: str, pid: int, *, stands: bool) -> None:
-        """Record that a claim of a process rose or fell."""
+        """Record that a claim of a process began or ended."""
         name, claim = component_of(address), _Claim(address, host, pid)
         if stands:
             self._entries.setdefault(name, _Entry()).claims.add(claim)
@@ -123,7 +123,7 @@ class Registry:
             self._forget_if_gone(name)
 
     def token_changed(self, address: str, *, stands: bool, now_s: float) -> list[Instruction]:
-        """Record that a liveliness token rose or fell."""
+        """Record that a liveliness token began or ended."""
         name = component_of(address)
         if not stands:
             return self._token_fell(name, address, now_s)
@@ -137,7 +137,7 @@ class Registry:
         return [Announce(Appeared(entry.state)), Introduce(address)]
 
     def introduced(self, state: ComponentState) -> list[Instruction]:
-        """Record the state of a component whose token stands."""
+        """Record the state of a component whose token exists."""
         self._introducing.discard(state.address)
         entry = self._entries.get(component_of(state.address))
         if entry is None or state.address not in entry.tokens:
@@ -165,7 +165,7 @@ class Registry:
 
     # ------------------------------------------------------------------ questions
     def is_unknown(self, address: str) -> bool:
-        """Return whether a token stands at this address without a known component."""
+        """Return whether a token exists at this address without a known component."""
         entry = self._entries.get(component_of(address))
         return entry is not None and address in entry.tokens and (entry.state is None or entry.state.address != address)
 
@@ -228,7 +228,7 @@ class Registry:
             del self._entries[name]
 
     def _forget_unclaimed(self, now_s: float) -> None:
-        """Forget holders that died before their claim rose."""
+        """Forget holders that died before they declared their claim."""
         for name, entry in list(self._entries.items()):
             if not entry.tokens and not entry.claims and now_s >= entry.given_s + self._claim_within_s:
                 del self._entries[name]

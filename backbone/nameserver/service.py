@@ -42,7 +42,7 @@ from backbone.wire import Envelope, Message
 log = logging.getLogger(__name__)
 
 HUB_BEGAN = "hub-began"
-INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer within this hangs; only its token is known then
+INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer in this time hangs; then only its token is known
 
 
 class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -192,7 +192,7 @@ class Nameserver(Component[NameserverParameters]):
         self.bus.publish(self.address, Conversation.EVENTS, news)
 
     async def _introduce(self, address: str) -> None:
-        """Ask the component of a token for its state, until it answers or the token falls."""
+        """Ask the component of a token for its state, until it answers or the token ends."""
         while True:
             try:
                 state = await self.bus.ask(address, AskState(), ComponentState, within_s=INTRODUCE_EACH_S)

@@ -1,4 +1,4 @@
-"""Locks on open files, which the system lets go when their process ends, however it ends."""
+"""Locks on open files, which the system releases when their process ends for any reason."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import fcntl
 
 
 def lock_alone_nowait(descriptor: int) -> None:
-    """Have the file alone until it is closed.
+    """Lock the file for this process alone until it is closed.
 
     Raises:
-        BlockingIOError: Another process has it.
+        BlockingIOError: Another process has locked it.
     """
     fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def lock_together(descriptor: int) -> None:
-    """Have the file together with others until it is closed; wait while another has it alone."""
+    """Lock the file together with other processes until it is closed; wait while a process has it alone."""
     fcntl.flock(descriptor, fcntl.LOCK_SH)

@@ -1,7 +1,7 @@
 """Sockets between processes of one user on one machine. Their names end with their processes: no file is left.
 
-Packets arrive whole, in order, or not at all, and no call ever blocks. Linux alone has such names; they belong to the
-network namespace, so processes that a network separates do not meet.
+Packets arrive whole, in order, or not at all, and no call ever blocks. Only Linux has such names. They belong to the
+network namespace, so processes in different network namespaces cannot connect.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def connect(name: str) -> socket.socket:
     """Return a connection to the process of this user that listens at the name.
 
     Raises:
-        OSError: None does, or it has no time, or it is another user's.
+        OSError: No process listens there, it accepts no connection now, or it belongs to another user.
     """
     made = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     try:
@@ -56,9 +56,9 @@ def accept(listening: socket.socket) -> socket.socket:
     """Return the next connection.
 
     Raises:
-        BlockingIOError: There is none.
-        PermissionError: It was another user's, and is closed.
-        OSError: The system refuses it.
+        BlockingIOError: No connection waits.
+        PermissionError: The connection was another user's, and is closed.
+        OSError: The system refuses the connection.
     """
     made, _address = listening.accept()
     try:
@@ -79,7 +79,7 @@ def require_own(connected: socket.socket) -> None:
     """Return if the process at the other end belongs to this user.
 
     Raises:
-        PermissionError: It belongs to another one.
+        PermissionError: It belongs to another user.
     """
     _pid, user, _group = _PEER.unpack(connected.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
     if user != os.geteuid():

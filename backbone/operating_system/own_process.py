@@ -9,7 +9,7 @@ from contextlib import suppress
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME, _PR_SET_CHILD_SUBREAPER = 1, 15, 36  # linux/prctl.h
 _LONGEST_TITLE = 15  # linux/sched.h: TASK_COMM_LEN less its end mark
-_BEHIND = 10  # chosen: half of what there is
+_BEHIND = 10  # chosen: half of the range
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -29,9 +29,9 @@ def set_title(title: str) -> None:
 
 
 def go_behind_others() -> None:
-    """Let other processes of this machine go first from now on, where the system has an order of processes.
+    """Lower this process's priority below other processes of this machine, if the system has priorities.
 
-    For who records, counts or shows: who decides and commands goes first.
+    Processes that record, count or show call this, so that processes that decide and command run first.
     """
     with suppress(OSError):
         os.nice(_BEHIND)

@@ -1,4 +1,4 @@
-"""When a process began, which names one life of its pid, because pids are used again. Imports next to nothing."""
+"""Start time of a process, which identifies one life of its pid, because pids are reused. Imports almost nothing."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""One picture of a mission: what components publish and answer, folded into one model, and the words for it."""
+"""One picture of a mission: one model of the components' publications and answers, and the words for it."""

@@ -6,7 +6,7 @@ Rules of this file: pure; observations go in, the verdict comes out. Each owner 
 * ``ok``: no wanted component is absent.
 * ``degraded``: a wanted component is absent, and its owner is restarting it.
 * ``failed``: a vital component has been absent for longer than ``FAILED_AFTER_S``, or the owner of an absent
-  component has no further attempt to make.
+  component makes no further attempt to start it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from backbone.wire import Message, plain
 LOOK_EVERY_S = 0.5  # chosen: an absence appears within two rounds; machine seconds
 SAY_EVERY_S = 1.0  # chosen: one small message a second from one process; machine seconds
 SILENT_AFTER_S = 2.0  # chosen: two messages of the launcher were missed; machine seconds
-FAILED_AFTER_S = 10.0  # chosen: twice the longest recovery that is an aim (a killed creator, 5 s)
+FAILED_AFTER_S = 10.0  # chosen: twice the longest recovery time among the aims (a killed creator, 5 s)
 
 
 class HealthWord(StrEnum):

@@ -1,11 +1,12 @@
-"""Load: how much processor time each robot, each module and each process of a mission takes, from two readings.
+"""Load: the processor time of each robot, each module and each process of a mission, from two readings.
 
 Rules of this file:
 
-* Processor time is measured for processes. The components of one process have equal parts of its time.
-* A robot's time is that of its RC, with the driver in it, and of the ARCs that hold it or wait for it; an ARC that asks
-  for several robots gives each an equal part.
-* A module's time is what its ``update`` took, as its unit measured it. It is part of the time of the unit's process.
+* Processor time is measured for processes. Each component of a process counts with an equal part of its time.
+* A robot's time is the time of its RC, with the driver in it, and of the ARCs that hold the robot or wait for it. The
+  time of an ARC for several robots counts in equal parts for each robot.
+* A module's time is the duration of its ``update`` calls, as its unit measured it. It is part of the time of the unit's
+  process.
 """
 
 from __future__ import annotations
@@ -26,10 +27,11 @@ Numbers = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True)
 class LoadReading:
-    """What all components said of themselves at about the same time.
+    """The statistics of all components at about the same time.
 
     Attributes:
         at_s: Seconds of the machine's monotonic clock.
+        numbers: Address → the component's statistics.
     """
 
     at_s: float
@@ -41,7 +43,7 @@ class ProcessLoad:
     """A process.
 
     Attributes:
-        components: Those in it, by name.
+        components: Names of its components, sorted.
         processor_s: Its processor time until now.
         cores: Cores that it kept busy between the readings; 1: one whole core.
     """
@@ -59,8 +61,8 @@ class RobotLoad:
 
     Attributes:
         components: Its RC first, then its ARCs.
-        processor_s: As of a process.
-        cores: Same.
+        processor_s: Processor time of these components for the robot until now.
+        cores: Cores that they kept busy for the robot between the readings.
     """
 
     robot: str
@@ -74,8 +76,8 @@ class ModuleLoad:
     """A module.
 
     Attributes:
-        processor_s: How long its updates took until now.
-        cores: Same, between the readings.
+        processor_s: Duration of all its updates until now.
+        cores: Seconds of updates per second between the readings.
         rate_hz: Updates a second between the readings.
         longest_s: Its longest update.
     """
@@ -93,7 +95,7 @@ class Loads:
     """All loads of a mission.
 
     Attributes:
-        silent: Components that did not say, by name.
+        silent: Names of the components without a processor time in their statistics, sorted.
     """
 
     robots: list[RobotLoad]
@@ -105,7 +107,7 @@ class Loads:
 def loads(
     components: Iterable[ComponentState], schedule: Schedule | None, first: LoadReading, then: LoadReading
 ) -> Loads:
-    """Return the loads between two readings; a component that began meanwhile counts from its begin."""
+    """Return the loads between two readings; a component that started between them counts from its start."""
     present = list(components)
     processes = sorted(_processes(present, first, then), key=lambda one: (-one.cores, one.host, one.pid))
     silent = sorted(

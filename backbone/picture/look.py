@@ -1,7 +1,7 @@
-"""Look at a mission from outside: ask the core services, and take their answers into a picture.
+"""Look at a mission from outside: ask the core services, and make a picture of their answers.
 
-A question without an answer never makes the picture look whole: the service that did not answer is absent, and the
-picture's ``problems`` name the gaps.
+A picture with gaps never seems whole: a service that did not answer is absent, and the picture's ``problems`` name the
+gaps.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from backbone.wire import Message
 
 LOOK_TIME_S = 0.8  # chosen: a hung service is shown within 1 s; a starved one answers sooner
 TYPES_WITHIN_S = 4.0  # chosen: the component database waits 3 s for the nameserver
-NAMES_SHOWN = 8  # chosen: a line of a terminal
+NAMES_SHOWN = 8  # chosen: they fit a line of a terminal
 
 
 async def look(
@@ -44,7 +44,7 @@ async def look(
     """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of their answers.
 
     Args:
-        before: The picture to update: an absence keeps its begin, and if the nameserver does not answer the picture
+        before: The picture to update: an absence keeps its start, and if the nameserver does not answer, the picture
             stays as it was, marked as stale. None: a new one.
         schedule: False: only check that the RC manager answers.
         listed: Called with the nameserver's answer, which comes first.
@@ -94,7 +94,7 @@ async def types_of(bus: Bus) -> list[TypeCount]:
 
 
 def _gone_stale(picture: MissionPicture, silence: Absence, now_s: float) -> None:
-    """Leave the picture as it was, but for the time and the nameserver's absence."""
+    """Mark the picture as stale, and set the nameserver's absence; the rest stays as it was."""
     picture.stale_since_s = picture.at_s if picture.stale_since_s is None else picture.stale_since_s
     others = (absence for absence in picture.missed if absence.name != silence.name)
     picture.missed = (*_remembered([silence], picture.missed), *others)
@@ -136,7 +136,7 @@ def _lacks(listing: Components, processes: Iterable[ProcessState]) -> list[str]:
     if running:
         lines.append(f"the list is incomplete: running and not registered yet: {_count(running)}")
     elif not listing.complete and not lines:
-        lines.append("the list may be incomplete: the nameserver began a moment ago and components still come back")
+        lines.append("the list may be incomplete: the nameserver has just started, and components still register again")
     return lines
 
 

@@ -1,7 +1,7 @@
 """A mission as its observers know it: messages in; lines, tables and plain data out.
 
 Rules of this file: no bus, no clock, no screen; times are mission seconds and arguments. Command line, launcher and
-consoles keep the same picture: some ask for all of it now and then (``look``), others subscribe to its messages.
+consoles keep the same picture: some ask for all of it repeatedly (``look``), others subscribe to its messages.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class MissionPicture:
         at_s: Mission time of the last look.
         components: The present components, by address.
         processes: Reports of creators and launcher on their processes, by component name.
-        schedule: The RC manager's; None if it did not answer.
+        schedule: The RC manager's schedule; None if it did not answer.
         problems: Services that did not answer, and gaps of the picture.
         missed: Absences this observer found: services that did not answer, components that failed, hang or ended.
         stale_since_s: Mission time at which the rest of the picture was true; None: now.
@@ -76,7 +76,7 @@ class MissionPicture:
 
     # ------------------------------------------------------------------ messages in
     def take(self, said: Said, source: str = "") -> None:
-        """Take a message in.
+        """Update the picture with a message.
 
         Args:
             source: Address of the sender.
@@ -101,7 +101,7 @@ class MissionPicture:
                 assert_never(said)
 
     def changes(self, listed: Components) -> list[ComponentState | Disappeared]:
-        """Return the present components of a list and, if it is complete, those that left."""
+        """Return the present components of a list and, if the list is complete, the components that left."""
         gone = self.components.keys() - {component.address for component in listed.components}
         return [*listed.components, *(Disappeared(address) for address in sorted(gone) if listed.complete)]
 
@@ -193,7 +193,7 @@ def misses(
 
 
 def _fallen(process: ProcessState, now_s: float, rate: float, listed: set[str]) -> Absence | None:
-    """Return the fault of a process; None: it has none."""
+    """Return the absence that the report of a process means; None: it means none."""
     name, is_core = process.spawn.name, process.spawn.subsystem == Subsystem.BACKBONE
     if process.silent_s >= HUNG_AFTER_S:
         cause = f"it hangs: its event loop did not run for {process.silent_s:.1f} s"
@@ -209,9 +209,9 @@ def _fallen(process: ProcessState, now_s: float, rate: float, listed: set[str]) 
 
 
 def is_older(one: ComponentState, other: ComponentState) -> bool:
-    """Return whether the same process sent one state before the other, by the order of its life.
+    """Return whether the same process sent one state before the other, by the order of its life cycle.
 
-    Their times cannot decide: the nameserver dates a readiness by its own observation.
+    Their times cannot decide, because the nameserver dates a readiness by its own observation.
     """
     return one.pid == other.pid and _LIFE.index(one.state) < _LIFE.index(other.state)
 

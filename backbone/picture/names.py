@@ -14,7 +14,7 @@ from backbone.run_names import MissionNames
 
 
 def names_in(picture: MissionPicture, types: Iterable[TypeCount] = ()) -> MissionNames:
-    """Return the names in a picture and of these types; a person's name only if a shell takes it as one word."""
+    """Return the names in a picture and of these types; a person's name only if it is one word for a shell."""
     components, schedule = picture.components, picture.schedule
     rcs = schedule.rcs if schedule is not None else []
     requests = schedule.requests if schedule is not None else []
@@ -33,10 +33,10 @@ def names_in(picture: MissionPicture, types: Iterable[TypeCount] = ()) -> Missio
 
 
 def is_behavior(at: str, kind: str) -> bool:
-    """Return whether the component is a behavior; an execution unit of the same subsystem is none."""
+    """Return whether the component is a behavior; an execution unit of the same subsystem is not a behavior."""
     return at.startswith(f"{Subsystem.MISSION_CONTROL}/") and kind != EXECUTION_UNIT
 
 
 def is_word(text: str) -> bool:
-    """Return whether a shell takes the text as one word."""
+    """Return whether the text is one word for a shell."""
     return bool(text) and text.isprintable() and not any(each in text for each in " \t'\"\\$`&|;<>()*?[]#~=%!{}:")

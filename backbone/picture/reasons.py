@@ -1,4 +1,4 @@
-"""``why`` and ``story``: ask the components concerned, and put their answers in order."""
+"""``why`` and ``story``: ask the components that know about a name, and put their answers in order."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Reasons:
         placement: The placer's answer, if it placed it.
         component: The component's own report, if there is one.
         absence: Its absence, if it is wanted and absent.
-        led_to: If the name is a message's: the events that the message led to.
-        remarks: Further facts: of a host, of a person, of a message that led to nothing.
+        led_to: If the name is the id of a message: the events that the message led to.
+        remarks: Further facts about a host, about a person, or about a message that led to nothing.
         people: The person at each console; the answer names persons.
     """
 
@@ -58,7 +58,7 @@ class Reasons:
 
     @property
     def is_known(self) -> bool:
-        """Whether there is any reason."""
+        """True if there is a reason."""
         return any((self.why, self.placement, self.component, self.absence, self.led_to, self.remarks))
 
     def lines(self, now_s: float) -> list[str]:
@@ -110,7 +110,7 @@ class AskedName:
 
     Attributes:
         name: Name of the component, request or resource.
-        message: The message meant, ``<address>#<number>``; empty: none.
+        message: Id of the meant message, ``<address>#<number>``; empty: none.
     """
 
     name: str
@@ -233,7 +233,7 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> FoundEvents:
     absent = [each for each in picture.health.absent if each.name not in named]
     missing += [f"{each.name}: it is absent, {each.cause}" for each in absent]
     if not listing.complete:
-        missing.append("the nameserver began a moment ago: components may be missing in its list")
+        missing.append("the nameserver has just started: components may be missing in its list")
     return printable_all(FoundEvents(sorted(events, key=lambda event: event.at_s), missing, picture.people))
 
 
@@ -254,7 +254,7 @@ async def _looked(bus: Bus, clock: Clock) -> MissionPicture:
 
 
 def _question(address: str, asked: AskedName) -> AskStory:
-    """Ask the component itself for its whole story, the others for events about it; for a message all components."""
+    """Return the question for one component: the named component gets a question for its whole story."""
     if asked.message:
         return AskStory(asked.message)
     return AskStory() if component_of(address) == asked.name else AskStory(asked.name)

@@ -33,7 +33,7 @@ _STATE_STYLE = {
 _HEALTH_STYLE = {HealthWord.OK: "bold green", HealthWord.DEGRADED: "bold yellow", HealthWord.FAILED: "bold red"}
 _TROUBLES_SHARE = 4  # chosen: a quarter of the terminal; the rest still shows components and events
 _FRAME_LINES = 2  # a panel's upper and lower edge
-_EVENTS_MOST = 12  # chosen: more events than a glance takes in would push components off the picture
+_EVENTS_MOST = 12  # chosen: more events would leave too few lines for components
 _EVENTS_LEAST = 3
 _NUMBERS = ("pid", "restarts", "running", "1 min", "10 min")
 _NEXT_MOST = 3  # chosen: the schedule shows the further ones
@@ -182,7 +182,7 @@ def screen(picture: MissionPicture) -> RenderableType:
 
 
 def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> Table:
-    """Return a table whose last column alone goes on below."""
+    """Return a table in which only the last column wraps."""
     drawn = Table(title=title, title_justify="left")
     for column in columns:
         drawn.add_column(column, justify="right" if column in _NUMBERS else "left", no_wrap=column != columns[-1])

@@ -7,10 +7,10 @@ from backbone.mission_log.people import People
 from backbone.scheduling.views import RequestView
 
 WANTED = "self"
-"""The word for a robot that the console itself gave back."""
+"""The reason for a robot that the console itself gave back."""
 
 UNDECIDED = ("lost", "lease")
-"""The words for losses without a decision: the console was cut off, or paused."""
+"""The reasons for losses without a decision: the console was cut off, or paused."""
 
 _SENTENCES = {
     "slice": "it is the turn of {by}",
@@ -58,7 +58,7 @@ def why_lost(reason: str, by: str) -> str:
 
 
 def because(request: RequestView, people: People) -> str:
-    """Return why a request runs or waits, without the words its row has anyway, by the names of people."""
+    """Return why a request runs or waits, with the names of people and without the words of its row."""
     return people.named(request.because.removeprefix(f"{request.arc} {request.state}: "))
 
 

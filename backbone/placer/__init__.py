@@ -1,1 +1,1 @@
-"""Which host gets the next component, and why not the others."""
+"""Chooses a host for each component, with the reasons."""

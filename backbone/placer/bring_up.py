@@ -1,4 +1,4 @@
-"""Bring-up of one component: a host is chosen, its creator starts the component, and another host follows if it dies.
+"""Bring-up of one component: choose a host, order its creator to start the component, and choose again if it dies.
 
 A component starts on no host while a silent host may still run it.
 """
@@ -20,7 +20,7 @@ from backbone.placer.placement_book import PlacementBook
 
 CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
 OLD_LIFE_S = 5.0  # chosen: longer than any lease that keeps tokens of a lost host's components
-SPAWN_TRIES = 3  # chosen: two creators may die for other reasons; a third dies of the order
+SPAWN_TRIES = 3  # chosen: two creators may die for other reasons; if a third dies, the order is the reason
 
 
 class BringUp:
@@ -43,10 +43,10 @@ class BringUp:
             bus: For questions to nameserver and creators.
             clock: The mission's clock.
             book: All placements; the choice of hosts.
-            creators: Answer for orders whose answer was lost.
-            news: What happens meanwhile.
+            creators: Find the outcome of orders whose answer was lost.
+            news: Wakes waiting starts after each event.
             note: Subject, event → the story.
-            is_meeting: True while a creator is met that may give a host.
+            is_meeting: True while the placer meets a creator, whose host may then be possible.
         """
         self._bus, self._clock, self._book, self._creators, self._news = bus, clock, book, creators, news
         self._note, self._is_meeting = note, is_meeting
@@ -96,7 +96,7 @@ class BringUp:
         return started(record)
 
     async def _unfenced(self, record: PlacementRecord) -> None:
-        """Return when no silent host can run the component any more, or when it has returned with its host."""
+        """Return when no silent host can run the component any more, or when the component and its host are back."""
         name = record.spawn.name
         while record.phase is PlacementPhase.STARTING and not record.unwanted:
             until_s = self._book.fenced_until_s(name, self._clock.now_s())
@@ -106,7 +106,7 @@ class BringUp:
             await self._news.or_at(until_s)
 
     async def _choose(self, record: PlacementRecord) -> None:
-        """Choose a host unless the component has returned; wait a while if only a creator's return makes one possible.
+        """Choose a host unless the component has returned; if only a creator's return makes one possible, wait for it.
 
         Raises:
             NoHost: No host is possible.
@@ -136,7 +136,7 @@ class BringUp:
         return CreatorSilent(f"{name}: {error}; whether it runs on {host} is unknown", name=name, outcome="unknown")
 
     async def old_life_ended(self, record: PlacementRecord) -> None:
-        """Return when the name is free or has returned, because a component dies a moment after its creator."""
+        """Return when the name is free or the component has returned; a component dies a moment after its creator."""
         name, until_s = record.spawn.name, self._clock.now_s() + OLD_LIFE_S * self._clock.rate
         while self._clock.now_s() < until_s and record.phase is PlacementPhase.STARTING and not record.unwanted:
             try:

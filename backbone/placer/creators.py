@@ -1,4 +1,4 @@
-"""Creators: the placer's questions and orders to the creators of all hosts, and what a lost answer leaves open."""
+"""Creators: the placer's questions and orders to the creators of all hosts, and the outcome of unanswered orders."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Creators:
         return None
 
     async def revise(self, host: str, spawn: Spawn) -> None:
-        """Have the component start with this class and these parameters from its next start on this host on.
+        """Make this host start the component with this class and these parameters from its next start on.
 
         Raises:
             CreatorSilent: The creator lives but does not answer; the outcome is unknown.

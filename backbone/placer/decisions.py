@@ -28,10 +28,10 @@ class PlacementRecord:
         host: The host on which it runs or starts; empty: none.
         pid: Its process; 0 if unknown.
         since_s: Mission time of the last decision about it.
-        reasons: One line a host.
+        reasons: One line for each host.
         unwanted: True from the order to stop it.
         suspect: True while the placer must ask its creator whether it still runs.
-        lost: True from the loss of its host until it has another; it may return with the old host.
+        lost: True from the loss of its host until it has another host; it may return with the old one.
         missing_since_s: Mission time from which on it is missing; negative: it is not missing.
         cause: Why it is missing.
         doing: What the placer does to start it again.
@@ -76,7 +76,7 @@ class PlacementRecord:
 
 @dataclass(frozen=True, slots=True)
 class PlaceAgain:
-    """Start this component again, which is missing."""
+    """Start this missing component again."""
 
     name: str
 

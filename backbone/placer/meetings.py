@@ -26,7 +26,7 @@ Work = Callable[[], Coroutine[object, None, None]]
 
 
 class Meetings:
-    """Keeps the book's hosts like the creators that live."""
+    """Keeps the book's hosts up to date with the living creators."""
 
     def __init__(
         self,
@@ -49,12 +49,12 @@ class Meetings:
             clock: The mission's clock.
             book: Hosts and placements.
             creators: Lists the creators and their processes.
-            news: Hears of each meeting that ends.
+            news: Gets the end of each meeting.
             own_host: Host of the placer: a creator there is never cut off.
             note: Subject, event → the story.
-            carry_out: Carries out what the book instructs.
-            begin: Starts a task of this name.
-            begin_later: The same, once the placer serves.
+            carry_out: Carries out the book's instructions.
+            begin: Starts a task with a name.
+            begin_later: Starts a task with a name, once the placer serves.
         """
         self._bus, self._clock, self._book, self._creators, self._news = bus, clock, book, creators, news
         self._own_host, self._note, self._carry_out = own_host, note, carry_out
@@ -86,7 +86,7 @@ class Meetings:
             self._carry_out(self._book.component_disappeared(record.address))
 
     def _creator_status_heard(self, heard: Envelope[ComponentState]) -> None:
-        """Place a creator's components again as soon as it drains; its token stands until it has ended them."""
+        """Place a creator's components again as soon as it drains; its token exists until it has ended them."""
         creator = heard.body
         if creator.state in LEAVING and self._book.knows_creator(creator.host, creator.pid):
             self._carry_out(self._book.creator_down(creator.host, self._clock.now_s()))
@@ -114,7 +114,7 @@ class Meetings:
                 self.lost_sight_of(host.name)
 
     def lost_sight_of(self, host: str) -> None:
-        """Record a creator's fallen token: a creator of this host died, one of another host may be cut off."""
+        """Record the end of a creator's token: a creator of this host died, one of another host may be cut off."""
         fence_s = 0.0 if host == self._own_host else CUT_OFF_ENDS_WITHIN_S * self._clock.rate
         self._carry_out(self._book.creator_down(host, self._clock.now_s(), fence_s))
 
@@ -146,7 +146,7 @@ class Meetings:
                 each_s=ANSWER_EACH_S,
                 within_s=ANSWER_WITHIN_S,
             )
-        except LinkError as error:  # it may only be slow: ask again while its token stands
+        except LinkError as error:  # it may only be slow: ask again while its token exists
             self._note(host, f"its creator does not list its processes: {error}")
             self._begin_later(partial(self._meet_later, creator), f"meet {host} later")
             return

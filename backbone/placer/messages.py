@@ -33,7 +33,7 @@ class Started(Message, frozen=True):
     """Answer to ``Start``: the component is ready.
 
     Attributes:
-        reasons: One line a host: why it was chosen or not.
+        reasons: One line for each host: why it was chosen or not.
     """
 
     address: Mention
@@ -47,7 +47,7 @@ class ReviseStart(Message, frozen=True):
 
     Attributes:
         parameters: All of them; the running component keeps its own.
-        class_path: Of its next life; empty: as before.
+        class_path: Class path from its next start on; empty: as before.
     """
 
     name: Mention
@@ -84,7 +84,7 @@ class Placement(Message, frozen=True):
 
     Attributes:
         requester: Address of its owner.
-        reasons: One line a host: why it was chosen or not.
+        reasons: One line for each host: why it was chosen or not.
     """
 
     name: Mention

@@ -8,7 +8,7 @@ from backbone.bus.interface import Clock
 
 
 class News:
-    """Something that happened to a component or a host."""
+    """Wakes all waiting tasks after an event of a component or a host."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock

@@ -1,15 +1,15 @@
-"""Packing: which process of its host a component joins, so that a host has few processes and none is too full.
+"""Packing: the choice of a component's process on its host, so that a host has few processes and none is too full.
 
 Rules:
 
-* The host is chosen first, by load. Then the component joins a process there, and the same state gives the same choice.
-* With a number of packs, a component whose order names no process joins the pack with the fewest members; of equal
-  ones, the first.
-* Without, components of one type share processes as soon as there are many: the first ones have their own, and each
-  further process holds at most as many. So ARCs, which command, never wait for behaviors, which search pictures.
-* A process of the mission file that is full is split: further members join its next part.
+* The host is chosen first, by load. Then the component joins a process there; the same state leads to the same choice.
+* If the number of packs is set, a component whose order names no process joins the pack with the fewest members; among
+  equal packs, the first.
+* If it is not set, components of one type share processes as soon as there are many: the first ones have their own, and
+  each further process holds at most as many. So ARCs, which command, never wait for behaviors, which search pictures.
+* If a process of the mission file is full, further members join its next part.
 * Members never change their process while they run.
-* The name of its process says that a component is packed, so a restarted placer knows it from the creators' lists.
+* The name of its process shows that a component is packed, so a restarted placer knows it from the creators' lists.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from itertools import chain, count
 
 from backbone.creator.messages import Spawn
 
-MOST_PACKS = 64  # chosen: more than any host's processors here; beyond, components may as well have their own processes
-MEMBERS_MOST = 64  # chosen: twice what the missions here have; a hang or a kill of the process ends no more
+MOST_PACKS = 64  # chosen: more than any host's processors here; with more packs, own processes would be as good
+MEMBERS_MOST = 64  # chosen: twice as many as the missions here have; a hang or kill of the process ends at most these
 _PREFIX = "packed--"  # chosen: legal, and unlike any name in a mission file
 _LONGEST = 56  # chosen: the longest legal name less the number of a part
 WANTS_PACK = f"{_PREFIX}0"
@@ -53,7 +53,7 @@ def joined(spawn: Spawn, there: Collection[Spawn], packs: int) -> str:
     """Return the process that a component joins on its host; empty: it has its own.
 
     Args:
-        spawn: Its order.
+        spawn: The order to start the component.
         there: The orders of the other components on the host.
         packs: How many packs a host has, at least 1.
     """
@@ -70,7 +70,7 @@ def pack(processes: Iterable[str], count: int) -> str:
     """Return the pack that one more component joins.
 
     Args:
-        processes: Of each component on the host.
+        processes: Process of each component on the host.
         count: How many packs a host has, at least 1.
 
     Example:
@@ -85,7 +85,7 @@ def part(processes: Iterable[str], process: str) -> str:
     """Return the first part of a process that has room for one more member.
 
     Args:
-        processes: Of each component on the host.
+        processes: Process of each component on the host.
 
     Example:
         >>> part(["hardware"] * 64, "hardware"), part(["hardware"] * 63, "hardware")

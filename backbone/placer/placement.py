@@ -1,4 +1,4 @@
-"""Placement: which host gets the next component, and why not the others.
+"""Placement: the choice of a host for one more component, with a reason for each host.
 
 Rules:
 
@@ -32,7 +32,7 @@ class CandidateHost:
 
     Attributes:
         name: Name in the mission file.
-        alive: True while its creator's token stands.
+        alive: True while its creator's token exists.
         components: Number of its components, starting ones included.
         cpu: Busy share of all cores, 0 to 1, as last published by its creator.
         memory: Used share of memory, 0 to 1.
@@ -66,7 +66,7 @@ class Choice:
 
     Attributes:
         host: The host's name.
-        reasons: One line a host, sorted by host: why it was chosen or not.
+        reasons: One line for each host, sorted by host: why it was chosen or not.
     """
 
     host: str

@@ -6,13 +6,13 @@ Rules:
 
 * A name is in the book once, from its admission on. So two starts never get the same name, and each choice of a host
   counts the components that are still starting.
-* Truth lives at the edge: a creator's list of processes decides which components its host has. A restarted placer
-  rebuilds its book from these lists.
-* A record is a wish: it stands until an order stops its component. A missing component is placed again, whether its
+* The creators are the source of truth: a creator's list of processes decides which components its host has. A restarted
+  placer rebuilds its book from these lists.
+* A record is a wish: it exists until an order stops its component. A missing component is placed again, whether its
   host was lost or it ended without an order. Only components without restart (ARCs) are forgotten, because their
   owners claim new ones.
 * When a creator dies, its components die with it. Pinned components wait until their creator is back.
-* The book remembers each order to stop, so that owners that compare wish and fact do not start the component again.
+* The book remembers each order to stop, so that owners do not start the component again when they find it missing.
 * A silent host may only be cut off and run on for a while. Its components are *fenced*: they are started elsewhere only
   when that host has ended them by itself, or when its creator is back and has listed its processes.
 * A host that was cut off may return with components that were stopped meanwhile. The placer ends these orphans.
@@ -42,7 +42,7 @@ STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; no mission stop
 
 @dataclass(slots=True)
 class _Host:
-    """One host: its view without the count of components, and its creator's pid."""
+    """One host: the placer's view of it without the count of components, and its creator's pid."""
 
     view: CandidateHost
     creator_pid: int
@@ -54,7 +54,7 @@ class PlacementBook:
     """All placements and hosts of one mission.
 
     Args:
-        packs: Into how many shared processes a host packs components, see ``packing``.
+        packs: Number of shared processes into which a host packs components, see ``packing``.
     """
 
     def __init__(self, packs: int = 0) -> None:
@@ -66,7 +66,7 @@ class PlacementBook:
         self._stopped: dict[str, str] = {}
         self._fences: dict[str, tuple[str, float]] = {}
 
-    # ------------------------------------------------------------------ looking
+    # ------------------------------------------------------------------ views
     def record(self, name: str) -> PlacementRecord:
         """Return the record of this name.
 
@@ -269,7 +269,7 @@ class PlacementBook:
             return []
         known = self._hosts[host]
         known.view = replace(known.view, alive=False)
-        instructions: list[Instruction] = [Note(host, "lost its creator and all it ran")]
+        instructions: list[Instruction] = [Note(host, "lost its creator and all its components")]
         for record in self.records():
             if record.host != host:
                 continue
@@ -278,7 +278,7 @@ class PlacementBook:
             if fence_s > 0:
                 self._fences[name] = (host, now_s + fence_s)
             if record.phase is PlacementPhase.STARTING:
-                continue  # the task that starts it finds out and decides
+                continue  # the task that starts it detects the loss and decides
             if record.phase is PlacementPhase.RUNNING and record.spawn.policy.restart and not record.unwanted:
                 record.misses(f"was lost with the creator of {host}", now_s)
                 record.lost = True
@@ -307,7 +307,7 @@ class PlacementBook:
         return []
 
     def component_disappeared(self, component_address: str) -> list[Instruction]:
-        """Record a fallen token; the creator knows whether its component has ended or is being restarted."""
+        """Record the end of a token; the creator knows whether its component has ended or is being restarted."""
         for record in self._records.values():
             if record.address == component_address and record.phase is PlacementPhase.RUNNING and not record.unwanted:
                 record.suspect = True
@@ -342,7 +342,7 @@ class PlacementBook:
 
     # ------------------------------------------------------------------
     def _colocation(self, record: PlacementRecord) -> str:
-        """Return the host of the other members of its process; empty if they have none or there are none."""
+        """Return the host of the other members of its process; empty: no other member has a host."""
         spawn = record.spawn
         if not spawn.process or is_packed(spawn.process) or spawn.alike_most > 1:
             return ""

@@ -1,4 +1,4 @@
-"""An exchange lasts beyond a restart: the placer starts the component with its new class from the next start on."""
+"""Makes an exchange last beyond a restart: the placer uses the new class from the component's next start on."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ REVISED_WITHIN_S = 2.0  # chosen: the placer answers in milliseconds
 
 
 async def revise_start(bus: Bus, order: ReviseStart) -> str:
-    """Have the next life of the component begin as the order says; return what an operator should know, or nothing."""
+    """Send the placer the order for the component's next start; return a remark for the operator, empty: none."""
     try:
         await bus.ask(PLACER, order, StartRevised, within_s=REVISED_WITHIN_S)
     except NotPlaced:  # started by hand
         return ""
     except (LinkError, Refusal) as error:
-        return f"a new start of {order.name} has the old class again: {error}"
+        return f"the next start of {order.name} uses the old class again: {error}"
     return ""

@@ -56,15 +56,15 @@ from backbone.placer.placement_book import PlacementBook
 from backbone.wire import Envelope, Message, UnknownMessage
 
 AGAIN_PAUSES_S = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)  # chosen: before each try to place a missing component again
-COMPARE_EVERY_S = 5.0  # chosen: wishes without an owner are rare: the owner and the placer died at the same time
+COMPARE_EVERY_S = 5.0  # chosen: a wish without an owner is rare; its owner and the placer died at the same time
 
 
 class PlacerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters of ``Placer``.
 
     Attributes:
-        packs: Number of shared processes a host into which components without a process are packed; 0: none; None:
-            only components of a type that has many.
+        packs: Number of shared processes of each host into which components without a process are packed; 0: none;
+            None: only types with many components share processes.
     """
 
     packs: Annotated[int, msgspec.Meta(ge=0, le=MOST_PACKS)] | None = None
@@ -290,7 +290,7 @@ class Placer(Component[PlacerParameters]):
             self._begin_later(self._meetings.look_again, "look again")
 
     def _enqueue(self, begin: Callable[[], None]) -> None:
-        """Queue this for ``serve``, because events arrive before the component serves."""
+        """Queue this call for ``serve``, because events arrive before the component serves."""
         self._queue.put_nowait(begin)
 
     def _begin(self, work: Work, name: str) -> None:

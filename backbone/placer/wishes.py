@@ -1,9 +1,9 @@
 """A wish: one component that its owner wants to run; the owner keeps it placed through the placer.
 
 ``Wish`` is pure: it turns events into pauses and into the absence that the owner reports. ``keep_placed`` is the loop
-around it. The owner compares wish and fact repeatedly, so the reason of an absence (an exit code, a signal, a lost
-host, a restarted placer) makes no difference. A wish ends in two ways: its owner cancels the loop, or an order to the
-placer stops the component.
+around it. The owner repeatedly compares its wish with the placer's record, so the reason of an absence (an exit code, a
+signal, a lost host, a restarted placer) makes no difference. A wish ends in two ways: its owner cancels the loop, or an
+order to the placer stops the component.
 
 Prior art: level-triggered controllers of Kubernetes; permanent children of Erlang supervisors.
 """
@@ -27,10 +27,10 @@ from backbone.waiting import first_of
 log = logging.getLogger(__name__)
 
 PAUSE_FIRST_S, PAUSE_MOST_S = 0.2, 5.0  # chosen: a restarted placer is back within the first few; machine seconds
-COMPARE_EVERY_S = 20.0  # chosen: every known cause triggers a comparison at once; this is for the unknown ones
+COMPARE_EVERY_S = 20.0  # chosen: every known cause triggers a comparison at once; this covers unknown causes
 REPLY_TIME_S = 1.0  # chosen: the placer answers in milliseconds
 START_WITHIN_S = START_MOST_S + 10.0  # chosen: the placer's own limit and a moment
-SLOW_START_S = 1.5  # chosen: most starts take less than one; health names what is absent within 2 s
+SLOW_START_S = 1.5  # chosen: most starts take less than one; health names an absent component within 2 s
 
 
 @dataclass
@@ -75,7 +75,7 @@ class Wish:
 async def ask_to_start(
     bus: Bus, clock: Clock, wish: Wish, order: Start, within_s: float, on_changed: Callable[[], None]
 ) -> Started:
-    """Return the placer's answer; a component whose start takes long is absent meanwhile.
+    """Return the placer's answer; after ``SLOW_START_S`` the component counts as absent until the answer comes.
 
     Raises:
         Refusal: The placer did not start it.

@@ -82,10 +82,10 @@ def test_an_old_class_keeps_its_code_and_the_new_one_has_its_own(file: Path) -> 
         ("    sizes: list[int] = []\n", "", "Spot"),
     ],
 )
-def test_a_class_of_values_that_is_declared_otherwise_is_refused(file: Path, old: str, new: str, name: str) -> None:
+def test_a_class_of_values_that_is_declared_differently_is_refused(file: Path, old: str, new: str, name: str) -> None:
     before = ReadAnew(PATH, load_module_class).kind
     file.write_text(SOURCE.replace(old, new).replace("[EDITION]", ""))
-    with pytest.raises(ValuesChanged, match=f"declares {name} otherwise"):
+    with pytest.raises(ValuesChanged, match=f"declares {name} differently"):
         ReadAnew(PATH, load_module_class)
     assert sys.modules["read_anew_package.inside"].One is before
 

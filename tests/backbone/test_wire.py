@@ -112,9 +112,9 @@ def test_each_hostile_message_is_refused_as_what_it_is(hostile: Hostile) -> None
 
 
 def test_a_refusal_of_a_version_names_both() -> None:
-    with pytest.raises(WrongVersion, match="Stop version 2, this is 1"):
+    with pytest.raises(WrongVersion, match="Stop version 2, but version 1 is expected"):
         reader.read(enveloped(["Stop/2", ""]))
-    with pytest.raises(WrongVersion, match="envelope version 7, this is 1"):
+    with pytest.raises(WrongVersion, match="envelope version 7, but version 1 is expected"):
         reader.read(enveloped(AskState(), wire=7))
 
 

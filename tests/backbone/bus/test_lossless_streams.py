@@ -121,7 +121,7 @@ async def test_a_message_over_the_limit_of_its_conversation_is_refused_and_goes_
     class Long(News, frozen=True):
         text: str = ""
 
-    with pytest.raises(OversizedMessage, match="65536 are the most") as refused:
+    with pytest.raises(OversizedMessage, match="at most 65536 are admitted") as refused:
         sender.publish(SERVER, Conversation.POSES, Long(1, "x" * 65_536))
     assert "docs/reference/messages.md" in refused.value.remedy
     sender.publish(SERVER, Conversation.POSES, News(2))

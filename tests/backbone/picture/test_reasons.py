@@ -95,7 +95,12 @@ def test_a_story_names_every_component_that_did_not_tell_its_part(text: str) -> 
     told = story(text, complete=False, unknown=("mission_control/watch",))
     missing = "\n".join(told.missing)
     assert told.events[0].what == "connected"
-    for name in ("resource_pool/scout2: ", "mission_control/watch: ", "radio: it is absent", "nameserver began"):
+    for name in (
+        "resource_pool/scout2: ",
+        "mission_control/watch: ",
+        "radio: it is absent",
+        "nameserver has just started",
+    ):
         assert name in missing
 
 

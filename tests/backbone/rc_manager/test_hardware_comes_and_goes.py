@@ -194,8 +194,8 @@ def test_a_component_that_the_placer_did_not_start_is_not_taken_in(mission: Begi
                 await here.find("third")
             with pytest.raises(UnknownRc):
                 await claimed(here, "third")
-            refused = [what for what in await here.story(DEPENDENCY_DATABASE, "third") if "not taken in" in what]
-            assert refused == ["is not taken in: 'third' was not placed"]
+            refused = [what for what in await here.story(DEPENDENCY_DATABASE, "third") if "cannot be claimed" in what]
+            assert refused == ["cannot be claimed: 'third' was not placed"]
 
     run_virtual(main())
 

@@ -266,7 +266,7 @@ def test_a_new_one_that_fails_gives_way_to_the_old_one_and_the_cause_is_named(
         assert cause in await stage.feedback()
         level, what = (await stage.story())[-1]
         assert (level, cause in what) == (LogLevel.WARNING, True)
-        assert "reads the file as it is now" in swapped.remark
+        assert "uses the present file" in swapped.remark
         assert stage.revised == []
 
     play(scene)
@@ -327,7 +327,7 @@ def test_a_further_optional_input_is_fed(stage: Stage, play: Play) -> None:
 def test_classes_of_values_must_stay_as_they_are(stage: Stage, play: Play) -> None:
     async def scene() -> None:
         stage.edit("    number: int\n    who", "    number: float\n    who")
-        with pytest.raises(ValuesChanged, match="declares Count otherwise"):
+        with pytest.raises(ValuesChanged, match="declares Count differently"):
             await stage.swap()
 
     play(scene)

@@ -69,7 +69,7 @@ async def test_a_wrong_moment_is_refused_in_the_form_and_what_was_found_stays(st
         assert len(await rows(page)) == 1
         await page.get_by_label("Since").fill("soon")
         await page.get_by_role("button", name="Search").click()
-        await page.locator("#log-status", has_text="'soon' is no moment. Say 5m").wait_for()
+        await page.locator("#log-status", has_text="'soon' is no moment. Type 5m").wait_for()
         assert await page.locator("#panel tbody tr").count() == 1
         assert await page.get_by_label("Since").input_value() == "soon"
 
