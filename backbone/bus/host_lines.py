@@ -22,7 +22,7 @@ from backbone.operating_system import local_sockets
 from backbone.waiting import settle
 from backbone.wire import MAX_MESSAGE_BYTES
 
-# chosen: three of them fit the default buffer of a socket (net.core.wmem_default); a smaller buffer gets shorter packets
+# chosen: three of them fit the default buffer of a socket (net.core.wmem_default); a smaller one gets shorter packets
 MOST_PACKET_BYTES = 65_536
 MOST_WAITING_BYTES = 2 * MAX_MESSAGE_BYTES  # chosen: a stopped peer costs at most this memory
 MOST_AT_ONCE = 32  # chosen: packets of one line before the rest of the event loop has its turn
