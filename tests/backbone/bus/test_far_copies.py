@@ -121,6 +121,10 @@ async def test_questions_come_with_their_answers_from_who_answers(place: Place) 
     recording = await listening(place, THIRD)
     server, asker = place.join(SERVER), place.join(ASKER)
     server.serve(SERVER, Echo, echo)
+    served = asyncio.Event()
+    asker.watch_alive(SERVER, lambda _address, _stands: served.set())
+    server.declare_alive(SERVER)
+    await served.wait()  # the hub learned of the token after it had learned of the server
     for _question in range(3):
         await asker.ask(SERVER, Echo("hello"), Echoed, within_s=ASK_S)
     await until(lambda: len(recording) == 6, "questions and answers")
