@@ -1,4 +1,4 @@
-"""Shared parts of commands that serve other tools until they are ended."""
+"""Shared parts of commands that serve other tools until a signal or the end of the mission."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GONE_AFTER_S = 5.0  # chosen: a restarted hub is back within two; seconds of the
 
 
 class PortUnusable(Refusal):
-    """The command cannot listen there."""
+    """The command cannot listen at this host and port."""
 
     code = "usage.port"
     remedy = "Name another port by --port, or an address of this machine by --host."
@@ -25,7 +25,7 @@ def opening_port(host: str, port: int) -> Iterator[None]:
     """Open a port.
 
     Raises:
-        PortUnusable: It cannot be opened.
+        PortUnusable: The port cannot be opened.
     """
     try:
         yield
@@ -35,7 +35,7 @@ def opening_port(host: str, port: int) -> Iterator[None]:
 
 @asynccontextmanager
 async def until_ended(bus: Bus) -> AsyncIterator[asyncio.Event]:
-    """Yield an event that is set by a signal, by a bug, or once the mission's hub was away for ``GONE_AFTER_S``.
+    """Yield an event that is set by a signal, by a bug, or after the mission's hub was away for ``GONE_AFTER_S``.
 
     Raises:
         BaseException: The bug.

@@ -1,4 +1,4 @@
-"""``scout-backbone status``: the mission picture once, or again and again, also of a mission whose hub is away."""
+"""``scout-backbone status``: the mission picture once or repeatedly, also of a mission whose hub does not answer."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
 from backbone.picture.screen import live_screen, screen
 
-EVERY_S = 1.0  # chosen: programs that watch want one line a second
-REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds
+EVERY_S = 1.0  # chosen: monitoring programs want one line a second
+REDRAW_EVERY_S = 0.5  # chosen: slices of seconds stay visible
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Shown:
     """How a status is shown.
 
     Attributes:
-        as_json: One JSON object instead of tables.
-        watch: Again and again.
-        width: Of tables; None: as the terminal.
+        as_json: True: one JSON object instead of tables.
+        watch: True: show it repeatedly.
+        width: Width of tables; None: the terminal's.
     """
 
     as_json: bool
@@ -44,10 +44,10 @@ class Shown:
 
 
 async def show_status(where: Where, shown: Shown) -> ExitCode:
-    """Print how a mission is and return the exit code: MISSION_FAILED if it has failed, else DONE.
+    """Print the state of a mission and return the exit code: MISSION_FAILED if it has failed, else DONE.
 
     Raises:
-        MissionNotUp: None of this name is up on this machine.
+        MissionNotUp: No mission of this name is up on this machine.
         LinkError: The nameserver did not answer, and no launcher of the mission lives on this machine.
     """
     found = run_files.find(where.mission) if where.connect is None else None
@@ -80,7 +80,7 @@ async def _show(bus: Bus, clock: Clock, found: run_files.RunFile | None, shown: 
 async def _pictures(
     bus: Bus, clock: Clock, found: run_files.RunFile | None, every_s: float
 ) -> AsyncGenerator[MissionPicture, None]:
-    """Yield how the mission is, without end."""
+    """Yield the state of the mission, without end."""
     before = None
     while True:
         try:
@@ -94,7 +94,7 @@ async def _pictures(
 
 
 def picture_without_hub(found: run_files.RunFile, error: LinkError) -> MissionPicture:
-    """Return what is known of a mission from its run file alone: its launcher lives, its hub does not answer."""
+    """Return the picture of a mission from its run file alone: its launcher lives, its hub does not answer."""
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     now_s, pid = clock.now_s(), found.launcher_pid
     silence = f"no answer: {error}" if not isinstance(error, HubUnreachable) else f"nothing answers at {found.endpoint}"
@@ -126,7 +126,7 @@ def _print(picture: MissionPicture, shown: Shown) -> None:
 
 def console_of_width(width: int | None) -> Console:
     """Return a console for tables; None: as wide as the terminal."""
-    # What stands in a cell came over the bus: square brackets in it are text, and no markup.
+    # Cell contents come over the bus: square brackets in them are text, not markup.
     return Console(width=width, markup=False, emoji=False, highlight=False)
 
 

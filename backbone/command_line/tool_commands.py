@@ -1,4 +1,4 @@
-"""``scout-backbone`` ``bridge``, ``metrics``: a mission that is up, for other tools. They change nothing in it.
+"""``scout-backbone`` ``bridge``, ``metrics``: show a mission that is up in other tools. They change nothing in it.
 
 Rules of this file: as those of ``cli``.
 """
