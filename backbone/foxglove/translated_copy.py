@@ -1,6 +1,6 @@
 """A translated copy of a recording, for tools that do not know this project's messages.
 
-The recording itself stays unchanged. Therefore recording costs nothing for other tools, and a new translation serves old
+The recording itself stays unchanged. So recording costs nothing for other tools, and a new translation serves old
 recordings, too. The copy contains each message as recorded, with its schema, so that all its numbers can be plotted.
 Beside it the copy contains its translation, or only the translation if that is complete. A copy has no profile, so that
 no command mistakes it for a recording.
