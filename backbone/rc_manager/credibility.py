@@ -1,9 +1,9 @@
 """Credibility: checks the state that an RC reports.
 
-An RC that contradicts itself, its hardware or its grants is put aside alone: the RC manager plans nothing on it,
-publishes the reason, and asks it again until its answer is credible. It ignores the RC's reports meanwhile.
+If an RC contradicts itself, its hardware or its grants, only this RC is put aside: the RC manager plans nothing on it,
+publishes the reason, and asks it again until its answer is credible. Meanwhile it ignores the RC's publications.
 
-Rule of this file: pure; time is an argument. ``ranges`` checked each number by itself; here they are compared.
+Rule of this file: pure; time is an argument. ``ranges`` has validated each number; this file compares the numbers.
 """
 
 from __future__ import annotations
