@@ -37,8 +37,8 @@ class Player:
         clock: Must show ``since_s`` when ``run`` begins.
         recording: Read while it runs.
         classes: Known message classes, by schema.
-        since_s: Mission time at which it begins; what was said before is known.
         since_s: Mission time at which it begins; earlier messages are known.
+        keys: Patterns of the keys whose publications are played; none: all.
         next_step: Awaited before each publication, with the message; None: play in the recorded time.
         checkpoints: Checkpoints of the same recording; None: the recording is read from its begin.
     """

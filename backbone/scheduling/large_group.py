@@ -95,7 +95,7 @@ class LargeGroupPlanner:
         return None
 
     # Views: which ARCs wait before which, and when an ARC will start.
-    # Views: which ARCs wait before which, and when an ARC will start.
+
     def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
         """Return an estimate of the place of every queued ARC of the group, in order."""
         return estimate(self._table, self._table.in_order([arc for arc in group if arc.queued]), now_s)
