@@ -40,7 +40,7 @@ async def inject(where: Where, key: str, text: str, within_s: float) -> ExitCode
     try:
         said = json.loads(text)
     except ValueError as error:
-        raise OtherForm(f"it is no JSON: {error}") from error
+        raise OtherForm(f"the text is not JSON: {error}") from error
     async with connected(where) as (bus, clock):
         address, conversation = _place(key, bus.mission)
         classes = await mission_classes(bus)

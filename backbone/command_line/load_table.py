@@ -78,7 +78,7 @@ def _draw(found: Loads, width: int | None) -> None:
         if rows := list(rows):
             console.print(table(title, columns, rows))
     if found.silent:
-        say(f"no numbers of {', '.join(found.silent)}")
+        say(f"no answer from {', '.join(found.silent)}")
 
 
 def _robot_rows(found: Loads) -> Iterable[tuple[str, ...]]:

@@ -184,7 +184,7 @@ def last_lines(outcome: Outcome) -> list[str]:
     if outcome.ready_after_s is not None:
         lines.append(f"was ready after {outcome.ready_after_s:.2f} s")
     if outcome.pushed:
-        lines.append("more than asking was needed: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
+        lines.append("needed a signal to end: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
     if outcome.failure is not None:
         return [*lines, f"the mission failed: {outcome.failure}"]
     return [*lines, f"down: {counted(len(outcome.ended), 'component')} ended, nothing is left"]

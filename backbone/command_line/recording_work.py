@@ -129,7 +129,7 @@ async def record_to(
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
     if recorder.full:
-        say(f"it ended because {recorder.full}")
+        say(f"the recording ended because {recorder.full}")
     return ExitCode.REFUSED if recorder.full else ExitCode.DONE
 
 

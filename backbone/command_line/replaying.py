@@ -72,7 +72,7 @@ async def run_without(
         recorded = recording.messages(source=launch.address)
         result = print_comparison(compared(recorded, rerun.said, tolerances), as_json=as_json)
     if rerun.fell is not None:
-        say(f"it fell: {type(rerun.fell).__name__}: {rerun.fell}")
+        say(f"the component failed: {type(rerun.fell).__name__}: {rerun.fell}")
         return ExitCode.REFUSED
     return result
 
@@ -97,7 +97,7 @@ async def decide_anew(path: Path, since_s: float, rules: dict[str, Any], *, as_j
     made = f"{counted(found.decisions, 'decision')} made anew, {counted(found.grants, 'grant')} among them"
     say(f"{made}: {'all as recorded' if found.difference is None else 'the last one is not as recorded'}")
     if found.missing:
-        say(f"nothing is said of {counted(found.missing, 'decision')} that the recording does not have whole")
+        say(f"not compared, because incomplete in the recording: {counted(found.missing, 'decision')}")
     return ExitCode.DONE if found.difference is None else ExitCode.REFUSED
 
 
@@ -202,7 +202,7 @@ class _Collector:
 async def _play_to_end(player: Player) -> None:
     await player.run()
     gc.enable()
-    say(f"that was all, {counted(player.played, 'publication')}; questions are still answered")
+    say(f"the recording is over, {counted(player.played, 'publication')}; questions are still answered")
     await asyncio.Event().wait()
 
 

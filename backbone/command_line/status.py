@@ -99,10 +99,10 @@ def picture_without_hub(found: run_files.RunFile, error: LinkError) -> MissionPi
     now_s, pid = clock.now_s(), found.launcher_pid
     silence = f"no answer: {error}" if not isinstance(error, HubUnreachable) else f"nothing answers at {found.endpoint}"
     if _is_paused(pid):
-        remedy = f"Let it go on with 'kill -CONT {pid}', or end the mission with 'scout-backbone down'."
+        remedy = f"Continue it with 'kill -CONT {pid}', or end the mission with 'scout-backbone down'."
         missed = [
             Absence("launcher", now_s, f"its process {pid} is paused", "", remedy, vital=True),
-            Absence("nameserver", now_s, silence, "", "Let the launcher go on, which restarts it.", vital=True),
+            Absence("nameserver", now_s, silence, "", "Continue the launcher, which restarts it.", vital=True),
         ]
     else:
         missed = [Absence("nameserver", now_s, silence, f"the launcher, process {pid}, restarts it", vital=True)]

@@ -96,7 +96,7 @@ async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str])
     except LinkError:
         stopped = {}
     if name in stopped:
-        remedy = "Start it: its owner does, or 'scout-backbone start'; then swap again."
+        remedy = "Start it through its owner or by 'scout-backbone start', then swap again."
         return Silent(f"{name} is stopped: {stopped[name]}", remedy=remedy)
     return UnknownModule(f"no module, behavior or resource {name!r} runs{did_you_mean(name, known)}")
 

@@ -146,6 +146,6 @@ async def _tell_last_branch(bus: Bus, within_s: float) -> None:
     try:
         over = await bus.ask(LAUNCHER, AwaitLastBranch(), LastBranchOver, within_s=within_s)
     except LinkError as error:
-        say(f"the launcher does not tell how the last branch ended: {error}")
+        say(f"the launcher did not report how the last branch ended: {error}")
     else:
         say(over.told)

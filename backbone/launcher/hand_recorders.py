@@ -102,7 +102,7 @@ class HandRecorders:
                 events.append((one.name, f"does not respond; it records to {one.beat.file}"))
             elif self._has_left(one, now_s) and not (one.is_silent and self._is_worth_naming(one, now_s)):
                 del self._known[claim]
-                left = f"left without a word; if {one.beat.file} is not whole, 'scout-backbone record recover' mends it"
+                left = f"ended without notice; if {one.beat.file} is incomplete: 'scout-backbone record recover'"
                 events.append((one.name, left))
         return events
 
@@ -126,8 +126,8 @@ class HandRecorders:
 def _absence(one: _Recorder) -> Absence:
     host, pid = one.beat.host, one.beat.pid
     doing = f"messages may be missing in {one.beat.file}"
-    mend = "then 'scout-backbone record recover' mends its file"
-    remedy = f"Wake it on {host} by 'kill -CONT {pid}', or 'kill -9 {pid}'; {mend}."
+    mend = "then 'scout-backbone record recover' repairs its file"
+    remedy = f"Continue it on {host}: 'kill -CONT {pid}'. Or 'kill -9 {pid}'; {mend}."
     return Absence(one.name, one.heard_s, "it does not respond", doing, remedy)
 
 

@@ -114,14 +114,14 @@ class TreeChangedMeanwhile(Refusal):
     """The tree has changed since the operator read it; this change had no effect."""
 
     code = "tree.changed_meanwhile"
-    remedy = "Look at it again with 'scout-backbone tree', then decide anew."
+    remedy = "Read the tree again with 'scout-backbone tree', then decide again."
 
 
 class TreeInvalid(Refusal):
     """This change would make the mission file invalid; nothing is changed. The detail has one fault a line."""
 
     code = "tree.invalid"
-    remedy = "Mend the faults; the mission runs on as it was."
+    remedy = "Correct the faults; the mission runs on unchanged."
 
 
 class UnknownBehavior(Refusal):

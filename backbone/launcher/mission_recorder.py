@@ -122,7 +122,7 @@ class MissionRecorder:
         self._watching = asyncio.create_task(watch(process.stdout, self._silent), name="whether the recorder responds")
         if not said.startswith("records to"):
             await self.end()
-            raise RecorderFailed(f"the recorder did not begin: {said.strip() or 'it ended without a word'}")
+            raise RecorderFailed(f"the recorder did not begin: {said.strip() or 'it ended without a message'}")
 
     async def keep(self) -> None:
         """Start the recorder again whenever it has ended, until cancelled."""
@@ -182,7 +182,7 @@ class MissionRecorder:
             return
         if is_silent:
             pid = self._process.pid
-            remedy = f"Wake it by 'kill -CONT {pid}', or 'kill -9 {pid}': then the recording goes on in a further file."
+            remedy = f"Continue it: 'kill -CONT {pid}'. Or 'kill -9 {pid}': the recording goes on in a further file."
             doing = "messages wait for it, as far as there is room"
             self._absence = Absence(NAME, self._clock.now_s(), "it does not respond", doing, remedy)
             self.on_changed(f"its recorder does not respond; {doing}")

@@ -36,7 +36,7 @@ def refuse_if_up(mission: str) -> None:
     except run_files.MissionNotUp:
         return
     raise MissionAlreadyUp(
-        f"mission {mission} is up since before, launcher process {running.launcher_pid}", pid=running.launcher_pid
+        f"mission {mission} is up already, launcher process {running.launcher_pid}", pid=running.launcher_pid
     )
 
 

@@ -294,7 +294,7 @@ class TreeKeeper:
         except UnknownRequest:
             return []
         except LinkError as error:
-            raise OutcomeUnknown(f"the RC manager does not say what {name} claims: {error}") from error
+            raise OutcomeUnknown(f"the RC manager does not answer what {name} claims: {error}") from error
         return [request.arc for request in found.requests if component_of(request.owner) == name]
 
     async def _number(self, name: str, priority: int) -> str:

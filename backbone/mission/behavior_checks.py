@@ -125,7 +125,9 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
             continue
         if not name and not features:
             report.fault(
-                wish.place, f"a wish for a {wanted} without name and features", "Say which one, or remove the wish"
+                wish.place,
+                f"a wish for a {wanted} without name and features",
+                "Add a name or features, or remove the wish",
             )
         candidates = [tables.resources[name]] if name else there
         if there and not any(_has(resource, features) for resource in candidates):

@@ -33,7 +33,7 @@ class ReservedParameter(Refusal):
     """A behavior's own parameter has a name that belongs to the tree."""
 
     code = "mission.reserved_parameter"
-    remedy = f"Give the parameter another name; {', '.join(TREE_PARAMETERS)} are set by what starts a behavior."
+    remedy = f"Give the parameter another name; {', '.join(TREE_PARAMETERS)} are set when a behavior is started."
 
 
 def behavior_orders(description: MissionDescription) -> list[Start]:

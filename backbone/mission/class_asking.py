@@ -66,7 +66,7 @@ def arrange(question: UnitsQuestion) -> Arranged:
         printed, reason = _printed("arrange", [text])
         if not printed:
             remedy = "Mend the class of a module, so that its file can be imported"
-            return Arranged(faults=(UnitFault(f"the modules' classes tell nothing: {reason}", remedy),))
+            return Arranged(faults=(UnitFault(f"the modules' classes cannot be asked: {reason}", remedy),))
         _arranged[text] = msgspec.json.decode(printed[0], type=Arranged)
     return _arranged[text]
 

@@ -207,7 +207,7 @@ def _may_hold(node: Element, tag: str) -> None:
         there = listed([f"<{one}>" for one in allowed])
         raise EditRefused(
             f"<{tag}> does not belong in <{node.tag}>",
-            remedy=f"In <{node.tag}> may stand: {there}" if there else f"<{node.tag}> has no elements inside.",
+            remedy=f"<{node.tag}> may contain: {there}" if there else f"<{node.tag}> has no elements inside.",
         )
     if len(node.all(tag)) >= allowed[tag][1]:
         raise EditRefused(f"<{node.tag}> has its <{tag}> already", remedy="Change that one, or remove it first.")
@@ -225,7 +225,7 @@ def _may_be(new: NewElement) -> None:
 
 def _quoted(value: str, quote: str = '"') -> bytes:
     if strange := _NOT_XML.search(value):
-        raise EditRefused(f"the character {strange[0]!r} cannot stand in XML", remedy="Leave it out.")
+        raise EditRefused(f"the character {strange[0]!r} is not allowed in XML", remedy="Leave it out.")
     escaped = value.replace("&", "&amp;").replace("<", "&lt;").replace("\r", "&#13;")
     escaped = escaped.replace("\n", "&#10;").replace("\t", "&#9;")
     escaped = escaped.replace('"', "&quot;") if quote == '"' else escaped.replace("'", "&apos;")

@@ -76,5 +76,5 @@ def _check_tags(process: str, members: list[Element], tables: Tables, report: Re
         report.fault(
             members[0].place_of(PROCESS),
             f"no host can run all of process {process} ({listed([m.text('name') for m in members])}): {reasons}",
-            "Give a host all these tags, or let those who need them have another process",
+            "Give a host all these tags, or put the components that need them into another process",
         )

@@ -113,7 +113,7 @@ def _rename(parent: Element, child: Element, rule: ElementRule, report: Report) 
     known = child.tag in vocabulary()
     what = f"<{child.tag}> does not belong in <{parent.tag}>" if known else f"no element is called {quoted(child.tag)}"
     allowed = listed([f"<{tag}>" for tag in rule.children])
-    remedy = f"In <{parent.tag}> may stand: {allowed}" if allowed else f"<{parent.tag}> has no elements inside"
+    remedy = f"<{parent.tag}> may contain: {allowed}" if allowed else f"<{parent.tag}> has no elements inside"
     report.fault(child.place, what + _remark(meant), remedy)
     child.tag = meant or child.tag
     return bool(meant)

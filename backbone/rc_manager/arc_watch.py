@@ -119,4 +119,4 @@ class ArcWatch:
         try:
             await self._service.bus.ask(in_pool(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
-            self._service.story.note(arc, f"did not take its new path; the next RC manager would not know it: {error}")
+            self._service.story.note(arc, f"did not accept its new path; the next RC manager would not get it: {error}")

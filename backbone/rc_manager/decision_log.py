@@ -54,7 +54,7 @@ class DecisionLog:
         try:
             self._publish(self.snapshot())
         except NoSnapshot:
-            self._note("", "its planner cannot be written down: recordings have no state of the schedule")
+            self._note("", "its planner cannot be saved, so recordings have no state of the schedule")
         for record in self._manager.opening_lines():
             self.record(record)
 

@@ -122,7 +122,7 @@ class RcWatch:
             return False
         if rc not in self.up:
             if self._faults.pop(rc, ""):
-                self._service.story.note(rc, "makes sense again")
+                self._service.story.note(rc, "is credible again")
             self.up.add(rc)
             self._service.happened(RcCameBack(rc, state.last_epoch))
             if state.capacity != self.resources[rc].capacity:

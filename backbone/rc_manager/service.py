@@ -311,7 +311,7 @@ class RcManager(Component[RcManagerParameters]):
             for lease in self._leases()
             if lease.arc not in self._switches
         ):
-            self.story.note(rc, "does not have all holds any more that it was given")
+            self.story.note(rc, "has lost holds that it was given")
             self.happened(RcCameBack(rc, state.last_epoch))
 
     def _heard_of_packets(self, state: RcState) -> None:

@@ -122,7 +122,7 @@ def read_marks(text: str) -> list[Mark]:
             raise NoMarks(f"line {number}: it ends at {mark.to_s:g} s, before {mark.from_s:g} s", line=number)
         marks.append(mark)
     if not marks:
-        raise NoMarks("it has no mark")
+        raise NoMarks("the file has no mark")
     return marks
 
 

@@ -192,7 +192,7 @@ class _JoinedWriter:
         known = self._channels.get(same)
         if known is None:
             if len(self._channels) >= MOST_CHANNELS:
-                raise TooManyKeys(f"they have more than {MOST_CHANNELS} keys, senders and schemas")
+                raise TooManyKeys(f"the recordings have more than {MOST_CHANNELS} keys, senders and schemas")
             made = self._writer.register_channel(channel.topic, channel.message_encoding, schema, channel.metadata)
             known = self._channels[same] = made
         return known

@@ -39,7 +39,8 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
             raise
         why = None
     if why is None and component is None and absence is None:
-        raise UnknownName(f"nothing about {name!r} was said before {at_s:.3f} s{did_you_mean(name, states)}", name=name)
+        hint = did_you_mean(name, states)
+        raise UnknownName(f"the recording has nothing about {name!r} before {at_s:.3f} s{hint}", name=name)
     return printable_all(Reasons(name, why, None, component, absence))
 
 

@@ -137,7 +137,7 @@ class RecordedMission:
             UnknownRequest: The schedule has no entry of this name.
         """
         if address not in self.there:
-            raise NotAnswered(f"{address} is not there at {self.now_s:.3f} s")
+            raise NotAnswered(f"{address} is absent at {self.now_s:.3f} s")
         match question:
             case AskTime():
                 return MissionTime(self.now_s, self.rate)

@@ -47,7 +47,7 @@ def choose(state: ScheduleState, request: SchedulingRequest) -> tuple[str, ...]:
     known = [wish for wish in request.alternatives if wish.keys() <= state.rcs.keys()]
     if not known:
         missing = sorted({rc for wish in request.alternatives for rc in wish} - state.rcs.keys())
-        raise UnknownRc(f"{request.arc} asks for {', '.join(missing)}, which this mission has not", rc=missing[0])
+        raise UnknownRc(f"{request.arc} asks for {', '.join(missing)}, which this mission does not have", rc=missing[0])
     overloads = [_overloaded_alone(state, wish) for wish in known]
     possible = [wish for wish, overloaded in zip(known, overloads, strict=True) if overloaded is None]
     if possible:

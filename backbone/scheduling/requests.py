@@ -185,7 +185,7 @@ class UnknownRequest(SchedulingRefusal):
     """The RC manager knows no request, node or RC of this name."""
 
     code = "scheduling.unknown"
-    remedy = "See 'scout-backbone status' for the names that are there."
+    remedy = "See 'scout-backbone status' for the present names."
 
 
 class NotMovable(SchedulingRefusal):

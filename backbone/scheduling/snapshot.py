@@ -125,7 +125,7 @@ def read(raw: bytes) -> ScheduleManager:
     except _UNREADABLE as error:
         raise NoSnapshot(f"no snapshot of a schedule: {error}") from error
     if not isinstance(manager, ScheduleManager):
-        raise NoSnapshot("the snapshot is of something else than a schedule")
+        raise NoSnapshot("the snapshot does not contain a schedule")
     return manager
 
 

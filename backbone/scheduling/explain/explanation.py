@@ -159,7 +159,7 @@ class Explanation:
             return self._why_owner(name, owned, now_s)
         if name in self._state.rcs:
             return self._why_rc(self._state.rcs[name], now_s)
-        raise UnknownRequest(f"nothing named {name!r} asks for run time, and no RC is named so", name=name)
+        raise UnknownRequest(f"no ARC or owner named {name!r} asks for run time, and no RC has this name", name=name)
 
     def _why_owner(self, name: str, owned: Sequence[ArcEntry], now_s: float) -> Why:
         """Return the reasons for all its ARCs; state and rule are those of the ARC that waits longest."""
@@ -352,7 +352,7 @@ class Explanation:
 
 def _what_brings_back(rc: RcEntry) -> str:
     if rc.fault:
-        return f"it makes sense again; a restart helps: 'scout-backbone stop {rc.name}', then 'start {rc.kind}'"
+        return f"its report is credible again; a restart helps: 'scout-backbone stop {rc.name}', then 'start {rc.kind}'"
     return "its process answers again"
 
 
