@@ -102,7 +102,7 @@ class HandRecorders:
                 events.append((one.name, f"does not respond; it records to {one.beat.file}"))
             elif self._has_left(one, now_s) and not (one.is_silent and self._is_worth_naming(one, now_s)):
                 del self._known[claim]
-                left = f"ended without notice; if {one.beat.file} is incomplete: 'scout-backbone record recover'"
+                left = f"ended without notice; if {one.beat.file} is incomplete, use 'scout-backbone record recover'"
                 events.append((one.name, left))
         return events
 

@@ -15,7 +15,7 @@ from backbone.component.field_docs import field_docs
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
 
-ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; the end of their process ends no more of them
+ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; a hang or kill of their process ends no more
 
 
 def facts_of(class_path: str) -> ClassFacts:

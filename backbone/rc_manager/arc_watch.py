@@ -23,7 +23,7 @@ from backbone.wire import Envelope
 
 log = logging.getLogger(__name__)
 
-ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; a later one hangs or is gone
+ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; without an answer it hangs or is gone
 
 
 class ArcService(Protocol):

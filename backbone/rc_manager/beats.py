@@ -1,7 +1,7 @@
 """Beats: finds ARCs that hang, by the time since each one's last beat.
 
 Rules of this file: pure; the caller owns the clock.
-Rules of this file: pure; the caller owns the clock.
+
 * At most ``LOOK_MOST_S`` of the time between two checks counts as silence. A paused RC manager receives nothing, and
   beats sent meanwhile arrive only after it continues.
 """

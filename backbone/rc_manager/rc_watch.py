@@ -226,7 +226,7 @@ class RcWatch:
         return state
 
     async def _ask_doubted(self, rc: str) -> None:
-        """Ask the RC itself after an incredible publication, because any component may publish in its name."""
+        """Ask the RC itself after a publication that is not credible: any component may publish in its name."""
         self._doubted.add(rc)
         try:
             await self._ask(rc, self._service.manager.epoch_of(rc))

@@ -26,7 +26,7 @@ from backbone.wire import Message
 
 log = logging.getLogger(__name__)
 
-SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; a later answer means that the question was lost
+SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; without an answer by then, the question was lost
 RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
 
 
