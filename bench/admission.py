@@ -1,8 +1,8 @@
-"""What quicker tests than the exact one would admit to a radio, and what the exact one costs.
+"""Compares quick admission tests for a radio with the exact one, and measures the cost of the exact one.
 
-Random sets of periodic packets, deadline at the next release. The papers' sum of shares, the Liu-Layland
-and the hyperbolic bound are right for processors that can be interrupted; a packet once begun is sent.
-Counts the sets each of them admits, and how many of those miss a deadline. Prints one JSON line.
+The sets of periodic packets are random, with deadlines at the next release. The papers' sum of shares, the Liu-Layland
+bound and the hyperbolic bound are correct for processors that can be interrupted; a radio cannot interrupt a packet.
+Counts the sets that each test admits, and those of them that miss a deadline. Prints one JSON line.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from measuring import report, summary
 from backbone.scheduling.response_time import admissible
 from backbone.scheduling.streams import Stream, utilization
 
-PERIODS_S = (0.02, 0.2)  # a stick's commands to a dead man's sign of life
+PERIODS_S = (0.02, 0.2)  # from a stick's commands to a dead man's sign of life
 SIZES = (5, 20, 100)
 SHARES = (0.3, 1.0)
 TIMED_SETS = 40
 
 
 def random_set(rng: random.Random, count: int, share: float) -> list[Stream]:
-    """Return streams in rate-monotonic order that need this share of the radio together."""
+    """Return streams in rate-monotonic order that together need this share of the radio."""
     cuts = sorted([0.0, *(rng.random() for _ in range(count - 1)), 1.0])
     streams = []
     for low, high in itertools.pairwise(cuts):
@@ -36,7 +36,7 @@ def random_set(rng: random.Random, count: int, share: float) -> list[Stream]:
 
 
 def sum_of_shares(streams: Sequence[Stream]) -> bool:
-    """Admit what is no more than the radio has."""
+    """Admit if the sum of all shares is at most 1."""
     return admissible(streams, 1.0, "sum")
 
 
@@ -58,7 +58,7 @@ TESTS: dict[str, Callable[[Sequence[Stream]], bool]] = {
 
 
 def compare(rng: random.Random, sets: int) -> dict[str, dict[str, int]]:
-    """Return for each test how many sets it admits, and how many of them miss a deadline."""
+    """Return, for each test, the number of admitted sets, and of those that miss a deadline."""
     counts = {name: {"admitted": 0, "of_them_late": 0} for name in [*TESTS, "exact"]}
     for _ in range(sets):
         streams = random_set(rng, rng.randint(2, 10), rng.uniform(*SHARES))
@@ -72,7 +72,7 @@ def compare(rng: random.Random, sets: int) -> dict[str, dict[str, int]]:
 
 
 def cost(rng: random.Random, size: int) -> dict[str, float]:
-    """Return how long one analysis of so many streams takes that are all in time: a refusal is quicker."""
+    """Return the time of one analysis of so many streams that are all in time; a refusal is quicker."""
     times_s: list[float] = []
     while len(times_s) < TIMED_SETS:
         streams = random_set(rng, size, rng.uniform(*SHARES))

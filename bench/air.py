@@ -1,6 +1,6 @@
-"""What the air costs a frame: each effect by itself and all as in the papers, beside one cv2.add of two such pictures.
+"""The cost of the air for a frame: each effect alone, and all as in the papers, beside one cv2.add of two pictures.
 
-Effects and floor take turns, frame by frame, so all see the same machine. Prints one JSON line; ``ratio`` is an
+Effects and floor take turns, frame by frame, so that all run under the same load. Prints one JSON line; ``ratio`` is an
 effect's median over the floor's. The picture is drawn by a formula, nothing is rendered.
 """
 
@@ -26,7 +26,7 @@ EFFECTS = ("white_noise", "tears", "ghosts", "fades", "partial_frames")
 
 
 def only(**scales: float) -> AirDescription:
-    """Return air that has these effects alone."""
+    """Return air with only these effects."""
     return msgspec.structs.replace(CLEAN_AIR, **{**dict.fromkeys(EFFECTS, 0.0), "noise": 1.0, **scales})
 
 
@@ -47,7 +47,7 @@ CASES: dict[str, tuple[AirDescription, list[Signal], bool]] = {
 
 
 def reception(air: AirDescription, signals: list[Signal], anew: bool) -> Callable[[int], None]:
-    """Return what receives a frame, each time after another tuning if ``anew``."""
+    """Return a function that receives a frame; with ``anew``, each time after another tuning."""
     receiver = Receiver(1, "video1", air)
 
     def receive(frame: int) -> None:

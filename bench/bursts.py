@@ -1,8 +1,8 @@
-"""A thousand pictures of 320 x 240 sent at once: how many arrive, and when the last one does.
+"""A burst of a thousand pictures of 320 x 240: how many arrive, and when the last one does.
 
-To listeners in processes of their own, in turns: one that must lose nothing, one of all, one of the newest only, and
-beside them, through the same hub, bare zenoh-python with both answers to a full queue: drop and block. Prints one JSON
-line with the pictures delivered and the seconds from the first one sent to the last one delivered.
+Three kinds of listeners, each in a process of its own, take turns: lossless, all pictures, only the newest one. Beside
+them, through the same hub, bare zenoh-python runs with both policies for a full queue: drop and block. Prints one
+JSON line with the delivered pictures and the seconds from the first one sent to the last one delivered.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from resource_pool.messages import Frame
 MISSION, CLOCK, GRABBER, BARE = "bench", MissionClock(0.0), "resource_pool/framegrabber", "bare/frames"
 WAYS = ("lossless", "all", "newest", "bare_drop", "bare_block")
 PIXELS = memoryview(bytes(320 * 240))
-REST_S = 3.0  # chosen: nothing is on its way any more so long after the last one was sent
+REST_S = 3.0  # chosen: so long after the last picture was sent, none is on its way any more
 
 
 def be_hub(endpoint: str) -> None:
-    """Be the hub process."""
+    """Run as the hub process."""
     with zenoh.open(hub_config([endpoint])):
         print("ready", flush=True)
         wait_for_end_of_input()
 
 
 async def listen(endpoint: str, way: str) -> None:
-    """Be a listener; print its count and the time of its last picture at the end of input."""
+    """Run as a listener; print its count and the arrival of its last picture at the end of input."""
     came_s: list[float] = []
 
     def came(_one: object) -> None:
@@ -60,7 +60,7 @@ async def listen(endpoint: str, way: str) -> None:
 
 
 async def send(endpoint: str, way: str, pictures: int) -> None:
-    """Be the sender; print when the first picture was sent."""
+    """Run as the sender; print the time of the first picture."""
     bus, bare = ZenohBus.open(MISSION, GRABBER, CLOCK, client_config(endpoint)), zenoh.open(client_config(endpoint))
     control = zenoh.CongestionControl
     publisher = bare.declare_publisher(
@@ -68,7 +68,7 @@ async def send(endpoint: str, way: str, pictures: int) -> None:
         priority=zenoh.Priority.DATA_LOW,
         congestion_control=control.BLOCK if way == "bare_block" else control.DROP,
     )
-    await asyncio.sleep(0.3)  # of the machine: it knows the subscriptions
+    await asyncio.sleep(0.3)  # of the machine: the sender knows the subscriptions
     began_s = time.monotonic()
     for number in range(pictures):
         if way.startswith("bare"):
@@ -82,7 +82,7 @@ async def send(endpoint: str, way: str, pictures: int) -> None:
 
 
 def measure(way: str, pictures: int) -> tuple[int, float]:
-    """Return how many pictures arrived one way, and after how many seconds the last one did."""
+    """Return the number of pictures that arrived one way, and the seconds until the last one."""
     endpoint = free_endpoint()
     with ExitStack() as running:
 
@@ -101,7 +101,7 @@ def measure(way: str, pictures: int) -> tuple[int, float]:
 
 
 def line_of(one: subprocess.Popen[bytes]) -> str:
-    """Return what a process prints next."""
+    """Return the next line that a process prints."""
     assert one.stdout is not None
     return one.stdout.readline().decode().strip()
 

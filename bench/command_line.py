@@ -1,7 +1,7 @@
-"""How long a person waits for the command line: help, version, completion, status, beside a bare interpreter.
+"""Waiting times of the command line: help, version, completion, status, beside a bare interpreter.
 
-Prints one JSON line for each command: its median time from the start of the process to its end, and as floor that of
-``python -c pass``, both measured in turns. Completion and status run without a mission and beside the smallest one.
+Prints one JSON line for each command: its median time from the start of the process to its end, and as floor the time
+of ``python -c pass``, both measured in turns. Completion and status run without a mission and beside the smallest one.
 ``--aim`` ends with 1 if a median is above its aim.
 """
 
@@ -22,18 +22,18 @@ from measuring import BIN, report
 
 MISSION = Path(__file__).parents[1] / "docs" / "examples" / "smallest.xml"
 FLOOR = (sys.executable, "-c", "pass")
-HELP_S = COMPLETION_S = 0.12  # chosen: a person takes a tenth of a second for at once
-STATUS_S = 0.3  # chosen: with the time that the mission takes to answer
+HELP_S = COMPLETION_S = 0.12  # chosen: a person perceives a tenth of a second as immediate
+STATUS_S = 0.3  # chosen: includes the mission's time to answer
 
 
 def completion(*typed: str) -> dict[str, str]:
-    """Return what bash sets to ask for completions of the last word."""
+    """Return the environment that bash sets to ask for completions of the last word."""
     name = f"_{typed[0].replace('-', '_').upper()}_COMPLETE"
     return {name: "complete_bash", "COMP_WORDS": " ".join(typed), "COMP_CWORD": str(len(typed) - 1)}
 
 
 def seconds(command: Sequence[str], environment: Mapping[str, str]) -> float:
-    """Run the command once, and return how long it lived."""
+    """Run the command once, and return its duration."""
     began_s = time.perf_counter()
     subprocess.run(command, env=environment, check=False, capture_output=True)
     return time.perf_counter() - began_s
@@ -61,7 +61,7 @@ def measure(name: str, command: Sequence[str], aim_s: float, rounds: int, enviro
 
 @contextmanager
 def mission(environment: Mapping[str, str]) -> Iterator[None]:
-    """Have the smallest mission up until the block ends."""
+    """Keep the smallest mission up until the block ends."""
     program = str(BIN / "scout-backbone")
     subprocess.run([program, "up", str(MISSION), "--detach"], env=environment, check=True, capture_output=True)
     try:

@@ -1,4 +1,4 @@
-"""A command from a behavior to its ARC, from there to the robot's RC, and the answer back.
+"""Times of a command from a behavior to its ARC, from there to the robot's RC, and of the answer back.
 
 Prints one JSON line. The floor is one bare zenoh question through the mission's hub, asked by the behavior's own
 process between two commands; see ``commanding_behavior.py``.
@@ -47,7 +47,7 @@ FILE = f"""<mission name="{MISSION}" priority="10">
 
 
 async def measure(seconds: float) -> dict[str, float]:
-    """Answer bare questions for so long; return the behavior's statistics."""
+    """Answer bare questions for the given time; return the behavior's statistics."""
     found = find(MISSION)
     with zenoh.open(client_config(found.endpoint, secret(found))) as bare:
         serve_bare(bare)

@@ -1,6 +1,6 @@
-"""A behavior that commands its robot again and again and measures how long each command takes, for the benches.
+"""A behavior that commands its robot repeatedly and measures the time of each command, for the benches.
 
-Between two commands it asks on bare zenoh, through the same hub, so both see the same machine.
+Between two commands it asks on bare zenoh, through the same hub, so that both run under the same load.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PAUSE_S = 0.02  # chosen: one command at a time, as behaviors and consoles send 
 
 
 async def timed_s(call: Awaitable[object]) -> float:
-    """Return how long this takes."""
+    """Return the duration of this call."""
     began_s = time.perf_counter()
     await call
     return time.perf_counter() - began_s

@@ -1,7 +1,7 @@
-"""What an idle component costs in memory, beside a bare interpreter and a fresh one with the same imports.
+"""Memory of an idle component, beside a bare interpreter and a fresh one with the same imports.
 
-Prints one JSON line. ``own`` is the memory that would be freed if the process ended (unique set size),
-``share`` also counts its part of what it shares (proportional set size), both in MB of 10^6 bytes.
+Prints one JSON line. ``own`` is the memory that would be freed if the process ended (unique set size). ``share`` also
+counts its part of the shared memory (proportional set size). Both are in MB of 10^6 bytes.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def memory(pid: int) -> tuple[float, float]:
 
 
 def interpreter_memory(program: str) -> tuple[float, float]:
-    """Return the memory of an interpreter that did this and waits."""
+    """Return the memory of an interpreter that ran this program and waits."""
     command = [sys.executable, "-c", f"{program}; print(flush=True); input()"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None

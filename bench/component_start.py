@@ -1,8 +1,8 @@
 """From the order to all ready: 20 light components started by one creator, beside bare process starts.
 
-Prints one JSON line. Real hub, real nameserver, real creator; the components are started all at once, as
-the placer does it. Floors, measured in the same run: a bare zygote (imports done, no bus) that forks 20
-children which answer with one byte on a pipe, and 20 bare interpreters (``python -c pass``), two at a time.
+Prints one JSON line. Hub, nameserver and creator are real; the components are started all at once, as the placer starts
+them. Floors, measured in the same run: a bare zygote (imports done, no bus) that forks 20 children, which answer with
+one byte on a pipe; and 20 bare interpreters (``python -c pass``), two at a time.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ LIGHT = ComponentType("light", "light_component:Light", Subsystem.RESOURCE_POOL)
 
 @asynccontextmanager
 async def creator_up(folder: str) -> AsyncIterator[ZenohBus]:
-    """Give the placer's bus to a host with nameserver and creator."""
+    """Run a host with nameserver and creator, and yield the placer's bus."""
     clock = MissionClock.started_now()
     hub = Launch(
         "bench",
@@ -101,7 +101,7 @@ async def timed_start(bus: ZenohBus, count: int) -> float:
 
 
 def bare_forks() -> float:
-    """Return the seconds in which a process with everything imported forks 20 children and hears of each."""
+    """Return the seconds in which a process with all imports forks 20 children and gets a byte from each."""
     began_s = perf_counter()
     heard, said = os.pipe()
     pids = []

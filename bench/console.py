@@ -1,8 +1,8 @@
-"""What a console costs while the shipped mission runs: ``.venv/bin/python bench/console.py [SECONDS [CONSOLE …]]``.
+"""Cost of a console while the shipped mission runs: ``.venv/bin/python bench/console.py [SECONDS [CONSOLE …]]``.
 
-Starts the mission, then one console after the other in a terminal of 120 × 40, and measures each one's processor time
-and what the mission's own processes take meanwhile. The claim: a monitor takes under 2 % of one core and changes no
-grant. It takes about a minute and a half.
+Starts the mission, then one console after the other in a terminal of 120 × 40. Measures the processor time of each
+console, and of the mission's own processes meanwhile. The claim: a monitor takes under 2 % of one core and changes no
+grant. The run takes about a minute and a half.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def in_a_terminal(command: list[str]) -> Iterator[tuple[psutil.Process, list[int
 
 
 def busy_s(processes: list[psutil.Process]) -> float:
-    """Return the processor time these took so far; one that has ended counts as none."""
+    """Return the processor time of these processes so far; one that has ended counts 0."""
     total = 0.0
     for process in processes:
         try:
@@ -85,14 +85,14 @@ def mission_processes(launcher: int) -> list[psutil.Process]:
 
 
 def turns_of_consoles() -> int:
-    """Return how many requests consoles have in the schedule."""
+    """Return the number of consoles' requests in the schedule."""
     done = subprocess.run([str(BIN / "scout-backbone"), "status", "--json"], capture_output=True, check=True)
     status: dict[str, Any] = json.loads(done.stdout)
     return sum(request["owner"].startswith("ui_console/") for request in status["requests"])
 
 
 def launcher_pid() -> int:
-    """Return the process of the launcher, as its run file tells."""
+    """Return the launcher's process id from its run file."""
     [run_file] = Path(os.environ["XDG_RUNTIME_DIR"]).glob("scout-backbone/*/run.json")
     return int(json.loads(run_file.read_text())["launcher_pid"])
 

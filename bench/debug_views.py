@@ -1,8 +1,8 @@
-"""What debug views cost: pictures a second of a watcher without a console that looks, and without views.
+"""Cost of debug views: pictures a second of a watcher whose views no console shows, and of one without views.
 
-One watcher sees noisy pictures of a room with something that moves, as ``see`` gets them; the two take turns, picture
-by picture. Times are of the process, one core. Prints one JSON line; ``ratio`` is pictures a second with views and
-no console that looks over those without views, ``ratio_looked_at`` the same while every view of it is looked at.
+Two watchers get the same noisy pictures of a room with a moving body, as ``see`` gets them; they take turns, picture
+by picture. Times are of the process, one core. Prints one JSON line; ``ratio`` is pictures a second with views that no
+console shows, over those without views; ``ratio_looked_at`` is the same while a console shows every view.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ ROUNDS = 5
 
 
 class WithoutViews(WatchForMotion):
-    """The floor: the same decisions, and no view."""
+    """The floor: the same decisions, without views."""
 
     def _show_stages(self) -> None:
         pass
@@ -53,7 +53,7 @@ def filmed(count: int) -> list[Frame]:
 
 
 def watcher(kind: Callable[[Launch, Bus, Clock], WatchForMotion], name: str, network: LocalNetwork) -> WatchForMotion:
-    """Return a watcher that is not started: it sees what it is given."""
+    """Return a watcher that is not started; the caller passes it the pictures."""
     clock = MissionClock.started_now()
     launch = Launch(
         network.mission, Subsystem.MISSION_CONTROL, name, "watch", "here", "here", "", clock.origin_monotonic_s, 1.0
@@ -65,13 +65,13 @@ def watcher(kind: Callable[[Launch, Bus, Clock], WatchForMotion], name: str, net
 
 
 def _never(work: Coroutine[object, None, None], name: str) -> None:
-    """Close the work: no ARC is there to be asked for more time."""
+    """Close the work, because no ARC exists that could be asked for more time."""
     del name
     work.close()
 
 
 def turns_s(one: WatchForMotion, other: WatchForMotion, frames: list[Frame]) -> tuple[float, float]:
-    """Show each picture to both; return the process's seconds for each of them."""
+    """Pass each picture to both; return the process's seconds for each watcher."""
     took = [0, 0]
     for number, frame in enumerate(frames):
         both = (0, one), (1, other)

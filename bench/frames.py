@@ -1,9 +1,9 @@
 """Pictures of 320 x 240 grey levels (76.8 kB), 30 a second, from one process to 1, 4 and 16 listeners of its host.
 
-The bus gives them to its listeners by a blackboard. Beside it, in the same run and in turns of a second: bare
-zenoh-python with shared memory, through the same hub, with as many bytes and the same bridge into asyncio; both drop
-what finds a queue full. Prints one JSON line for each number of listeners: latency of all listeners' pictures, and the
-processor time of sender, hub and listeners together for one picture, without what they use when nothing is sent.
+The bus sends them to its listeners by a blackboard. Beside it, in the same run and in turns of a second: bare
+zenoh-python with shared memory, through the same hub, with as many bytes and the same bridge into asyncio. Both drop
+pictures if a queue is full. Prints one JSON line for each number of listeners: latency of all listeners' pictures, and
+the processor time of sender, hub and listeners together for one picture, without their idle use.
 ``ratio`` is bus p50 over bare p50, ``processor_ratio`` the same of processor times; ``ros1`` has both of ROS 1.
 """
 
@@ -41,13 +41,13 @@ MISSION, CLOCK = "bench", MissionClock(0.0)
 GRABBER = address(Subsystem.RESOURCE_POOL, "framegrabber")
 BARE_KEY = "bare/frames"
 WIDTH_PX, HEIGHT_PX, RATE_HZ = 320, 240, 30.0
-TURN_S, REST_S = 1.0, 0.1  # chosen: a turn of each way, and a rest that no picture of the other way reaches over
-WARM_UP = 10_000_000  # number of the first of those pictures that count for nothing
+TURN_S, REST_S = 1.0, 0.1  # chosen: a turn of each way, and a rest longer than any picture of the other way takes
+WARM_UP = 10_000_000  # first number of the pictures that are not counted
 READY_S = 30.0
 ROS1_US = {1: (562, 660), 4: (828, 777), 16: (1882, 1606)}
 """Listeners → p50 of ROS 1, and of bare zenoh with shared memory beside it, for the same pictures.
 
-Source: measured for issue 16 in one run, before this program was; on another machine, so only the ratio says something.
+Source: measured for issue 16 in one run, before this program existed; on another machine, so use only the ratio.
 """
 ROS1_PROCESSOR_MS = {1: (0.89, 1.56), 4: (2.24, 2.51), 16: (6.79, 6.43)}
 """The same of processor time for a picture; same source."""
@@ -68,7 +68,7 @@ def joined(folder: str, source: str) -> tuple[ZenohBus, zenoh.Session]:
 
 
 def be_hub(folder: str) -> None:
-    """Be the hub process."""
+    """Run as the hub process."""
     with zenoh.open(with_shared_memory(hub_settings([socket_endpoint(Path(folder))], [], ""))):
         wait_for_end_of_input()
 
@@ -79,7 +79,7 @@ def processor_s(pids: Sequence[int]) -> float:
 
 
 async def publish(folder: str, frames: int, pids: list[int]) -> None:
-    """Be the publishing process: turns of both ways; print the processor time of each for a picture."""
+    """Run as the publishing process, in turns of both ways; print the processor time of each for a picture."""
     bus, bare = joined(folder, GRABBER)
     publisher = bare.declare_publisher(
         BARE_KEY, priority=zenoh.Priority.DATA_LOW, congestion_control=zenoh.CongestionControl.DROP
@@ -116,7 +116,7 @@ async def publish(folder: str, frames: int, pids: list[int]) -> None:
 
 
 async def listen(folder: str, name: str) -> None:
-    """Be a listener; print the latencies of both ways at the end of input."""
+    """Run as a listener; print the latencies of both ways at the end of input."""
     bus, bare = joined(folder, address(Subsystem.MISSION_CONTROL, name))
     loop, latencies_s = asyncio.get_running_loop(), {"bus": list[float](), "bare": list[float]()}
 
@@ -145,7 +145,7 @@ async def listen(folder: str, name: str) -> None:
 
 
 def ratios(listeners: int, p50_s: Mapping[str, float], processor_us: Mapping[str, float]) -> dict[str, object]:
-    """Return the bus to bare zenoh, and beside it what ROS 1 was to bare zenoh, if that was measured."""
+    """Return the ratio of the bus to bare zenoh, and that of ROS 1 to bare zenoh, if it was measured."""
     ratio, processor_ratio = p50_s["bus"] / p50_s["bare"], processor_us["bus"] / max(1.0, processor_us["bare"])
     told: dict[str, object] = {"ratio": round(ratio, 3), "processor_ratio": round(processor_ratio, 3)}
     if listeners in ROS1_US:
@@ -195,7 +195,7 @@ def socket_is_there(folder: str) -> bool:
 
 
 def line_of(one: subprocess.Popen[bytes]) -> str:
-    """Return what a process prints next."""
+    """Return the next line that a process prints."""
     assert one.stdout is not None
     return one.stdout.readline().decode().strip()
 

@@ -1,4 +1,4 @@
-"""What a mission costs while nobody asks anything of it: wake-ups and processor time, process by process.
+"""Cost of an idle mission: wake-ups and processor time, process by process, while no client asks anything.
 
 Prints one JSON line. A wake-up is a context switch of a thread that had waited (voluntary, from ``/proc``). The floor
 is a hub of zenoh and as many clients that only listen, with the settings of the mission's own processes.
@@ -22,7 +22,7 @@ SETTLE_S = 5.0  # chosen: the behaviors have their ARCs, and the first slices ha
 
 
 def wake_ups(pid: int) -> int:
-    """Return how often the threads of a process have waited since they began."""
+    """Return how often the threads of a process have waited since their start."""
     found = 0
     for status in Path(f"/proc/{pid}/task").glob("*/status"):
         lines = dict(line.split(":", 1) for line in status.read_text().splitlines())
@@ -38,7 +38,7 @@ def processor_s(pid: int) -> float:
 
 @contextmanager
 def mission_up(mission: Path) -> Iterator[psutil.Process]:
-    """Bring a mission up until the block ends; give its launcher."""
+    """Keep a mission up until the block ends; yield its launcher."""
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_RUNTIME_DIR"] = folder
         command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
@@ -57,7 +57,7 @@ def mission_up(mission: Path) -> Iterator[psutil.Process]:
 
 
 def name_of(process: psutil.Process) -> str:
-    """Return what a process is called; the zygote names each for its component."""
+    """Return the name of a process; the zygote names each process for its component."""
     return Path(f"/proc/{process.pid}/comm").read_text().strip()
 
 

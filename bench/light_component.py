@@ -1,4 +1,4 @@
-"""The lightest component there can be, for the benches."""
+"""The lightest possible component, for the benches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the programs in bench/ share: a hub and helpers in processes of their own, percentiles, one JSON line."""
+"""Shared parts of the programs in bench/: a hub and helpers in processes of their own, percentiles, one JSON line."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STOLEN_BEFORE_S: float = psutil.cpu_times().steal if psutil.LINUX else 0.0
 
 
 def percentile(values: Sequence[float], share: float) -> float:
-    """Return the value under which this share (0 to 1) of the values lies.
+    """Return the value below which this share (0 to 1) of the values lies.
 
     Example:
         >>> percentile([4.0, 1.0, 3.0, 2.0], 0.5)
@@ -44,10 +44,10 @@ def summary(values_s: Sequence[float]) -> dict[str, float]:
 
 
 def report(claim: str, **measured: Any) -> None:
-    """Print one JSON line: the claim, what was measured, and how busy the machine was.
+    """Print one JSON line: the claim, the measured values, and the load of the machine.
 
-    ``stolen_s`` is the time, since the program began, in which a processor had work and another machine ran on it.
-    A number that is far from its usual one means little where that is not nearly 0.
+    ``stolen_s`` is the time, since the program began, in which a processor had work but another machine ran on it.
+    If it is not nearly 0, an unusual measurement means little.
     """
     stolen_s = psutil.cpu_times().steal - _STOLEN_BEFORE_S if psutil.LINUX else 0.0
     machine = {"cpus": os.cpu_count(), "load": round(os.getloadavg()[0], 2), "stolen_s": round(stolen_s, 2)}

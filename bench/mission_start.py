@@ -1,7 +1,7 @@
 """From the command to all ready: the whole mission of IROS 2001, figure 2, beside bare process starts.
 
-Prints one JSON line: the seconds the launcher took, from its first instruction and from the shell's, and
-as floor the seconds a machine needs to start as many bare interpreters, two at a time.
+Prints one JSON line: the seconds that the launcher took, by its own clock and by the shell's; and, as floor, the
+seconds that the machine needs to start as many bare interpreters, two at a time.
 """
 
 from __future__ import annotations

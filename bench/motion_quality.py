@@ -1,12 +1,11 @@
-"""How well motion is told from noise: precision, recall and false alarms per hour, from seeded noisy clips.
+"""Quality of motion detection in noise: precision, recall and false alarms per hour, from seeded noisy clips.
 
-A Scout watches the published path for slices of five seconds; in the crossings a Pioneer or a person
-passes, in the still clips nothing moves.  Every detector sees the same received pictures: the one used,
-the same without its filter of whole rows, and the earlier frame averaging.  Prints a table and one JSON
-line.
+A Scout watches the published path for slices of five seconds. In the crossings a Pioneer or a person passes; in the
+still clips nothing moves. Every detector gets the same received pictures: the shipped one, the same one without its
+filter of whole rows, and the earlier frame averaging. Prints a table and one JSON line.
 
-An alarm counts as right while the body covers at least ``SEEN_PX`` pixels of the picture as sent, or
-did in the half second before; recall is the share of crossings with a right alarm.
+An alarm counts as right while the body covers at least ``SEEN_PX`` pixels of the picture as sent, or did so within the
+last half second. Recall is the share of crossings with a right alarm.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ DETECTORS = ("as used", "without row filter", "frame averaging")
 
 @dataclass
 class Count:
-    """What one detector did."""
+    """The alarms of one detector."""
 
     right: int = 0
     wrong: int = 0
@@ -63,7 +62,7 @@ class Count:
 
 
 def crossing(target: Target) -> tuple[list[Picture], list[bool]]:
-    """Return the pictures as sent while the target passes, and in which of them it is in view."""
+    """Return the pictures as sent while the target passes, and whether it is in view in each."""
     places = [RobotPlace("scout", 1, 4.0, 0.7, math.pi / 2)]
     table = [Furniture("table", 6.5, 4.8, 1.6, 0.7, 0.72)]
     world = World(WorldDescription(9.0, 6.0, 1, furniture=table, robots=places, targets=[target]))
@@ -80,7 +79,7 @@ def crossing(target: Target) -> tuple[list[Picture], list[bool]]:
 
 
 def received(pictures: list[Picture], seed: int, noise: float, first_frame: int) -> Iterator[Picture]:
-    """Yield the pictures as they come out of the receiver."""
+    """Yield the pictures as received."""
     receiver = Receiver(seed, "A", AirDescription(noise=noise))
     for number in range(SETTLING_FRAMES):
         receiver.receive([Signal(pictures[0], "scout")], first_frame + number)
@@ -90,7 +89,7 @@ def received(pictures: list[Picture], seed: int, noise: float, first_frame: int)
 
 
 def looks(pictures: Iterator[Picture]) -> Iterator[dict[str, bool]]:
-    """Yield which detectors give an alarm."""
+    """Yield, for each picture, which detectors give an alarm."""
     used, unfiltered, averaging = MotionDetector(), MotionDetector(filters_rows=False), FrameAveraging()
     for picture in pictures:
         answers = (used.look(picture), unfiltered.look(picture), averaging.look(picture))
@@ -98,9 +97,9 @@ def looks(pictures: Iterator[Picture]) -> Iterator[dict[str, bool]]:
 
 
 def measure(noise: float, crossings: int, still_slices: int, seed: int) -> dict[str, Count]:
-    """Return what each detector did under this noise."""
+    """Return the counts of each detector under this noise."""
     counts = {name: Count() for name in DETECTORS}
-    # They depart after a second, in which the robot came to rest on its wheels and one in which its view is learned.
+    # They depart after two seconds: one in which the robot came to rest, and one in which its view is learned.
     bodies = [
         Target("pioneer", "pioneer", [(2.6, 3.0), (8.0, 3.0)], 0.5, begin_s=1.5),
         Target("person", "person", [(1.6, 3.0), (8.0, 3.0)], 1.2, begin_s=1.5),

@@ -1,11 +1,11 @@
-"""Latency of a value over its size, by where its two modules are: unit, thread, or process of one host.
+"""Latency of a value over its size, by the placement of its two modules: unit, thread, or process of one host.
 
-``unit``: two modules of one execution unit, which hand over the object itself. ``thread``: two units of one process,
-each in a thread of its own. ``board``: two processes, by the bus with a blackboard. ``network``: two processes, by the
-bus through the hub, without shared memory. Beside them, in the same run, the floors: ``queue``, two bare threads and a
+``unit``: two modules of one execution unit, which pass the object itself. ``thread``: two units of one process, each in
+a thread of its own. ``board``: two processes, by the bus with a blackboard. ``network``: two processes, by the bus
+through the hub, without shared memory. Beside them, in the same run, the floors: ``queue``, two bare threads and a
 queue; ``socket``, a bare unix socket whose receiver reads the whole value; and ``zenoh``, bare zenoh-python through the
-same hub. Values between processes alternate by all ways. Prints one JSON line: p50 in microseconds by size and way, and
-the ratio of each way to its floor. A value of more than 8 MiB does not go by the network.
+same hub. Values between processes alternate between all ways. Prints one JSON line: p50 in microseconds by size and
+way, and the ratio of each way to its floor. A value of more than 8 MiB is not sent by the network.
 
 ``--plot FILE``, PNG or SVG, draws the line, as Figure 5 of RoboFrame 2006 does: floors are dashed.
 """
@@ -49,19 +49,19 @@ from mission_control.modules.unit_component import UnitComponent
 MISSION, CLOCK = "bench", MissionClock(0.0)
 SIZES = (64, 1_000, 16_000, 76_800, 921_600, 10_000_000)
 SENDER, RECEIVER = (address(Subsystem.MISSION_CONTROL, name) for name in ("sender", "receiver"))
-WARM_UP = 10  # values of each way, in which the bus finds its way
+WARM_UP = 10  # values of each way before the measurement, in which connections are set up
 BARE_KEY, OVER_KEY = "bare/values", "bare/over"
 HEAD = struct.Struct("<Qd")
-PAUSE_S, PAUSE_A_BYTE_S = 0.004, 3e-9  # chosen: no value waits for the one before it
+PAUSE_S, PAUSE_A_BYTE_S = 0.004, 3e-9  # chosen: no value waits for the preceding one
 READY_S = 30.0
-THREADS_HZ = 200.0  # chosen: no value waits for the one before it
+THREADS_HZ = 200.0  # chosen: no value waits for the preceding one
 FLOORS = {"thread": "queue", "board": "socket", "network": "zenoh"}
 LATENCIES_S: list[float] = []
-"""What the sink of this process noted."""
+"""Latencies that the sink of this process measured."""
 
 
 class Large(Message, frozen=True):
-    """A value that says when it was made, on the clock that all processes of a machine share."""
+    """A value with the time at which it was made, on the clock that all processes of a machine share."""
 
     made_s: MachineTime
     data: Bulk
@@ -76,14 +76,14 @@ class Source(Module):
         value: Large
 
     class Parameters(Module.Parameters, frozen=True):
-        """How large it is, in bytes."""
+        """Size of the value, in bytes."""
 
         size: int
 
     parameters: Parameters
 
     def reset(self) -> None:
-        """Make the data anew."""
+        """Make new data."""
         self.data = memoryview(bytes(self.parameters.size))
 
     def update(self, _inputs: Module.Inputs) -> Outputs:
@@ -92,7 +92,7 @@ class Source(Module):
 
 
 class Sink(Module):
-    """Takes values and notes how old they are."""
+    """Receives values and records their ages."""
 
     class Inputs(Module.Inputs):
         """The value."""
@@ -100,11 +100,11 @@ class Sink(Module):
         value: Large
 
     def reset(self) -> None:
-        """Forget."""
+        """Forget all ages."""
         LATENCIES_S.clear()
 
     def update(self, inputs: Inputs) -> Module.Outputs:
-        """Note one."""
+        """Record the age of a value."""
         LATENCIES_S.append(time.monotonic() - inputs.value.made_s)
         return self.Outputs()
 
@@ -150,7 +150,7 @@ async def between_threads(size: int, values: int) -> list[float]:
 
 
 def between_bare_threads(size: int, values: int) -> list[float]:
-    """Return the latencies of an object that goes from one thread to another by a queue."""
+    """Return the latencies of an object passed from one thread to another by a queue."""
     handed: queue.SimpleQueue[tuple[float, bytes] | None] = queue.SimpleQueue()
     found: list[float] = []
 
@@ -177,7 +177,7 @@ Say = Callable[[], None]
 
 
 def ways_to_say(raw: socket.socket, bare: zenoh.Session, near: ZenohBus, far: ZenohBus, size: int) -> list[Say]:
-    """Return what sends a value of this size by each way."""
+    """Return, for each way, a function that sends a value of this size."""
     data = bytes(size)
     publisher = bare.declare_publisher(f"{BARE_KEY}/{size}")
 
@@ -194,7 +194,7 @@ def ways_to_say(raw: socket.socket, bare: zenoh.Session, near: ZenohBus, far: Ze
 
 
 async def send(folder: str, values: int) -> None:
-    """Be the sending process."""
+    """Run as the sending process."""
     endpoint = socket_endpoint(Path(folder))
     near = ZenohBus.open(MISSION, SENDER, CLOCK, client_config(endpoint))
     near.boards = boards_for(folder)
@@ -218,19 +218,19 @@ async def send(folder: str, values: int) -> None:
 
 
 def be_hub(folder: str) -> None:
-    """Be the hub process."""
+    """Run as the hub process."""
     with zenoh.open(hub_config([socket_endpoint(Path(folder))])):
         wait_for_end_of_input()
 
 
 class Latencies:
-    """How old values were when they arrived, by way and size."""
+    """Ages of values at their arrival, by way and size."""
 
     def __init__(self) -> None:
         self.by_way: dict[str, dict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
 
     def note(self, way: str, size: int, made_s: float) -> None:
-        """Take a value that arrives now."""
+        """Record a value that arrives now."""
         self.by_way[way][size].append(time.monotonic() - made_s)
 
     def report(self, values: int) -> dict[str, dict[int, float]]:
@@ -256,7 +256,7 @@ class Latencies:
 
 
 async def measure(folder: str, values: int) -> dict[str, dict[int, float]]:
-    """Be the receiving process, and report; return way → size → p50 in microseconds."""
+    """Run as the receiving process, and report; return way → size → p50 in microseconds."""
     latencies, endpoint = Latencies(), socket_endpoint(Path(folder))
     loop, over = asyncio.get_running_loop(), asyncio.Event()
 
@@ -267,7 +267,7 @@ async def measure(folder: str, values: int) -> dict[str, dict[int, float]]:
                 await reader.readexactly(size)
                 latencies.note("socket", size, made_s)
         except (asyncio.IncompleteReadError, asyncio.CancelledError):
-            writer.close()  # asyncio prints a stream's handler that is cancelled as a bug
+            writer.close()  # if a stream's handler is cancelled, asyncio prints that as a bug
 
     def arrived(sample: zenoh.Sample) -> None:
         latencies.note("zenoh", *HEAD.unpack_from(sample.payload.to_bytes()))

@@ -1,4 +1,4 @@
-"""Draws what ``placements.py`` measured: latency over size by way, both axes logarithmic, floors dashed.
+"""Draws the measurements of ``placements.py``: latency over size by way, both axes logarithmic, floors dashed.
 
 Source of the picture: RoboFrame 2006, Figure 5.
 """
@@ -29,8 +29,8 @@ def draw(p50_us: Mapping[str, Mapping[int, float]], floors: Mapping[str, str], f
 
     Args:
         p50_us: Way → size in bytes → latency.
-        floors: Way → its floor, which gets its color.
-        file: Where to.
+        floors: Way → its floor, which is drawn in the same color.
+        file: File of the picture.
     """
     numbers = {way: number for number, way in enumerate(way for way in NAMES if way not in floors.values())}
     numbers |= {floor: numbers[way] for way, floor in floors.items()}

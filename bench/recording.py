@@ -1,9 +1,9 @@
-"""What a recorder costs: its processor time, and context switches with and without it.
+"""Cost of a recorder: its processor time, and context switches with and without it.
 
-Runs the mission of IROS 2001 with short slices several times: alone, with a recorder of everything, and with a process
-that takes all copies of its host and keeps nothing, which is the floor. Asks the RC manager a question twenty times a
-second meanwhile. Prints one JSON line; ``core_share`` and ``floor_share`` are parts of one core, ``switch_ratio`` and
-``question_ratio`` are medians with a recorder over those without.
+Runs the mission of IROS 2001 with short slices several times: alone, with a recorder of everything, and, as the floor,
+with a process that receives all copies of its host and discards them. Meanwhile it asks the RC manager a question
+twenty times a second. Prints one JSON line; ``core_share`` and ``floor_share`` are parts of one core, ``switch_ratio``
+and ``question_ratio`` are medians with a recorder over those without.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SETTLE_S = 3.0  # chosen: the recorder's imports and its first questions are ove
 
 @dataclass
 class Runs:
-    """What was measured in the runs of one kind."""
+    """Measurements in the runs of one kind."""
 
     switches_s: list[float] = field(default_factory=list)
     late_switches_s: list[float] = field(default_factory=list)
@@ -41,7 +41,7 @@ class Runs:
 
 
 def run(mission: Path, seconds: float, listener: list[str], runs: Runs) -> float:
-    """Run the mission once, with a process that overhears it or without; return that process's part of a core."""
+    """Run the mission once, with or without a process that overhears it; return that process's share of a core."""
     command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
         assert launcher.stderr is not None
@@ -73,7 +73,7 @@ def busy_s(recorder: subprocess.Popen[bytes] | None) -> float:
 
 
 async def overhear() -> None:
-    """Take all copies of this host and keep nothing, until SIGINT."""
+    """Receive all copies of this host and discard them, until SIGINT."""
     ended = asyncio.Event()
     asyncio.get_running_loop().add_signal_handler(signal.SIGINT, ended.set)
     ear = HostEar(run_files.run_directory("switching"), is_of_mission=True)

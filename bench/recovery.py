@@ -1,17 +1,17 @@
-"""Break a running mission, one process at a time or two, and see how it comes through.
+"""Injects faults into a running mission, in one process at a time or two, and measures its recovery.
 
 Each process of ``mission.xml`` gets SIGKILL, SIGTERM and SIGSTOP of 0.3, 1, 5 and 30 s, each in a mission
 of its own. Printed for each, as one JSON line:
 
-* ``noticed_s``: until a look at the mission shows it (health, the victim's process or restarts, what is absent).
-* ``healthy_s``: until health is ``ok``, everything runs again and pictures flow, to stay; 0: it never was otherwise.
-* ``unsaid_s``: the longest time for which the mission was less than it should be and its health said ``ok``.
-* ``gap_s``: the longest time without a picture; ``usual_gap_s``: before the fault, at a switch.
+* ``noticed_s``: until a look at the mission shows the fault (health, the victim's process or restarts, absences).
+* ``healthy_s``: until health is lastingly ``ok``, everything runs and pictures arrive; 0: this never ended.
+* ``unsaid_s``: longest time in which the mission lacked something although its health was ``ok``.
+* ``gap_s``: longest time without a picture; ``usual_gap_s``: the same before the fault, at a switch.
 * ``violations`` of the trace of scheduling decisions, ``late_by_pause``: starts that were late because the RC manager
-  itself was stopped, ``more``: processes beyond those before the fault,
+  itself was stopped, ``more``: processes in addition to those before the fault,
   ``left``: processes left after ``down``.
 
-``--pairs``, ``--again``, ``--during`` and ``--soak`` do other things to it. ``--table`` adds a table for people.
+``--pairs``, ``--again``, ``--during`` and ``--soak`` inject other faults. ``--table`` also prints a table for people.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ from recovery_verdict import Fault
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What is done to one mission."""
+    """The faults of one mission."""
 
     strikes: tuple[tuple[str, str], ...]
 
     def said(self) -> dict[str, str]:
-        """Return the case for a report."""
+        """Return the faults for a report."""
         return {
             "victim": " + ".join(victim for victim, _ in self.strikes),
             "fault": " + ".join(fault for _, fault in self.strikes),
@@ -55,7 +55,7 @@ class Case:
 
 
 def try_case(case: Case, patience_s: float) -> dict[str, Any]:
-    """Return what one case does to a mission of its own."""
+    """Inject the faults into a mission of their own; return the effects."""
     with breaker(patience_s) as breaking:
         expected = breaking.calm()
         faults = [breaking.fault(victim, name) for victim, name in case.strikes]
@@ -65,7 +65,7 @@ def try_case(case: Case, patience_s: float) -> dict[str, Any]:
 
 
 def launcher_ended(breaking: Breaker, faults: Sequence[Fault]) -> dict[str, Any]:
-    """Return how long it takes until nothing is left of a mission whose launcher is ended."""
+    """Return the time until nothing remains of a mission whose launcher is ended."""
     mission = breaking.mission
     breaking.strike(faults)
     mission.launcher.wait(DOWN_WITHIN_S)
@@ -76,7 +76,7 @@ def launcher_ended(breaking: Breaker, faults: Sequence[Fault]) -> dict[str, Any]
 
 
 def again(victim: str, times: int, fault: str) -> None:
-    """Do the same thing to the same victim, as soon as the mission is whole again."""
+    """Inject the same fault into the same victim repeatedly, each time after the mission has recovered."""
     with breaking_calm() as (breaking, expected):
         for number in range(1, times + 1):
             found = breaking.see_through(expected, [breaking.fault(victim, fault)])
@@ -87,7 +87,7 @@ def again(victim: str, times: int, fault: str) -> None:
 
 
 def pairs(number: int, seed: int, victims: Sequence[str]) -> list[Case]:
-    """Return any two different victims at once, each with any fault."""
+    """Return pairs of different random victims, each with a random fault."""
     rng = random.Random(seed)
     able = [victim for victim in victims if victim != "launcher"]
     return [Case(tuple((victim, rng.choice(FAULTS)) for victim in rng.sample(able, 2))) for _ in range(number)]
@@ -104,7 +104,7 @@ def table(results: Sequence[dict[str, Any]]) -> str:
 
 
 def cell(result: dict[str, Any] | None) -> str:
-    """Return one case as a cell: noticed / healthy / gap, or the time up or down took; seconds."""
+    """Return one case as a cell: noticed / healthy / gap, or the duration of up or down; seconds."""
     if result is None:
         return ""
     if "gone_s" in result:
@@ -119,7 +119,7 @@ def cell(result: dict[str, Any] | None) -> str:
 
 
 def main() -> None:
-    """Break and print."""
+    """Inject the faults and print the effects."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--victim", action="append", choices=list(ROWS), help="only these")
     parser.add_argument("--fault", action="append", choices=FAULTS, help="only these")

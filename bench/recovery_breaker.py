@@ -1,4 +1,4 @@
-"""The victims of a mission, what can be done to them, and the loop that waits until all is well again."""
+"""The victims of a mission, the faults for them, and the loop that waits for the recovery."""
 
 from __future__ import annotations
 
@@ -45,20 +45,20 @@ FAULTS = (*SIGNALS, *STOPS_S)
 UP_WITHIN_S = 90.0
 CALM_S = 6.0  # chosen: longer than a turn, so that the usual gap of pictures at a switch is seen
 STAYS_S = 2.0  # chosen: twice ``GONE_AFTER_S`` of a peer monitor
-MENDED_WITHIN_S = 40.0  # chosen: what takes longer is not mended
+MENDED_WITHIN_S = 40.0  # chosen: a fault that lasts longer counts as not mended
 DOWN_WITHIN_S = 30.0
-SHOWN = 5  # how many violations are spelt out
+SHOWN = 5  # number of violations that are printed in full
 
 
 class Breaker:
-    """Does things to a mission that is up, and says what came of them."""
+    """Injects faults into a mission that is up, and reports the effects."""
 
     def __init__(self, mission: BenchMission, patience_s: float = MENDED_WITHIN_S) -> None:
         self.mission, self.watch, self.patience_s = mission, mission.watch, patience_s
         self.struck: list[Fault] = []
 
     def calm(self) -> Expected:
-        """Return how the mission is when nothing is done to it."""
+        """Return the state of the mission without faults."""
         look = self.watch.wait(
             "everything runs", lambda look: look.sight.get("asks", []) >= sorted(WATCHERS) and look.word == "ok", 30.0
         )
@@ -67,10 +67,10 @@ class Breaker:
         return Expected(look, frozenset(n for n in look.ready() if not n.startswith(("cli-", "console"))), WATCHERS)
 
     def fault(self, victim: str, name: str) -> Fault:
-        """Return what is to be done to the victim as it is now.
+        """Return the fault of the victim's present process.
 
         Raises:
-            NotSeen: There is no such process now.
+            NotSeen: The victim does not run now.
         """
         if victim == "console":
             return Fault(victim, name, self.mission.attach_console(), ())
@@ -82,7 +82,7 @@ class Breaker:
         return Fault(victim, name, pid, rows)
 
     def strike(self, faults: Sequence[Fault]) -> None:
-        """Do it."""
+        """Inject these faults."""
         for fault in faults:
             number = SIGNALS.get(fault.name, signal.SIGSTOP)
             fault.at_s = time.monotonic()
@@ -94,10 +94,10 @@ class Breaker:
             if fault.victim.endswith("zygote") and fault.name == "SIGTERM":
                 time.sleep(POLL_S)
                 if any(process.pid == fault.pid for process in marked_of(self.mission)):
-                    fault.replaced_s = fault.at_s  # zygotes take no notice of it
+                    fault.replaced_s = fault.at_s  # a zygote ignores the signal
 
     def attend(self, fault: Fault) -> None:
-        """Let a stopped process go on when its time has come; see whether what is no component was replaced."""
+        """Continue a stopped process when its time has come; check whether a zygote was replaced."""
         now_s = time.monotonic()
         if fault.lifted_s == math.inf and fault.victim.endswith("zygote") and not is_stopped(fault.pid):
             fault.lifted_s = now_s  # its parent continued it
@@ -112,7 +112,7 @@ class Breaker:
                 fault.replaced_s = now_s
 
     def see_through(self, expected: Expected, faults: Sequence[Fault]) -> dict[str, Any]:
-        """Strike, wait until the mission is whole to stay, and return what was seen."""
+        """Inject the faults, wait until the mission has lastingly recovered, and return the observations."""
         usual_gap_s = longest_gap_s(self.watch.pictures_s, expected.before.at_s - CALM_S, expected.before.at_s)
         more = len(marked_of(self.mission))
         self.strike(faults)
@@ -161,20 +161,20 @@ class Breaker:
         }
 
     def _pauses(self) -> list[tuple[float, float]]:
-        """Return when the RC manager was stopped and when it went on, on the mission's clock."""
+        """Return when the RC manager was stopped and continued, on the mission's clock."""
         origin_s = self.watch.origin_s
         stopped = [fault for fault in self.struck if fault.victim == "rc_manager" and not fault.kills]
         return [(fault.at_s - origin_s, fault.lifted_s - origin_s) for fault in stopped]
 
 
 def marked_of(mission: BenchMission) -> list[psutil.Process]:
-    """Return the mission's processes, but for its console."""
+    """Return the mission's processes, except its console."""
     console = mission.console.pid if mission.console is not None else 0
     return [process for process in marked(mission.environment[MARK]) if process.pid != console]
 
 
 def rounded(seconds: float | None) -> float | None:
-    """Return seconds as people read them."""
+    """Return seconds rounded for people."""
     return None if seconds is None else round(seconds, 2)
 
 
@@ -192,6 +192,6 @@ def breaker(patience_s: float = MENDED_WITHIN_S) -> Iterator[Breaker]:
 
 @contextlib.contextmanager
 def breaking_calm() -> Iterator[tuple[Breaker, Expected]]:
-    """Yield a mission that is up, and how it is when nothing is done to it."""
+    """Yield a mission that is up, and its state without faults."""
     with breaker() as breaking:
         yield breaking, breaking.calm()

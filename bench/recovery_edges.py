@@ -1,4 +1,4 @@
-"""A fault while a mission comes up, and one while it goes down."""
+"""Faults while a mission comes up, and while it goes down."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from recovery_verdict import Fault
 
 During = Literal["up", "down"]
 DURING: tuple[During, ...] = ("up", "down")
-INTO_DOWN_S = 0.05  # chosen: the order to go down is on its way, and most components still live
+INTO_DOWN_S = 0.05  # chosen: the order to go down is on its way, and most components still run
 
 
 def try_edge(during: During, victim: str, fault: str, patience_s: float = MENDED_WITHIN_S) -> dict[str, Any]:
-    """Return what a fault does to a mission that is not just up."""
+    """Inject a fault while the mission comes up or goes down; return the effects."""
     return struck_coming_up(victim, fault, patience_s) if during == "up" else struck_going_down(victim, fault)
 
 
 def struck_coming_up(victim: str, name: str, patience_s: float) -> dict[str, Any]:
-    """Strike as soon as the victim is there; the mission comes up whole, or ends with a code and leaves nothing.
+    """Inject as soon as the victim runs; the mission comes up whole, or ends with a code and leaves nothing.
 
     Raises:
-        NotSeen: The victim never was there.
+        NotSeen: The victim never ran.
     """
     with mission_coming_up() as mission:
         breaking = Breaker(mission, patience_s)
@@ -57,10 +57,10 @@ def struck_coming_up(victim: str, name: str, patience_s: float) -> dict[str, Any
 
 
 def first_seen(breaking: Breaker, victim: str, name: str) -> Fault:
-    """Return what is to be done to the victim, as soon as it is there at all.
+    """Return the fault of the victim, as soon as the victim runs.
 
     Raises:
-        NotSeen: It never was.
+        NotSeen: The victim never ran.
     """
     if victim == "console":
         raise NotSeen("a console comes to a mission that is up")
@@ -84,7 +84,7 @@ def is_up(mission: BenchMission) -> bool:
 
 
 def struck_going_down(victim: str, name: str) -> dict[str, Any]:
-    """Strike when ``down`` was just ordered; it ends, says so, and leaves nothing."""
+    """Inject just after ``down`` was ordered; the mission ends, logs the order, and leaves nothing."""
     with breaking_calm() as (breaking, _expected):
         mission, fault = breaking.mission, breaking.fault(victim, name)
         ordered_s = time.monotonic()

@@ -1,6 +1,6 @@
-"""A real mission to break: started by the real command line, watched from a process of its own, taken down by it.
+"""A real mission for faults: started and ended by the real command line, watched from another process.
 
-Rule of this file: it never judges. What was seen is judged in ``recovery_verdict``.
+Rule of this file: it never judges. ``recovery_verdict`` judges the observations.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ GONE_WITHIN_S = 5.0  # chosen: the aim for a mission whose launcher is gone
 
 
 class NotSeen(Exception):
-    """What was waited for did not come in time."""
+    """An expected state did not come in time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """One look at the mission.
+    """An observation of the mission.
 
     Attributes:
-        began_s: When it began, monotonic clock of the machine.
-        at_s: When its answer was there.
-        sight: What it showed; see ``recovery_observer.sight``.
+        began_s: Begin of the observation, monotonic clock of the machine.
+        at_s: Arrival of its answer.
+        sight: The observed state; see ``recovery_observer.sight``.
     """
 
     began_s: float
@@ -51,7 +51,7 @@ class Look:
 
     @property
     def word(self) -> str:
-        """Health as ``status`` says it."""
+        """Health as printed by ``status``."""
         return str(self.sight["word"])
 
     @property
@@ -61,7 +61,7 @@ class Look:
         return found
 
     def pid(self, name: str) -> int:
-        """Return the process of a component; 0 if it has no row."""
+        """Return the process of a component; 0 if it is not listed."""
         return int(self.rows.get(name, [0])[0])
 
     def ready(self) -> set[str]:
@@ -71,13 +71,13 @@ class Look:
 
 @dataclass
 class Watch:
-    """What an observer of its own process saw, growing while it watches.
+    """The growing observations of an observer in its own process.
 
     Attributes:
         process: The observer.
-        origin_s: When the mission's clock was 0, monotonic clock of the machine.
+        origin_s: Time at which the mission's clock was 0, monotonic clock of the machine.
         looks: Its looks.
-        pictures_s: When pictures came.
+        pictures_s: Arrivals of pictures.
     """
 
     process: subprocess.Popen[str]
@@ -86,7 +86,7 @@ class Watch:
     pictures_s: list[float] = field(default_factory=list)
 
     def read(self) -> None:
-        """Take in lines until the observer ends."""
+        """Read lines until the observer ends."""
         assert self.process.stdout is not None
         sight: dict[str, Any] = {}
         for line in self.process.stdout:
@@ -100,10 +100,10 @@ class Watch:
                 self.looks.append(Look(said["began"], said["t"], sight))
 
     def wait(self, what: str, holds: Callable[[Look], bool], within_s: float) -> Look:
-        """Return the newest look once it fulfills the condition.
+        """Wait for a look that fulfills the condition, and return it.
 
         Raises:
-            NotSeen: It never did.
+            NotSeen: No look fulfilled it in time.
         """
         ends_s = time.monotonic() + within_s
         while time.monotonic() < ends_s:
@@ -119,11 +119,11 @@ class BenchMission:
 
     Attributes:
         name: Its name.
-        environment: For further commands.
+        environment: Environment for further commands.
         launcher: The ``up`` process.
-        watch: What is seen of it.
+        watch: The observations of the mission.
         trace: File of its scheduling decisions.
-        lines: What ``up`` said.
+        lines: The output of ``up``.
     """
 
     name: str
@@ -151,7 +151,7 @@ class BenchMission:
         )
 
     def attach_console(self) -> int:
-        """Have a person of priority 100 take a robot and hold it; return the console's process."""
+        """Let a person of priority 100 take a robot and hold it; return the console's process."""
         self.detach_console()
         words = ["attach", CONSOLE_ROBOT, "--priority", "100", "--script", "-", "--mission", self.name]
         self.console = subprocess.Popen(
@@ -180,7 +180,7 @@ class BenchMission:
         self.console = None
 
     def down(self) -> subprocess.CompletedProcess[str]:
-        """Take it down by command."""
+        """Take the mission down by command."""
         return self.command("scout-backbone", "down")
 
     def left(self, within_s: float = GONE_WITHIN_S) -> list[psutil.Process]:
@@ -195,7 +195,7 @@ class BenchMission:
         return {log.name: log.stat().st_size for log in sorted(self.directory.glob("log/*"))}
 
     def processes(self, look: Look) -> dict[str, int]:
-        """Return the process of each victim, the zygotes included, by its own name; none if the look has no rows."""
+        """Return victim, zygotes included → process; empty if the look has no rows."""
         if not look.rows:
             return {}
         found = {name: look.pid(name) for name in look.rows if look.pid(name)}
@@ -214,7 +214,7 @@ class BenchMission:
 
 
 def console_arcs(look: Look) -> list[str]:
-    """Return the ARCs that hold something for a console."""
+    """Return the ARCs of a console that hold RCs."""
     return [arc for arc in look.sight.get("held", []) if arc.endswith("-drive")]
 
 

@@ -1,10 +1,10 @@
-"""What can be seen of a running mission from outside, as JSON lines: a look every 50 ms and each picture's arrival.
+"""Observes a running mission from outside, as JSON lines: a look every 50 ms and the arrival of each picture.
 
-A process of its own, so that looking and measuring do not wait for each other. It speaks on one bus
-connection and is no component. It ends when its standard input closes.
+It is a process of its own, so that observing and measuring do not wait for each other. It uses one bus connection and
+is not a component. It ends when its standard input closes.
 
-Lines: ``{"began", "t", "sight"}`` for a look (``sight`` is left out where it is the one of the line
-before), ``{"frame"}`` for a picture. Times are this machine's monotonic clock.
+Lines: ``{"began", "t", "sight"}`` for a look (``sight`` is omitted if it equals that of the preceding look),
+``{"frame"}`` for a picture. Times are this machine's monotonic clock.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from backbone.picture.mission import MissionPicture
 from resource_pool.messages import Frame
 
 LOOK_EVERY_S = 0.05
-FOUND_EVERY_S = 0.02  # how often a mission that is only coming up is looked for
-UNREACHABLE = "unreachable"  # what an operator reads where ``status`` ends with exit code 4
+FOUND_EVERY_S = 0.02  # interval of the search for a mission that is coming up
+UNREACHABLE = "unreachable"  # stands for the end of ``status`` with exit code 4
 
 
 def sight(picture: MissionPicture) -> dict[str, Any]:
-    """Return what matters of a picture, as plain data."""
+    """Return the relevant parts of a picture, as plain data."""
     verdict = picture.health
     schedule = picture.schedule
     return {
@@ -54,7 +54,7 @@ def say(**said: Any) -> None:
 
 
 async def found(mission: str) -> run_files.RunFile:
-    """Return how to reach the mission as soon as its launcher says so."""
+    """Return the mission's run file, as soon as its launcher has written it."""
     while True:
         with contextlib.suppress(run_files.MissionNotUp):
             return run_files.find(mission)
@@ -72,7 +72,7 @@ async def open_bus(run_file: run_files.RunFile, clock: MissionClock) -> ZenohBus
 
 
 async def watch(bus: Bus, clock: MissionClock) -> None:
-    """Look repeatedly."""
+    """Observe repeatedly."""
     last: dict[str, Any] = {}
     while True:
         began = time.monotonic()
@@ -86,7 +86,7 @@ async def watch(bus: Bus, clock: MissionClock) -> None:
 
 
 async def attend(mission: str) -> None:
-    """Find the mission and watch it."""
+    """Find the mission and observe it."""
     run_file = await found(mission)
     say(origin=run_file.clock_origin_monotonic_s)
     clock = MissionClock(run_file.clock_origin_monotonic_s, run_file.clock_rate)
@@ -99,7 +99,7 @@ async def attend(mission: str) -> None:
 
 
 async def observe(mission: str) -> None:
-    """Attend to the mission until standard input closes."""
+    """Observe the mission until standard input closes."""
     closed = asyncio.get_running_loop().run_in_executor(None, sys.stdin.buffer.read)
     attending = asyncio.create_task(attend(mission))
     await asyncio.wait({closed, attending}, return_when=asyncio.FIRST_COMPLETED)

@@ -1,12 +1,12 @@
-"""Many faults, one after the other, in one mission: what it is like at the end, and what has grown.
+"""Many faults, one after the other, in one mission: its state at the end, and the growth of its processes.
 
-What a process uses is taken after a first part of the same faults, and again at the end; each time all links were
-just lost and regained, and the least of some seconds counts, since links begin and end threads. It has grown when it
-uses more at the end than ever in the first part: lives differ in age, and a framegrabber fills its stores for three
-minutes; a nameserver grows by a seventh over the first seventy lives that end beside it, and then
-stays (measured: 21.3 MB at first, 24.6 after 72, 24.6 after 120). A second life is not as the first: it is not forked
-from a fresh zygote, it watches what it found instead of what it started, and its link, once lost and regained, keeps
-three descriptors more.
+The usage of each process is measured after a first part of the same faults, and again at the end. Each time all links
+were lost and regained just before, and the minimum over some seconds counts, because links start and end threads. A
+process has grown if it uses more at the end than ever in the first part. The first part is long, because lives differ
+in age: a framegrabber fills its stores for three minutes; a nameserver grows by a seventh over the first seventy lives
+that end beside it, and then stays (measured: 21.3 MB at first, 24.6 after 72, 24.6 after 120). A second life differs
+from the first: it is not forked from a fresh zygote, it watches what it found instead of what it started, and its link,
+once lost and regained, keeps three descriptors more.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from recovery_breaker import FAULTS, HARDWARE, ROWS, STAYS_S, Breaker, breaking_
 from recovery_mission import POLL_S, BenchMission, Look, NotSeen
 from recovery_verdict import Expected, Fault, Judgement, longest_gap_s
 
-UsageOfOne = dict[str, float]  # what a process uses: mb, fds, threads, log_kb
+UsageOfOne = dict[str, float]  # usage of a process: mb, fds, threads, log_kb
 Usage = dict[str, UsageOfOne]
 
 PAUSE_S = (5.0, 15.0)
 REMEMBERED_S = 60.0  # chosen: twice the longest pause of a process
 SETTLED_WITHIN_S = 60.0
-GROWTH = 0.1  # the most that a process may have grown
-FEW_THREADS = 2  # chosen: worker threads are begun when there is work for them
+GROWTH = 0.1  # largest allowed growth of a process
+FEW_THREADS = 2  # chosen: worker threads start when there is work for them
 WARM_UP_S = 720.0  # measured: some seventy lives end in that time
-LOOKED_AT_S = 20.0  # measured: worker threads of a link end some ten seconds after the load that began them
-LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its size
+LOOKED_AT_S = 20.0  # measured: worker threads of a link end some ten seconds after the load that started them
+LOG_KB = 2 * 1024 + 256  # a log and its predecessor, each a little over its size
 
 
 def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
@@ -84,7 +84,7 @@ def strike(
 
 
 def end_each_once(breaking: Breaker, expected: Expected) -> None:
-    """Kill each process but the launcher, one after the other, and see it come back; then all lose their link once."""
+    """Kill each process except the launcher, one after the other, and await its return; then cut all links once."""
     for victim in (*ROWS, "nameserver"):
         if victim != "launcher":
             found = breaking.see_through(expected, [breaking.fault(victim, "SIGKILL")])
@@ -92,7 +92,7 @@ def end_each_once(breaking: Breaker, expected: Expected) -> None:
 
 
 def drawn(breaking: Breaker, rng: random.Random, victims: Sequence[str]) -> Fault | None:
-    """Do any one thing to any one process; return it, or None where there was no such process."""
+    """Inject a random fault into a random process; return it, or None if there was no such process."""
     victim = rng.choice(victims)
     name = rng.choice([each for each in FAULTS if victim != "launcher" or each.startswith("SIGSTOP")])
     try:
@@ -110,7 +110,7 @@ def done_to(fault: Fault) -> dict[str, Any]:
 
 
 def wait(breaking: Breaker, judgement: Judgement, until_s: float) -> None:
-    """Let time pass; stopped processes go on when their time has come."""
+    """Wait; continue stopped processes when their time has come."""
     while time.monotonic() < until_s:
         time.sleep(POLL_S)
         for fault in judgement.faults:
@@ -120,7 +120,7 @@ def wait(breaking: Breaker, judgement: Judgement, until_s: float) -> None:
 
 
 def settle(breaking: Breaker, judgement: Judgement) -> None:
-    """Return when the mission is whole, to stay, or has had its time."""
+    """Return when the mission has lastingly recovered, or its time is over."""
     ends_s = time.monotonic() + SETTLED_WITHIN_S
     while time.monotonic() < ends_s:
         wait(breaking, judgement, time.monotonic() + STAYS_S / 4)
@@ -130,7 +130,7 @@ def settle(breaking: Breaker, judgement: Judgement) -> None:
 
 
 def relinked_usage(breaking: Breaker, judgement: Judgement) -> Usage:
-    """Return the least that each process uses for a while after all have lost their link once more and are whole."""
+    """Cut all links once more, wait for recovery, and return the least usage of each process over some seconds."""
     settle(breaking, judgement)
     fault = breaking.fault("nameserver", "SIGKILL")
     breaking.strike([fault])
@@ -147,7 +147,7 @@ def relinked_usage(breaking: Breaker, judgement: Judgement) -> Usage:
 
 
 def usage(mission: BenchMission, look: Look) -> Usage:
-    """Return what each process uses, and how long its log is, by the name of a component in it."""
+    """Return the usage of each process, and the length of its log, by the name of a component in it."""
     logs, found, seen = mission.logs(), Usage(), set[int]()
     for name, pid in mission.processes(look).items():
         if pid in seen:
@@ -166,21 +166,21 @@ def usage(mission: BenchMission, look: Look) -> Usage:
 
 
 def anonymous_kb(pid: int) -> int:
-    """Return how much memory of its own a process has, also what it shares with the zygote it was forked from.
+    """Return the anonymous memory of a process, including the part that it shares with its zygote.
 
-    The death of a zygote makes what was shared a process's alone; by this measure nothing changes then.
+    When a zygote dies, shared memory becomes a process's own; this measure does not change then.
     """
     lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:"))
 
 
 def compared(name: str, before: UsageOfOne, most: UsageOfOne, after: UsageOfOne) -> dict[str, Any]:
-    """Return what a process used before and after, and what of it has grown by more than ``GROWTH``.
+    """Return the usage of a process before and after, and which of it has grown by more than ``GROWTH``.
 
-    A log grows with each fault that it tells of; it has grown when it is longer than logs may be.
+    A log grows with each reported fault; it counts as grown only if it is longer than logs may be.
 
     Args:
-        most: The most that the process used in the first part.
+        most: The largest usage of the process in the first part.
     """
     both = {kind: [before[kind], after.get(kind)] for kind in before}
     bound = {kind: max(was, most.get(kind, was)) * (1 + GROWTH) for kind, was in before.items()} | {"log_kb": LOG_KB}

@@ -1,4 +1,4 @@
-"""The trace of scheduling decisions under faults: which rules it breaks, and what was late because of a fault itself.
+"""The trace of scheduling decisions under faults: broken rules, and starts that were late because of a fault itself.
 
 Rules of this file: no processes, no bus. Times are the mission's clock.
 """
@@ -16,23 +16,23 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from trace_checker import check
 from trace_checker.violation import Violation
 
-LATE = frozenset({"RR", "WC", "PRIO"})  # a start that did not come; all else is done wrongly, not late
+LATE = frozenset({"RR", "WC", "PRIO"})  # a missing start; all other violations are wrong actions, not late ones
 SINCE = re.compile(r"waits since (?P<since_s>[0-9.]+)")
-WAKES_WITHIN_S = 0.1  # chosen: a process that goes on takes its first decision in a few ms
+WAKES_WITHIN_S = 0.1  # chosen: a process that continues makes its first decision within a few ms
 
 
 def violations(trace: Path, pauses: Sequence[tuple[float, float]]) -> tuple[list[Violation], list[Violation]]:
-    """Return the rules the trace breaks, and apart from them the starts that were late because of a pause.
+    """Return the rules that the trace breaks, and separately the starts that were late because of a pause.
 
-    Each life of the RC manager is judged by itself: it begins with a ``meta`` line, and with what it adopts.
+    Each life of the RC manager is judged by itself; it begins with a ``meta`` line and its adoptions.
 
     Args:
         trace: The file.
-        pauses: When the RC manager's process was stopped, and when it went on.
+        pauses: Times at which the RC manager's process was stopped and continued.
     """
     lives: list[list[dict[str, Any]]] = []
     for line in trace.read_text().splitlines():
-        if line.endswith("}"):  # one that was killed may not have finished its last line
+        if line.endswith("}"):  # a killed process may not have finished its last line
             event = json.loads(line)
             if event["ev"] == "meta":
                 lives.append([])
@@ -45,7 +45,7 @@ def violations(trace: Path, pauses: Sequence[tuple[float, float]]) -> tuple[list
 
 
 def is_late_by_a_pause(found: Violation, life: list[dict[str, Any]], pauses: Sequence[tuple[float, float]]) -> bool:
-    """Return whether a due start fell into a pause, and the RC manager decided as soon as it went on."""
+    """Return whether a due start fell into a pause, and the RC manager decided as soon as it continued."""
     since = SINCE.match(found.msg)
     if found.code not in LATE or since is None:
         return False

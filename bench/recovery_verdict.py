@@ -1,4 +1,4 @@
-"""What a fault did to a mission: judged from what an observer saw.
+"""The effects of a fault on a mission, judged from an observer's looks.
 
 Rules of this file: no processes, no clock, no bus. Times are the machine's monotonic clock.
 """
@@ -13,21 +13,21 @@ from itertools import pairwise
 
 from recovery_mission import Look, console_arcs
 
-PICTURES_FLOW_S = 0.6  # chosen: twice the time for which a picture settles at a switch
+PICTURES_FLOW_S = 0.6  # chosen: twice the settling time of a picture at a switch
 
 
 @dataclass(slots=True)
 class Fault:
-    """One thing done to one process.
+    """A fault of one process.
 
     Attributes:
-        victim: What the program calls it.
+        victim: Its name in this program.
         name: ``SIGKILL``, ``SIGTERM`` or ``SIGSTOP n``.
         pid: The process.
-        rows: Components that live in it, or die with it.
-        at_s: When it was done.
-        lifted_s: When a stopped process was told to go on; for others ``at_s``.
-        replaced_s: When another process did the work of one that is no component; ``math.inf``: not yet.
+        rows: Components that live in it, or end with it.
+        at_s: Time of the fault.
+        lifted_s: Time at which a stopped process was continued; for others ``at_s``.
+        replaced_s: Time at which another process replaced it, if it is not a component; ``math.inf``: not yet.
     """
 
     victim: str
@@ -40,11 +40,11 @@ class Fault:
 
     @property
     def kills(self) -> bool:
-        """Whether the process is not to come back."""
+        """Whether the process cannot come back."""
         return not self.name.startswith("SIGSTOP")
 
     def is_mended(self, look: Look) -> bool:
-        """Return whether, at this look, the work of the victim was possible again."""
+        """Return whether, at this look, the victim's work was possible again."""
         if look.at_s < self.at_s:
             return True
         if not self.kills and look.began_s >= self.lifted_s:
@@ -58,7 +58,7 @@ class Fault:
         return all(look.pid(row) not in (0, self.pid) for row in self.rows)
 
     def is_noticed(self, look: Look, before: Look) -> bool:
-        """Return whether a person who looks there learns of it."""
+        """Return whether a person could notice the fault in this look."""
         if look.word != "ok" or set(self.rows) & set(look.sight.get("absent", [])):
             return True
         restarts, restarts_before = look.sight.get("restarts", {}), before.sight.get("restarts", {})
@@ -69,7 +69,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """The mission as it was before anything was done to it.
+    """The mission before any fault.
 
     Attributes:
         before: The last look before.
@@ -82,7 +82,7 @@ class Expected:
     asks: frozenset[str]
 
     def missing(self, look: Look) -> list[str]:
-        """Return what is not as it should be in this look, for people."""
+        """Return what this look lacks of the expected state, for people."""
         if "rows" not in look.sight:
             return ["everything"]
         asks = set(look.sight["asks"])
@@ -90,16 +90,16 @@ class Expected:
 
 
 class Judgement:
-    """Judges looks, each once, as they come in."""
+    """Judges each look once, as it arrives."""
 
     def __init__(self, expected: Expected, faults: Sequence[Fault]) -> None:
         self.expected, self.faults = expected, faults
         self.good_since_s = math.inf
-        """Since when the mission has been whole and says so; infinite while it is not."""
+        """Time since which the mission has been whole and its health ``ok``; infinite while it is not."""
         self.was_bad = False
         self.noticed_s = math.inf
         self.unsaid_s = 0.0
-        """The longest time for which the mission was less than it should be and said ``ok``."""
+        """Longest time in which the mission lacked something although its health was ``ok``."""
         self._unsaid_since_s = math.inf
         self._seen = 0
 
@@ -116,7 +116,7 @@ class Judgement:
         whole = not lacking
         if self.noticed_s == math.inf and any(f.is_noticed(look, self.expected.before) for f in self.faults):
             self.noticed_s = look.at_s
-        if set(lacking) - {"console as a process"} and look.word == "ok":  # a person's, and no wish of the mission
+        if set(lacking) - {"console as a process"} and look.word == "ok":  # a console is a person's, not the mission's
             self._unsaid_since_s = min(self._unsaid_since_s, max(began_s, look.began_s))
             self.unsaid_s = max(self.unsaid_s, look.at_s - self._unsaid_since_s)
         else:
@@ -136,13 +136,13 @@ class Judgement:
         return lacking
 
     def healthy_after_s(self) -> float | None:
-        """Return the time from the first fault to lasting health; 0.0: it never was anything else; None: never."""
+        """Return the time from the first fault to lasting health; 0.0: health never ended; None: it did not return."""
         if self.good_since_s == math.inf:
             return None
         return self.good_since_s - min(fault.at_s for fault in self.faults) if self.was_bad else 0.0
 
     def noticed_after_s(self) -> float | None:
-        """Return the time from the first fault until a look showed it; None: none did."""
+        """Return the time from the first fault to the first look that showed it; None: no look did."""
         return None if self.noticed_s == math.inf else self.noticed_s - min(fault.at_s for fault in self.faults)
 
 

@@ -1,10 +1,10 @@
-"""How close a replay is to what was recorded: when each publication comes, and in which order.
+"""Accuracy of a replay: time and order of each publication, compared with the recording.
 
 Records the mission of IROS 2001 for some seconds unless given a recording, plays it beside a listener, and compares.
-Prints one JSON line for each speed: ``late_ms`` is how much later than recorded publications are heard, with the time
-on the bus; ``missing`` counts those that never were, though the listener was there; ``other_order`` those that came
-before an earlier one of their key and sender (of others urgent ones may). Times of the machine. The floor is a process
-that does nothing but publish as many bytes at these times on bare zenoh, beside a listener of its own.
+Prints one JSON line for each speed: ``late_ms`` is the delay of received publications, including the time on the bus;
+``missing`` counts publications that did not arrive although the listener was ready; ``other_order`` those that arrived
+before an earlier one of their key and sender (publications of other keys may overtake, if urgent). Times are of the
+machine. The floor is a process that only publishes as many bytes at these times on bare zenoh, beside a listener.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from backbone.recording.hearing import Hearing
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import Recording
 
-BEFORE_S = 3.0  # chosen: the listener is there before the first message; seconds of the machine
+BEFORE_S = 3.0  # chosen: the listener is ready before the first message; seconds of the machine
 KNOWN_S = 0.1  # measured: a publisher knows of its first subscriber after 7 ms; seconds of the machine
-AFTER_S = 2.0  # chosen: the last message is long over; seconds of the machine
+AFTER_S = 2.0  # chosen: the last message has long arrived; seconds of the machine
 HEARD = tuple(one for one in Conversation if one not in {Conversation.ASK, Conversation.ALIVE, *COPIED})
 MISSION = "replay-bench"
 SHARES = {"p50": 0.5, "p99": 0.99}
@@ -61,7 +61,7 @@ def sent_in(path: Path) -> dict[Sent, float]:
 
 
 def play(path: Path, sent: dict[Sent, float], speed: float) -> tuple[float, list[tuple[Sent, float]]]:
-    """Play the recording; return when the listener was there, and what it heard in order, with mission times."""
+    """Play the recording; return when the listener was ready, and the messages that it received, with mission times."""
     since_s = min(sent.values()) - BEFORE_S * speed
     words = ["replay", str(path), f"--from={since_s}", "--speed", str(speed), "--mission", MISSION]
     with subprocess.Popen([str(BIN / "scout-backbone"), *words], stderr=subprocess.PIPE) as player:
@@ -74,7 +74,7 @@ def play(path: Path, sent: dict[Sent, float], speed: float) -> tuple[float, list
 
 
 def listen(until_s: float) -> tuple[float, list[tuple[Sent, float]]]:
-    """Listen until this mission time; see ``play``. Not by a ``Bus``, which gathers what is overheard."""
+    """Listen until this mission time; see ``play``. Uses no ``Bus``, because a bus batches overheard messages."""
     run = run_files.find(MISSION)
     clock = MissionClock(run.clock_origin_monotonic_s, run.clock_rate)
     came = list[tuple[zenoh.Sample, float]]()
@@ -96,7 +96,7 @@ def listen(until_s: float) -> tuple[float, list[tuple[Sent, float]]]:
 
 
 def bare_late_ms(path: Path, speed: float) -> list[float]:
-    """Return how late publications of the same sizes at the same times are on bare zenoh."""
+    """Return the delays of publications with the same sizes at the same times on bare zenoh."""
     with path.open("rb") as file:
         messages = Recording(file).messages(tuple(f"*/{one}" for one in HEARD))
         due = [(one.at_s / speed, len(json.dumps(one.body, default=str))) for one in messages if one.source]
@@ -112,7 +112,7 @@ def bare_late_ms(path: Path, speed: float) -> list[float]:
 
 
 def publish(endpoint: str) -> None:
-    """Publish bytes at the times that standard input names; print when the first was due."""
+    """Publish bytes at the times read from standard input; print when the first was due."""
     due = [(float(at_s), bytes(int(size))) for at_s, size in map(str.split, sys.stdin)]
     with zenoh.open(client_config(endpoint)) as session:
         publisher = session.declare_publisher("floor", congestion_control=zenoh.CongestionControl.BLOCK)
@@ -130,7 +130,7 @@ def publish(endpoint: str) -> None:
 
 
 def compare(sent: dict[Sent, float], heard: list[tuple[Sent, float]], speed: float, floor_ms: list[float]) -> None:
-    """Print how close what was heard is to what was sent while the listener was there, beside the floor."""
+    """Print the delays and losses while the listener was ready, beside the floor."""
     first = {one: at_s for one, at_s in reversed(heard) if one in sent}
     late_ms = [1e3 * (at_s - sent[one]) / speed for one, at_s in first.items()]
     newest, other_order = defaultdict[tuple[str, str], int](int), 0

@@ -1,9 +1,8 @@
-"""Time from asking to having the answer: client, hub and server in three processes.
+"""Time from a question to its answer: client, hub and server in three processes.
 
-The floor is the same path on bare zenoh-python: ``session.get`` and a queryable, both bridged to
-asyncio as the bus does it, with the same bytes. Calls alternate one by one, so both see the same
-machine. They speak by the unix socket, as a mission on one machine does. Prints one JSON line; ``ratio`` is bus
-p50 over bare p50.
+The floor is the same path on bare zenoh-python: ``session.get`` and a queryable, both bridged to asyncio as the bus
+does it, with the same bytes. Calls alternate one by one, so that both run under the same load. They use the unix
+socket, as a mission on one machine does. Prints one JSON line; ``ratio`` is bus p50 over bare p50.
 """
 
 from __future__ import annotations
@@ -34,12 +33,12 @@ WITHIN_S = 10.0
 
 
 async def answer(asked: Envelope[Any]) -> Message:
-    """Answer as small as a question."""
+    """Return an answer as small as the question."""
     return Stop(asked.body.name)
 
 
 def serve_bare(session: zenoh.Session) -> None:
-    """Answer on bare zenoh, out of the event loop, with as many bytes as the bus."""
+    """Answer on bare zenoh from the event loop, with as many bytes as the bus."""
     loop = asyncio.get_running_loop()
     reply = write(Envelope(WIRE_VERSION, SERVER, 1, 0.5, f"{CLIENT}#1", Stop("left_rad_s")))
 
@@ -52,7 +51,7 @@ def serve_bare(session: zenoh.Session) -> None:
 
 
 async def ask_bare(session: zenoh.Session, payload: bytes) -> bytes:
-    """Ask on bare zenoh out of the event loop."""
+    """Ask on bare zenoh from the event loop."""
     loop = asyncio.get_running_loop()
     answered: asyncio.Future[zenoh.Reply] = loop.create_future()
 
@@ -70,7 +69,7 @@ async def ask_bare(session: zenoh.Session, payload: bytes) -> bytes:
 
 
 async def serve(endpoint: str) -> None:
-    """Be the server process."""
+    """Run as the server process."""
     bus = await ZenohBus.open_when_up(MISSION, SERVER, MissionClock.started_now(), client_config(endpoint))
     bare = zenoh.open(client_config(endpoint))
     serve_bare(bare)
@@ -83,13 +82,13 @@ async def serve(endpoint: str) -> None:
 
 
 def be_hub(endpoint: str) -> None:
-    """Be the hub process."""
+    """Run as the hub process."""
     with zenoh.open(hub_config([endpoint])):
         wait_for_end_of_input()
 
 
 async def measure(endpoint: str, calls: int) -> None:
-    """Be the client process."""
+    """Run as the client process."""
     bus = await ZenohBus.open_when_up(MISSION, CLIENT, MissionClock.started_now(), client_config(endpoint))
     bare = zenoh.open(client_config(endpoint))
     ready = asyncio.Event()

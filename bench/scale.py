@@ -10,8 +10,8 @@ Prints one JSON line for each size:
 * take-overs by an operator, from asking to the first command that the robot's RC applied;
 * pictures a second of each grabber, and how many it allows at the end: where the processors are full, they fall first.
 
-The floor is one question to the RC manager through the same hub, asked meanwhile. Where the machine has other work,
-read counts and processor time only. A size that needs more memory than the machine has free is not begun.
+The floor is one question to the RC manager through the same hub, asked meanwhile. If the machine has other work, use
+only counts and processor time. A size is skipped if it needs more memory than the machine has free.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ from ui_console.model.events import Asked, CommandApplied, ConsoleEvent
 from ui_console.session.teleoperation import Teleoperation
 
 SIZES = [3, 10, 30, 60, 100]
-MOST_MB_A_SCOUT = 60.0  # measured: 56 before anything was done about it
-READY_WITHIN_S = 120.0  # chosen: a machine with other work
+MOST_MB_A_SCOUT = 60.0  # measured: 56 before any optimization
+READY_WITHIN_S = 120.0  # chosen: allows for other work on the machine
 WHOLE_WITHIN_S = 20.0  # chosen: same; behaviors get their ARCs after all is ready
 STATUS_WITHIN_S = 60.0
 END_WITHIN_S = 60.0
@@ -65,8 +65,8 @@ class Up:
     """A mission that is up.
 
     Attributes:
-        ready_s: From the shell's command to *all ready*; None: it did not come up.
-        said: What ``up`` said on the way.
+        ready_s: Time from the shell's command to *all ready*; None: the mission did not come up.
+        said: The output of ``up`` so far.
     """
 
     launcher: subprocess.Popen[str]
@@ -74,7 +74,7 @@ class Up:
     said: list[str]
 
     def processes(self) -> list[psutil.Process]:
-        """Return the launcher and all that it started."""
+        """Return the launcher and its descendants."""
         own = psutil.Process(self.launcher.pid)
         return [own, *own.children(recursive=True)]
 
@@ -105,14 +105,14 @@ def mission_up(file: Path, options: Sequence[str]) -> Iterator[Up]:
 
 
 class Took(NamedTuple):
-    """How long a command took, and its processor time."""
+    """Duration of a command, and its processor time."""
 
     wall_s: float
     processor_s: float
 
 
 def status() -> tuple[Took, dict[str, Any]]:
-    """Run ``status``; return how long it took and what it printed."""
+    """Run ``status``; return its duration and its output."""
     began_s, before = time.monotonic(), os.times()
     command = [str(BIN / "scout-backbone"), "status", "--json", "--mission", NAME]
     done = subprocess.run(command, capture_output=True, text=True, timeout=STATUS_WITHIN_S, check=False)
@@ -125,13 +125,13 @@ def status() -> tuple[Took, dict[str, Any]]:
 
 
 def kind_of(process: psutil.Process) -> str:
-    """Return what kind of process this is: its name without numbers; an ARC's begins with that of its watcher."""
+    """Return the kind of a process: its name without numbers; an ARC's name begins with that of its watcher."""
     name = re.sub(r"^watch-scout\d+(-?)", lambda found: "ARC" if found[1] else "watcher", name_of(process))
     return "ARC" if name.startswith("ARC") else re.sub(r"[-\d]+$", "", name)
 
 
 def busy(processes: Sequence[psutil.Process]) -> dict[int, tuple[str, float]]:
-    """Return the kind and processor time of each process that is there."""
+    """Return the kind and processor time of each process that still exists."""
     found = {}
     for process in processes:
         try:
@@ -162,7 +162,7 @@ def memory(processes: Sequence[psutil.Process]) -> dict[str, Any]:
 def cores_by_kind(
     before: dict[int, tuple[str, float]], after: dict[int, tuple[str, float]], took_s: float
 ) -> dict[str, Any]:
-    """Return the shares of a core that the processes took, all together and by kind."""
+    """Return the shares of a core that the processes used, in total and by kind."""
     by_kind: dict[str, float] = defaultdict(float)
     for pid, (kind, then_s) in after.items():
         by_kind[kind] += (then_s - before.get(pid, ("", 0.0))[1]) / took_s
@@ -179,12 +179,12 @@ async def numbers_of(bus: Bus, address: str) -> dict[str, float]:
 
 
 def total(numbers: Sequence[dict[str, float]], name: str) -> float:
-    """Return the sum of one statistic of several components; one that did not answer adds nothing."""
+    """Return the sum of one statistic over components; a component that did not answer counts 0."""
     return sum(one.get(name, 0.0) for one in numbers)
 
 
 async def questions_s(bus: Bus, seconds: float) -> list[float]:
-    """Return the times of bare questions over so many seconds."""
+    """Return the durations of bare questions over so many seconds."""
     found, ends_s = [], time.monotonic() + seconds
     while time.monotonic() < ends_s:
         began_s = time.perf_counter()
@@ -196,7 +196,7 @@ async def questions_s(bus: Bus, seconds: float) -> list[float]:
 
 
 async def take_over(robot: str, number: int) -> float:
-    """Attach to a robot as an operator's console does, turn it, give it back; return the seconds until it obeyed."""
+    """Attach to a robot as a console does, turn it, release it; return the seconds until it obeyed."""
     found = run_files.find(NAME)
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     launch = Launch(
@@ -229,7 +229,7 @@ async def take_over(robot: str, number: int) -> float:
 
 
 def switches_s(trace: Path, since_s: float, until_s: float) -> list[float]:
-    """Return the times of the switches at the end of a slice that began in this time of the mission."""
+    """Return the durations of switches at slice ends that began in this mission time."""
     found, begun_s = [], dict[str, float]()
     for line in trace.read_text().splitlines():
         event = json.loads(line)

@@ -1,15 +1,15 @@
-"""Time the schedule manager takes to decide, from ten ARCs to ten thousand.
+"""Time that the schedule manager takes to decide, from ten ARCs to ten thousand.
 
-A fleet from a seed runs on virtual time: all ask within one slice, then slices end, new ARCs ask and
-old ones leave. Measured is ``ScheduleManager.handle`` alone, by kind of event: a request, the release
-by an ARC that runs, the end of a slice, and the two outcomes of a context switch (freed, opened).
+A seeded fleet runs on virtual time: all ARCs send requests within one slice, then slices end, new ARCs come and old
+ones leave. Only ``ScheduleManager.handle`` is measured, by kind of event: a request, the release by an ARC that runs,
+the end of a slice, and the two outcomes of a context switch (freed, opened).
 
-Beside it, for fleets a constraint solver can do in seconds: how many ARCs run at once and how many
-slices are served, against a solver that is bound by the same rules and one that is free of them
-(``scheduler_solver.py``; needs the extra ``bench``).
+Beside it, for fleets that a constraint solver can handle in seconds: how many ARCs run at once and how many slices are
+served, compared with a solver bound by the same rules and one free of them (``scheduler_solver.py``; needs the extra
+``bench``).
 
-Prints one JSON line for the headline sizes; ``--table`` prints how it grows, ``--profile`` where the
-time goes. ``--arcs N --rcs M --shape S`` measure one size. ``--no-solver`` and ``--only-solver`` leave one half out.
+Prints one JSON line for the headline sizes. ``--table`` prints how the time grows, ``--profile`` which functions use
+it. ``--arcs N --rcs M --shape S`` measure one size. ``--no-solver`` and ``--only-solver`` skip one half.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ KINDS: dict[type[Event], str] = {
     Freed: "freed",
     Opened: "opened",
 }
-ARRIVALS_S = 5.0  # chosen: one slice; so that slice ends are spread over time
+ARRIVALS_S = 5.0  # chosen: one slice, so that slice ends are spread over time
 CHANGES_S = 15.0  # chosen: mission time between two changes times RCs; about as many changes as slice ends
 
 
@@ -62,11 +62,11 @@ class TooSlow(Exception):
 
 @dataclass
 class Stopwatch:
-    """A schedule manager and how long each of its decisions took.
+    """A schedule manager with the durations of its decisions.
 
     Attributes:
-        manager: Who decides.
-        ends_at: ``perf_counter`` at which to give up.
+        manager: The schedule manager.
+        ends_at: ``perf_counter`` value at which the measurement is abandoned.
         times_s: Kind of event → seconds, decision by decision.
     """
 
@@ -75,10 +75,10 @@ class Stopwatch:
     times_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
-        """Decide, and note how long it took.
+        """Decide, and record the duration.
 
         Raises:
-            TooSlow: There was no time left for it.
+            TooSlow: The wall time was used up before.
         """
         began = perf_counter()
         if began > self.ends_at:
@@ -90,16 +90,16 @@ class Stopwatch:
 
 @dataclass
 class Measured:
-    """What one size took.
+    """The measurements of one size.
 
     Attributes:
-        shape: Of the fleet.
-        arcs: ARCs that were to ask.
-        rcs: RCs there were.
-        asked: ARCs that asked before the time was up.
-        whole: The fleet was complete and had run for a while when its decisions were measured.
-        build_s: Seconds of deciding until all had asked and run for a while.
-        times_s: Kind of event → seconds, in the running fleet; in the growing one if it did not come to run.
+        shape: Shape of the fleet.
+        arcs: ARCs in the complete fleet.
+        rcs: RCs in the fleet.
+        asked: ARCs that sent a request before the time was over.
+        whole: True if the fleet was complete and had run for a while when its decisions were measured.
+        build_s: Seconds of deciding until all had sent requests and run for a while.
+        times_s: Kind of event → seconds, in the running fleet; in the growing one if it did not become complete.
         parallel: ARCs that ran at once, on average over the measured mission time.
     """
 
@@ -113,16 +113,16 @@ class Measured:
     parallel: float
 
     def ms(self, kind: str, share: float) -> float | None:
-        """Return a percentile in milliseconds; None: there was no such event."""
+        """Return a percentile in milliseconds; None: no such event occurred."""
         times_s = self.times_s.get(kind)
         return round(percentile(times_s, share) * 1000, 3) if times_s else None
 
     def slowest_ms(self, share: float) -> float | None:
-        """Return the percentile of the kind of event for which it is largest."""
+        """Return the percentile of the slowest kind of event."""
         return max((ms for kind in self.times_s if (ms := self.ms(kind, share)) is not None), default=None)
 
     def meets_aims(self) -> bool | None:
-        """Return whether every kind of event meets the aims of this size; None: it has none."""
+        """Return whether every kind of event meets the aims for this size; None: the size has no aims."""
         aims = AIMS_MS.get(self.arcs)
         if aims is None:
             return None
@@ -131,7 +131,7 @@ class Measured:
         return self.whole and all(ms is not None and ms < aims[name] for name, ms in reached.items())
 
     def as_json(self) -> dict[str, object]:
-        """Return it for the JSON line."""
+        """Return the measurements for the JSON line."""
         return {
             "shape": self.shape,
             "arcs": self.arcs,
@@ -145,14 +145,14 @@ class Measured:
 
 
 def measure(of: Fleet, arcs: int, *, events: int, within_s: float, seed: int) -> Measured:
-    """Return how long decisions take in a fleet of this size.
+    """Return the durations of decisions in a fleet of this size.
 
     Args:
         of: RCs and a source of requests.
         arcs: ARCs in the fleet.
         events: Requests and releases to measure, each; slice ends happen meanwhile.
-        within_s: Seconds of wall time after which it gives up; half of it for building the fleet.
-        seed: Of arrivals and departures.
+        within_s: Seconds of wall time before giving up; half of it for building the fleet.
+        seed: Seed of arrivals and departures.
     """
     rng = Random(seed)
     manager = ScheduleManager(SchedulingRules(grace_s=0.2), tolerance_s=0.05, mission=MISSION, mission_priority=0)
@@ -294,7 +294,7 @@ def main() -> None:
     if chosen.profile:
         profile.disable()
         pstats.Stats(profile, stream=sys.stderr).sort_stats("tottime").print_stats(25)
-    # One size asked for is meant for the solver only if it says so: the solver's time does not end at ten thousand.
+    # A single size is passed to the solver only with --only-solver, because its time grows without limit.
     with_solver = chosen.only_solver or (chosen.arcs is None and not chosen.no_solver and not chosen.profile)
     compared = solve(shapes, solved_sizes, chosen.solve_within, chosen.within, chosen.seed) if with_solver else []
     if chosen.table:

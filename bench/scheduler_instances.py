@@ -1,9 +1,9 @@
-"""Fleets for ``scheduler.py``: many ARCs that want two to four RCs each, in several shapes, from a seed.
+"""Seeded fleets for ``scheduler.py``: many ARCs that need two to four RCs each, in several shapes.
 
-* ``uniform``: any RCs; with many ARCs nearly all of them hang together as one group.
+* ``uniform``: any RCs; with many ARCs nearly all of them form one group.
 * ``cells``: robots in cells of eight RCs; no robot needs an RC of another cell: many small groups.
-* ``hub``: everybody needs one of a few RCs (a video frequency) beside its own: one big group with a bottleneck.
-* ``tree``: as uniform, and the owners stand in a behavior tree of three levels with priorities.
+* ``hub``: every ARC needs one of a few RCs (a video frequency) beside its own: one big group with a bottleneck.
+* ``tree``: as uniform, and the owners are in a behavior tree of three levels with priorities.
 * ``radio``: as uniform, and one of the RCs is a radio shared by streams.
 """
 
@@ -19,9 +19,9 @@ from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usa
 MISSION = "fleet"
 SHAPES = ("uniform", "cells", "hub", "tree", "radio")
 CONNECT_S, DISCONNECT_S = 0.3, 0.05  # the papers' picture settles; a radio packet stops a robot
-SLICES_S = (4.0, 5.0, 6.0)  # around the papers' 5 s; unlike ones, so that slice ends do not fall together
+SLICES_S = (4.0, 5.0, 6.0)  # around the papers' 5 s; different, so that slice ends do not coincide
 CELL_RCS = 8  # chosen: two robots and their frequencies
-RCS_OF_A_HUB = 20  # chosen: RCs for each one that everybody needs
+RCS_OF_A_HUB = 20  # chosen: RCs for each RC that every ARC needs
 RCS_OF_A_RADIO = 20  # chosen: RCs for each radio
 LEVELS = 3
 
@@ -31,9 +31,9 @@ class Fleet:
     """RCs, and a source of requests for them.
 
     Attributes:
-        shape: One of ``SHAPES``.
+        shape: A name in ``SHAPES``.
         rcs: The RCs.
-        rng: Where chance comes from.
+        rng: Source of all random choices.
     """
 
     shape: str

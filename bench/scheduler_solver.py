@@ -1,14 +1,14 @@
-"""The price of fairness: how many ARCs a constraint solver lets run at once, bound by the rules or free of them.
+"""The price of fairness: how many ARCs a constraint solver runs at once, bound by the rules or free of them.
 
-All ARCs always want their RCs, all slices are equally long and switches take no time, so a schedule
-is a row of slots and each slot a choice of ARCs that fit together. Three ways to choose:
+All ARCs always want their RCs, all slices are equally long and switches take no time. So a schedule is a row of slots,
+and each slot is a choice of ARCs that fit together. Three ways to choose:
 
 * ``ours``: the schedule manager, on virtual time.
-* ``bound``: in each slot the largest choice the rules allow. No ARC is left out except because of one
-  who is higher, or equal and not served later; only the order among those last served in the same slot is
-  free, as it is in the rules. With a tree it is a little freer than the rules. It looks at one slot at a
-  time: the largest choice now may leave a worse one for later, so ``ours`` can come out ahead, and does with radios.
-* ``free``: the largest choice there is, the same in every slot: the others never run.
+* ``bound``: in each slot the largest choice that the rules allow. An ARC is left out only because of an ARC that is
+  higher, or equal and not served later. Only the order among those last served in the same slot is free, as in the
+  rules. With a tree it is a little freer than the rules. It considers one slot at a time: the largest choice now may
+  leave a worse one for later, so ``ours`` can be better, and is better with radios.
+* ``free``: the largest choice of all, the same in every slot, so that the other ARCs never run.
 
 A radio counts by the sum of its streams, so the solver is never more restricted there than the schedule manager.
 """
@@ -31,12 +31,12 @@ from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
 
 SLICE_S = 5.0  # RAM 2002: the papers' slice
-PARTS = 1_000_000  # the solver counts in whole numbers: a radio's capacity in millionths
+PARTS = 1_000_000  # the solver uses whole numbers: a radio's capacity in millionths
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What one ARC always wants.
+    """The demand of one ARC, the same in every slot.
 
     Attributes:
         uses: RC → share of its time, 0 to 1; an exclusive use is 1.
@@ -49,11 +49,11 @@ class Wish:
 
 @dataclass(frozen=True)
 class Rules:
-    """Who may come before whom in one slot.
+    """The order that the rules allow in one slot.
 
     Attributes:
-        turns: ARC by ARC, smaller may come before larger; equal ones in any order.
-        above: ARC by ARC, those that are higher.
+        turns: For each ARC a number; smaller ones may come before larger ones, equal ones in any order.
+        above: For each ARC the ARCs that are higher.
     """
 
     turns: Sequence[int]
@@ -66,7 +66,7 @@ class Choice:
 
     Attributes:
         arcs: Their numbers.
-        at_most: No choice has more of them.
+        at_most: Upper bound of the number of ARCs in any choice.
     """
 
     arcs: frozenset[int]
@@ -75,16 +75,16 @@ class Choice:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How well a way to choose uses the RCs.
+    """The use of the RCs under one way to choose.
 
     Attributes:
         at_once: ARCs that run at once, on average.
-        load: Share of the RCs' time that is used, 0 to 1.
+        load: Used share of the RCs' time, 0 to 1.
         slices_per_h: Whole slices served in an hour.
-        never: ARCs that never ran in the time looked at.
-        proven: False: the solver ran out of time, ``at_once`` may be less than the best.
+        never: Number of ARCs that did not run in the examined time.
+        proven: False: the solver ran out of time, so ``at_once`` may be less than the best.
         seconds: Wall time.
-        at_most: Upper bound of ``at_once``; equal to it where proven.
+        at_most: Upper bound of ``at_once``; equal to it if proven.
     """
 
     at_once: float
@@ -96,7 +96,7 @@ class Outcome:
     at_most: float
 
     def as_json(self) -> dict[str, object]:
-        """Return it for the JSON line."""
+        """Return the outcome for the JSON line."""
         return {
             "at_once": round(self.at_once, 2),
             "load": round(self.load, 3),
@@ -109,11 +109,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The three ways on one fleet, and ours when slice ends do not fall together.
+    """The three ways on one fleet, and the schedule manager when slice ends do not coincide.
 
     Attributes:
-        ours: None: the schedule manager took too long.
-        staggered: As ``ours``, but the ARCs ask at random times of the first slice.
+        ours: Outcome of the schedule manager; None: it took too long.
+        staggered: As ``ours``, but the ARCs send their requests at random times of the first slice.
     """
 
     shape: str
@@ -126,12 +126,12 @@ class Comparison:
 
     @property
     def price_of_fairness(self) -> float:
-        """Share of the ARCs at once, 0 to 1, that the rules cost, by the better of the two ways that keep them."""
+        """Share of the ARCs at once, 0 to 1, that the rules cost, by the better of the two ways that obey them."""
         fair = max(self.bound.at_once, 0.0 if self.ours is None else self.ours.at_once)
         return 1 - fair / self.free.at_once
 
     def as_json(self) -> dict[str, object]:
-        """Return it for the JSON line."""
+        """Return the comparison for the JSON line."""
         ours = {"ours": self.ours, "staggered": self.staggered, "bound": self.bound, "free": self.free}
         return {
             "shape": self.shape,
@@ -144,12 +144,12 @@ class Comparison:
 
 
 class OutOfTime(Exception):
-    """The schedule manager took longer than it was given."""
+    """The schedule manager took longer than allowed."""
 
 
 @dataclass
 class _Limited:
-    """A schedule manager that must be done by a time of ``perf_counter``."""
+    """A schedule manager with a deadline in ``perf_counter`` time."""
 
     manager: ScheduleManager
     ends_at: float
@@ -166,14 +166,14 @@ class _Limited:
 
 
 def compare(of: Fleet, arcs: int, *, slots: int, solve_s: float, within_s: float) -> Comparison:
-    """Return how the three ways do on one fleet.
+    """Return the outcomes of the three ways on one fleet.
 
     Args:
         of: RCs that connect and disconnect at once, and a source of requests.
         arcs: ARCs that always want their RCs.
-        slots: Slices looked at.
-        solve_s: Seconds the solver has for one choice; thirty times as long for the free one.
-        within_s: Seconds the schedule manager has.
+        slots: Number of slices to examine.
+        solve_s: Seconds that the solver has for one choice; thirty times as long for the free one.
+        within_s: Seconds that the schedule manager has.
     """
     requests = [_with_one_slice(of.request(f"arc{number}")) for number in range(arcs)]
     wishes = [_wish(request) for request in requests]
@@ -191,7 +191,7 @@ def compare(of: Fleet, arcs: int, *, slots: int, solve_s: float, within_s: float
 
 
 def bound_by_rules(of: Fleet, wishes: Sequence[Wish], *, slots: int, solve_s: float) -> Outcome:
-    """Return what comes out if the largest choice the rules allow is made in each slot."""
+    """Return the outcome if the largest choice that the rules allow is made in each slot."""
     began = perf_counter()
     served_last = [-1] * len(wishes)
     above = [frozenset(i for i, other in enumerate(wishes) if higher(other.path, wish.path)) for wish in wishes]
@@ -205,7 +205,7 @@ def bound_by_rules(of: Fleet, wishes: Sequence[Wish], *, slots: int, solve_s: fl
 
 
 def free_of_rules(of: Fleet, wishes: Sequence[Wish], *, solve_s: float) -> Outcome:
-    """Return what comes out if the largest choice of all is made in each slot."""
+    """Return the outcome if the largest choice of all is made in each slot."""
     began = perf_counter()
     chosen = [largest_choice(of, wishes, solve_s=solve_s)]
     return _outcome(of, wishes, chosen, perf_counter() - began)
@@ -216,12 +216,12 @@ def largest_choice(of: Fleet, wishes: Sequence[Wish], *, solve_s: float, rules: 
 
     Args:
         of: The RCs.
-        wishes: Of all ARCs.
-        solve_s: Seconds the solver has.
-        rules: Rules by which no ARC may be left out without an excuse; None: none binds.
+        wishes: Demands of all ARCs.
+        solve_s: Seconds that the solver has.
+        rules: Rules by which an ARC may be left out only with an excuse; None: no rules.
 
     Raises:
-        OutOfTime: The solver found none.
+        OutOfTime: The solver found no choice.
     """
     model = cp_model.CpModel()
     runs = [model.new_bool_var(f"runs {number}") for number in range(len(wishes))]
@@ -263,7 +263,7 @@ def _excuses(
     capacity: Mapping[str, int],
     rules: Rules,
 ) -> list[cp_model.IntVar]:
-    """Return of what one must be true: the ARC runs, or one that may come before it is in its way."""
+    """Return conditions of which one must be true: the ARC runs, or an ARC that may precede it blocks it."""
     excuses = [runs[number]]
     for rc in wishes[number].uses:
         before = [

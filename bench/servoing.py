@@ -1,8 +1,8 @@
-"""Servoing in the loop: a simulated Scout, its camera, the air, the tracker and the servo law; no bus.
+"""Servoing in the loop without a bus: a simulated Scout, its camera, the air, the tracker and the servo law.
 
-Each trial begins up to 2.5 m from the board, up to 45 degrees off its zero-angle line, with any heading.
-It succeeds if the robot says that it has arrived and truly stands within 5 cm and 10 degrees of its
-place.  Prints a table and one JSON line.
+Each trial begins up to 2.5 m from the board, up to 45 degrees off its zero-angle line, with any heading. It succeeds if
+the robot reports its arrival and truly stands within 5 cm and 10 degrees of its place. Prints a table and one JSON
+line.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ NEAREST_M, FARTHEST_M = 1.0, 2.5
 OFF_AXIS_RAD = math.radians(45.0)
 WITHIN_M, WITHIN_RAD = 0.05, math.radians(10.0)
 LIMIT_S = 180.0
-LATENCY_FRAMES = 2  # from a frame's capture until its command is heard
+LATENCY_FRAMES = 2  # from a frame's capture until its command arrives
 
 
 @dataclass(frozen=True)
 class Trial:
-    """How one approach went; angles in radians."""
+    """The result of one approach; angles in radians."""
 
     seed: int
     range_m: float
@@ -58,7 +58,7 @@ class Trial:
 
 
 def run(seed: int, air: AirDescription, *, limit_s: float = LIMIT_S) -> Trial:
-    """Play one approach."""
+    """Simulate one approach."""
     rng = np.random.default_rng(seed)
     range_m = float(rng.uniform(NEAREST_M, FARTHEST_M))
     off_axis_rad = float(rng.uniform(-OFF_AXIS_RAD, OFF_AXIS_RAD))
@@ -104,7 +104,7 @@ def _received(receiver: Receiver, world: World, camera: Camera) -> NDArray[np.ui
 
 
 def table_line(trial: Trial) -> str:
-    """Return the trial's line of the table."""
+    """Return the line of this trial in the table."""
     off_axis_deg, heading_deg = math.degrees(trial.off_axis_rad), math.degrees(trial.heading_rad)
     return (
         f"{trial.seed:5d} from {trial.range_m:.2f} m {off_axis_deg:+4.0f}°: {trial.stage} in {trial.took_s:5.1f} s,"
@@ -114,7 +114,7 @@ def table_line(trial: Trial) -> str:
 
 
 def main() -> None:
-    """Play the trials and print how they went."""
+    """Run the trials and print their results."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)

@@ -1,11 +1,11 @@
-"""The table of stops: how long wheels turn after a stop, from every screen of every console, or what the console says.
+"""The table of stops: how long wheels turn after a stop, from every screen of every console, or the console's warning.
 
 ``bench/stops.py [--console NAME …] [--link NAME …] [--place TEXT] [--first N] [--within S] [--table [FILE]]``. Each
 cell is tried on one real mission: the robots turn, the stop is given at a place of a console, and the poses of the
-simulated world say when the wheels stood. One JSON line a cell. ``--table`` prints the Markdown of the lines in FILE,
-or of this run.
+simulated world show when the wheels stood. Prints one JSON line for each cell. ``--table`` prints the Markdown of the
+lines in FILE, or of this run.
 
-Exit code 1: a cell has a fault: no answer, or more than ``--within`` seconds where the link is there.
+Exit code 1: a cell has a fault: no answer, or more than ``--within`` seconds although the link is up.
 """
 
 from __future__ import annotations
@@ -39,32 +39,32 @@ from backbone.errors import LinkError, Refusal
 
 MISSION = "stops"
 STANDS_WITHIN_S = 0.5  # the bound of an emergency stop
-SETTLED_S = 0.25  # chosen: a robot that stood so long stands
-WATCHED_S = 2.0  # chosen: a stop that takes longer is a fault at any length
+SETTLED_S = 0.25  # chosen: a robot that has not moved for so long stands
+WATCHED_S = 2.0  # chosen: a stop that takes longer is a fault, however long it takes
 SAYS_WITHIN_S = 3.0  # chosen: a page that sleeps needs a moment to wake
 AWAKE_S = 1.0  # chosen: a page that slept needs a moment
 TURNS_WITHIN_S = 1.0
 PRESSES = 2
-ATTEMPTS = 4  # an order to stop that was given without a link may come at any time
+ATTEMPTS = 4  # an order to stop that was given without a link may arrive at any time
 
 
 class Runner:
     """Tries cells of one console.
 
     Args:
-        console: Which.
-        world: Of the mission.
-        within_s: A stop that takes longer is a fault.
+        console: The console.
+        world: The world of the mission.
+        within_s: Longest legal duration of a stop.
     """
 
     def __init__(self, console: TriedConsole, world: World, within_s: float = STANDS_WITHIN_S) -> None:
         self._console, self._world, self._within_s = console, world, within_s
 
     async def try_cells(self, tried: list[Cell]) -> list[dict[str, Any]]:
-        """Return what came of these cells, each with its fault if it has one.
+        """Return the results of these cells, each with its fault if it has one.
 
         Args:
-            tried: One cell; or several of one place and one link that is away, which take turns while it is away once.
+            tried: One cell, or several cells of one place that take turns during one loss of the link.
         """
         try:
             await self._prepare(tried[0])
@@ -79,7 +79,7 @@ class Runner:
 
     # ------------------------------------------------------------------ before and after
     async def _prepare(self, cell: Cell) -> None:
-        """Have all robots turn, and the console at its place."""
+        """Make all robots turn, and bring the console to the place of the cell."""
         for _ in range(ATTEMPTS - 1):
             with suppress(NotSeen):
                 await self._turn_all(cell)
@@ -104,7 +104,7 @@ class Runner:
                 raise fault
 
     async def _turn_own(self, cell: Cell) -> None:
-        """Have the console's robot turn, by another operator or by the console itself."""
+        """Make the console's robot turn, by another operator or by the console itself."""
         world, console = self._world, self._console
         if cell.link is Link.OTHER or not console.kind.drives:
             await console.take()
@@ -116,7 +116,7 @@ class Runner:
         await world.holder.leave()
         await console.take()
         await until(world.console_holds, f"{console.name} holds {ROBOT}")
-        for _ in range(PRESSES):  # what was held before the console was ready for it is let go and held anew
+        for _ in range(PRESSES):  # keys held before the console was ready are released and pressed again
             await console.drive()
             with suppress(NotSeen):
                 await until(lambda: world.poses.turns(ROBOT), f"{ROBOT} turns", TURNS_WITHIN_S)
@@ -178,9 +178,9 @@ class Runner:
     def _mission_s(self, monotonic_s: float) -> float:
         return self._world.clock.now_s() - (time.monotonic() - monotonic_s)
 
-    # ------------------------------------------------------------------ without one
+    # ------------------------------------------------------------------ without a link
     async def _stop_without_link(self, gestures: list[Gesture], link: Link) -> list[dict[str, Any]]:
-        """Cut the link or freeze the console, give the stops, and see what the wheels do and what the console says."""
+        """Cut the link or freeze the console, give the stops, and return the wheels' and the console's reactions."""
         world, console = self._world, self._console
         moved = world.poses.turns(ROBOT) and console.kind.drives
         await console.aim(gestures)
@@ -198,7 +198,7 @@ class Runner:
             for gesture in gestures if link is Link.CUT else []:
                 await console.give(gesture)
                 rows.append({**found, **await self._said(away_s)})
-                away_s = -1.0  # said once, it is said
+                away_s = -1.0  # the delay of the warning counts once
         finally:
             if link is Link.CUT:
                 console.relay.heal()
@@ -219,7 +219,7 @@ class Runner:
         return {"moved": [ROBOT], "stands_s": round((last_s or away_s) - away_s, 3)}
 
     async def _said(self, away_s: float) -> dict[str, Any]:
-        """Return what a console that is cut off says, and after how long."""
+        """Return the warning of a console that is cut off, and its delay."""
         heard: list[str] = []
 
         async def is_said() -> bool:
@@ -246,7 +246,7 @@ def _faults(silent: list[str], moving: list[str], too_many: list[str]) -> str:
 # ---------------------------------------------------------------------- the mission and its consoles
 @contextmanager
 def mission_up(folder: str) -> Iterator[None]:
-    """Have the shipped mission up until the block ends."""
+    """Keep the shipped mission up until the block ends."""
     os.environ["XDG_RUNTIME_DIR"] = folder
     file = Path(folder) / "mission.xml"
     file.write_text(MISSION_XML.read_text().replace('name="iros2001"', f'name="{MISSION}"', 1))
@@ -260,7 +260,7 @@ def mission_up(folder: str) -> Iterator[None]:
 
 @asynccontextmanager
 async def console_at_hand(name: str) -> AsyncIterator[TriedConsole]:
-    """Have a console run, with its link to be cut."""
+    """Run a console whose link can be cut."""
     async with AsyncExitStack() as stack:
         if name.startswith("page"):
             environment = {"XDG_RUNTIME_DIR": os.environ["XDG_RUNTIME_DIR"]}
@@ -278,7 +278,7 @@ async def console_at_hand(name: str) -> AsyncIterator[TriedConsole]:
 
 
 def together(wanted: list[Cell]) -> list[list[Cell]]:
-    """Return the cells that are tried at once: those of one place while a link is away, else one."""
+    """Return the cells that are tried together: those of one place during one loss of the link; else single cells."""
     groups: dict[tuple[Any, ...], list[Cell]] = {}
     for cell in wanted:
         is_away = cell.link in (Link.CUT, Link.FROZEN)
@@ -287,7 +287,7 @@ def together(wanted: list[Cell]) -> list[list[Cell]]:
 
 
 async def try_all(wanted: list[Cell], within_s: float) -> list[dict[str, Any]]:
-    """Try these cells, each printed as soon as it is known; return them."""
+    """Try these cells, print each result as soon as it is known, and return all."""
     rows = []
     trying = asyncio.current_task()
     assert trying is not None
@@ -307,7 +307,7 @@ async def try_all(wanted: list[Cell], within_s: float) -> list[dict[str, Any]]:
 
 
 def main() -> int:
-    """Try the cells that were asked for."""
+    """Try the selected cells."""
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("--console", nargs="+", choices=[*KINDS], default=[*KINDS])
     asked.add_argument("--link", nargs="+", choices=[*Link], default=[*Link])

@@ -1,4 +1,4 @@
-"""A console that is driven by a gamepad of which another program plays the hands: ``stops_gamepad.py FIFO WORD …``.
+"""A console with a gamepad whose input another program supplies: ``stops_gamepad.py FIFO WORD …``.
 
 The lines of the FIFO are events as the device would send them: type, code and value. All else is ``scout-console``.
 """
@@ -18,7 +18,7 @@ RANGES = {gamepad.ABS_X: (-100, 100), gamepad.ABS_Y: (-100, 100)}
 
 
 class PlayedEvent(NamedTuple):
-    """One event of the device."""
+    """An event of the device."""
 
     type: int
     code: int
@@ -29,16 +29,16 @@ class PlayedGamepad:
     """A device whose events come from a FIFO.
 
     Args:
-        path: Of the FIFO.
+        path: Path of the FIFO.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     async def async_read_loop(self) -> AsyncIterator[PlayedEvent]:
-        """Yield what the hands do."""
+        """Yield the events from the FIFO."""
         reader = asyncio.StreamReader()
-        # opened to read and write, so that the file has no end while no program writes
+        # opened for reading and writing, so that the file does not end while no program writes
         pipe = self._path.open("r+b", buffering=0)
         loop = asyncio.get_running_loop()
         await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), pipe)

@@ -1,4 +1,4 @@
-"""A console without a screen, driven by a gamepad, as the table of stops tries it."""
+"""A console without a screen, driven by a gamepad, for the table of stops."""
 
 from __future__ import annotations
 

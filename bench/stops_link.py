@@ -1,4 +1,4 @@
-"""A link that can be cut: what passes it waits while it is cut, as on a network that drops every packet."""
+"""A link that can be cut. While it is cut, its bytes wait, as on a network that drops every packet."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SOCKET = "unixsock-stream/"
 
 
 class Relay:
-    """Carries bytes both ways, but for the times in which it is cut.
+    """Carries bytes both ways, except while it is cut.
 
     Args:
         connect: Opens a connection to the far end.
@@ -31,11 +31,11 @@ class Relay:
         self._tasks: set[asyncio.Task[None]] = set()
 
     def cut(self) -> None:
-        """Drop all messages from now on, without notice to either end."""
+        """Stop carrying bytes from now on, without notice to either end."""
         self._passes.clear()
 
     def heal(self) -> None:
-        """Let everything pass, first what has waited."""
+        """Carry bytes again, first those that waited."""
         self._passes.set()
 
     async def meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -50,7 +50,7 @@ class Relay:
             there, back = self._carry(reader, far), self._carry(far_reader, writer)
             await asyncio.gather(there, back)
         except (ConnectionError, FileNotFoundError, asyncio.CancelledError):
-            return  # cancelled only by ``close``; asyncio reports it as a fault of this callback
+            return  # only ``close`` cancels it; asyncio would report that as a fault of this callback
         finally:
             self._tasks.discard(task)
             for one in filter(None, (writer, far)):
@@ -75,7 +75,7 @@ class Relay:
 
 @asynccontextmanager
 async def relay_to_port(port: int) -> AsyncIterator[tuple[Relay, int]]:
-    """Have a relay to a port of this machine; yield it and its own port."""
+    """Run a relay to a port of this machine; yield it and its own port."""
     relay = Relay(lambda: asyncio.open_connection("127.0.0.1", port))
     server = await asyncio.start_server(relay.meet, "127.0.0.1", 0)
     try:
@@ -87,7 +87,7 @@ async def relay_to_port(port: int) -> AsyncIterator[tuple[Relay, int]]:
 
 @asynccontextmanager
 async def relay_to_mission(found: run_files.RunFile, folder: Path) -> AsyncIterator[Relay]:
-    """Have a runtime folder in which the mission is found at the end of a relay."""
+    """Make a runtime folder in which the mission's hub is reached through a relay; yield the relay."""
     own = folder / "scout-backbone" / found.mission
     own.mkdir(parents=True, mode=0o700)
     socket = own / "hub.sock"

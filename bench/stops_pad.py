@@ -1,4 +1,4 @@
-"""The hands at a gamepad that a console reads through ``stops_gamepad.py``."""
+"""Simulated hands at a gamepad that a console reads through ``stops_gamepad.py``."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ class Pad:
     """A gamepad.
 
     Args:
-        folder: Where its events pass.
+        folder: Folder for the FIFO of its events.
     """
 
     def __init__(self, folder: Path) -> None:
         self._fifo = folder / "gamepad"
 
     def program(self) -> list[str]:
-        """Plug it in; return the words that run a console with it."""
+        """Plug it in; return the command line of a console with it."""
         os.mkfifo(self._fifo)
         return [sys.executable, str(PROGRAM), str(self._fifo)]
 
@@ -34,7 +34,7 @@ class Pad:
         self._feel(f"{EV_ABS} {ABS_X} 100", f"{EV_KEY} {BTN_TR} 1")
 
     def let_go(self) -> None:
-        """Let the dead-man button go."""
+        """Release the dead-man button."""
         self._feel(f"{EV_KEY} {BTN_TR} 0")
 
     def take(self) -> None:

@@ -1,4 +1,4 @@
-"""Pages in a real browser, as the table of stops tries them."""
+"""Pages in a real browser, for the table of stops."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SIZES = {"desktop": (1440, 900), "tablet": (820, 1180), "phone": (390, 844)}
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")
 ARGUMENTS = ["--no-sandbox", "--disable-gpu"]
 WITHIN_S = 15.0
-PRESS_S = 0.1  # chosen: six pictures of the screen, at each of which the page looks at its gamepad
+PRESS_S = 0.1  # chosen: six frames of the screen, at each of which the page reads its gamepad
 CARD = f".robot[data-robot={ROBOT}]"
 BUTTONS = {
     Gesture.RED_ONE: f"{CARD} .emergency",
@@ -34,7 +34,7 @@ IN_A_DIALOG = {
     Gesture.RED_MINE: "#reading-stop",
     Gesture.RED_ALL: "#reading-stop-all",
 }
-"""A dialog covers every red button but its own."""
+"""An open dialog covers every red button except its own."""
 GAMEPAD_BUTTONS = {Gesture.PAD_ONE: 1, Gesture.PAD_ALL: 3}
 SAID = ("link", "blind-title", "unsure", "own", "lost-line", "let-go")
 BEFORE = """
@@ -59,7 +59,7 @@ class Page(TriedConsole):
         """See ``TriedConsole``."""
         await self._page.wait_for_selector("body:not(.is-blind)")
         if await self._page.evaluate("() => document.getElementById('take').disabled"):
-            return  # it asks
+            return  # the console has requested its robot already
         await self._page.evaluate(f"() => document.querySelector('{CARD} .row button').click()")
 
     async def go(self, place: Place) -> None:
@@ -129,7 +129,7 @@ class Page(TriedConsole):
         await self._page.keyboard.up("d")
 
     async def _touch(self, box: dict[str, float] | None) -> None:
-        """Put a finger, or the mouse, at a button's place, also if it is covered."""
+        """Press the finger, or the mouse, at a button's place, even if the button is covered."""
         if box is not None:
             press = self._page.mouse.click if self.name == "page desktop" else self._page.touchscreen.tap
             await press(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
@@ -141,14 +141,14 @@ class Page(TriedConsole):
         return [one["id"] for one in found["processInfo"] if one["type"] == "renderer"]
 
     async def plug_in(self) -> None:
-        """Have the page follow its gamepad, if it has one."""
+        """Connect the page's gamepad, if it has one."""
         if self._has_gamepad:
             await self._page.evaluate("() => { dispatchEvent(new Event('gamepadconnected')); }")
 
 
 @asynccontextmanager
 async def page_present(name: str, environment: dict[str, str], mission: str) -> AsyncIterator[Page]:
-    """Serve the mission's page, and have it open in a browser at the size of the console's name."""
+    """Serve the mission's page, and open it in a browser of the size in the console's name."""
     words = [str(BIN / "scout-console"), "serve", "--port", "0", "--mission", mission]
     pipe = asyncio.subprocess.PIPE
     server = await asyncio.create_subprocess_exec(*words, env={**os.environ, **environment}, stdout=pipe)

@@ -1,4 +1,4 @@
-"""Where a stop can be given: every screen, dialog and focus of every console, and how to get there.
+"""The places where a stop can be given: every screen, dialog and focus of every console, and the way to each.
 
 Rule of this file: data only. ``tests/ui_console/test_stops_table.py`` compares it with the consoles' own lists, so
 that a new table, dialog or control without a place fails that test.
@@ -16,7 +16,7 @@ OTHERS = ("scout1", "scout2")
 
 
 class Link(StrEnum):
-    """What is with the console while the stop is given."""
+    """State of the console's link, and of its robot, while the stop is given."""
 
     UP = "up"  # connected; the console drives the robot if it can
     OTHER = "other holds"  # connected; another operator drives the robot
@@ -25,7 +25,7 @@ class Link(StrEnum):
 
 
 class Gesture(StrEnum):
-    """How the stop is given."""
+    """Manner of the stop."""
 
     ONE = "one"
     ALL = "all"
@@ -46,14 +46,14 @@ class Place:
     """A screen, dialog or focus.
 
     Attributes:
-        name: For the table.
-        of: What of the code it shows: a table's name, the method that opens a dialog, an id or a class of the page.
-        open: Keys of a terminal, or a script of the page.
-        shows: What stands on the terminal, or holds of the page, once it is open; empty: nothing is waited for.
+        name: Name in the table.
+        of: Its part of the code: a table's name, the method that opens a dialog, an id or a class of the page.
+        open: Keys of a terminal, or a script of the page, that open it.
+        shows: Pattern on the terminal, or condition of the page, once it is open; empty: no wait.
         close: Keys or script that lead back.
-        needs: What has to be there first: "stopped" (another robot is stopped), "asked" (another operator asks), "held"
-            (the console holds ``ROBOT``, so there is no such cell while another operator does).
-        meant: The robot a stop of one means here while another operator holds ``ROBOT``.
+        needs: Required state: "stopped" (another robot is stopped), "asked" (another operator asks), "held" (the
+            console holds ``ROBOT``, so there is no such cell while another operator does).
+        meant: The robot that a stop of one robot concerns here while another operator holds ``ROBOT``.
     """
 
     name: str
@@ -185,14 +185,14 @@ PAD = (Gesture.PAD_ONE, Gesture.PAD_ALL)
 
 @dataclass(frozen=True)
 class Kind:
-    """A console as it is tried.
+    """A kind of console.
 
     Attributes:
-        places: Of this console.
-        gestures: It can be stopped by.
+        places: Its places.
+        gestures: The manners of stop that it has.
         drives: Whether it holds a robot.
-        size: Columns and lines of a terminal; (0, 0) for what has none.
-        words: Of its command.
+        size: Columns and lines of a terminal; (0, 0) for a console without a terminal.
+        words: Words of its command.
     """
 
     places: tuple[Place, ...]
@@ -219,7 +219,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell of the table."""
+    """A cell of the table."""
 
     console: str
     place: Place
@@ -228,14 +228,14 @@ class Cell:
 
 
 def cells(console: str) -> list[Cell]:
-    """Return all cells of a console, in the order in which they are best tried."""
+    """Return all cells of a console, in the best order of trials."""
     kind = KINDS[console]
     return [
         Cell(console, place, gesture, link)
         for link in Link
         for place in kind.places
         for gesture in kind.gestures
-        if not (link is not Link.UP and gesture is Gesture.RED_MINE)  # it is shown beside the hands that drive only
+        if not (link is not Link.UP and gesture is Gesture.RED_MINE)  # this button is shown only to hands that drive
         and not (link is Link.UP and not kind.drives)
         and not (console == "script" and link is Link.OTHER and place.of == "drive")
         and not (link is Link.OTHER and place.needs == "held")

@@ -14,7 +14,7 @@ HEAD = """\
 
 
 def markdown(rows: Iterable[dict[str, Any] | str]) -> str:
-    """Return the table of these cells, given as they are printed or as data.
+    """Return the table of these cells, given as data or as printed lines.
 
     Example:
         >>> print(markdown([{"console": "pendant", "link": "up", "stands_s": 0.1}]).splitlines()[2])

@@ -1,4 +1,4 @@
-"""Consoles in a terminal, and scripts on a pipe, as the table of stops tries them."""
+"""Consoles in a terminal, and scripts on a pipe, for the table of stops."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from stops_world import TURN, NotSeen, until
 from ui_console.model.driving import KEYS_LET_GO_S
 
 REPEAT_EVERY_S = 0.05  # chosen: about as fast as keyboards repeat
-LET_GO_S = KEYS_LET_GO_S + 0.1  # a little more, for the terminal takes a moment to hand keys on
-ESCAPE_S = 0.15  # chosen: a terminal tells escape from the begin of another key by a pause
+LET_GO_S = KEYS_LET_GO_S + 0.1  # a little more, because the terminal needs a moment to pass keys on
+ESCAPE_S = 0.15  # chosen: a terminal distinguishes escape from the begin of another key by a pause
 MOST_ESCAPES = 5
-SHOWN_S = 0.5  # chosen: what a key did is drawn by then
+SHOWN_S = 0.5  # chosen: the effect of a key is drawn by then
 SHOWN_WITHIN_S = 30.0
 FRAMES = re.compile(r"[\u2500-\u259f].*")
 CANNOT = r"NO LINK|CANNOT STOP|MAY NOT ARRIVE|no_answer"
-"""What consoles say when they are cut off."""
+"""Warnings of consoles that are cut off."""
 
 
 class TriedConsole(ABC):
-    """A console and the hands at it."""
+    """A console and its simulated hands."""
 
     def __init__(self, name: str, relay: Relay) -> None:
         self.name, self.kind, self.relay = name, KINDS[name], relay
@@ -42,13 +42,13 @@ class TriedConsole(ABC):
         self._let_go_s = 0.0
 
     async def drive(self) -> None:
-        """Hold what drives down, until ``let_go``; not before what was held counts as let go."""
+        """Hold the driving keys down until ``let_go``; begin only after earlier keys count as released."""
         if self._holding is None:
             await asyncio.sleep(self._let_go_s + LET_GO_S - time.monotonic())
             self._holding = asyncio.create_task(self._hold(), name="a hand")
 
     async def let_go(self) -> None:
-        """Hold nothing any more."""
+        """Release all keys."""
         holding, self._holding = self._holding, None
         if holding is not None:
             holding.cancel()
@@ -57,30 +57,30 @@ class TriedConsole(ABC):
             self._let_go_s = time.monotonic()
 
     async def aim(self, gestures: Sequence[Gesture]) -> None:  # noqa: B027  keys are found without looking
-        """Get ready to give these without looking. When: the console is about to be frozen."""
+        """Prepare to give these stops while the console is frozen. Call it before freezing."""
 
     @abstractmethod
     async def take(self) -> None:
-        """Be at the first screen and ask for the robot, if it does not."""
+        """Go to the first screen and request the robot, if the console has not requested it."""
 
     @abstractmethod
     async def go(self, place: Place) -> None:
         """Open a place."""
 
     async def shows_meant(self, robot: str) -> None:  # noqa: B027  only a cursor in a terminal makes it another one
-        """Return when the console shows that a stop of one is for this robot."""
+        """Return when the console shows that a stop of one robot concerns this robot."""
 
     @abstractmethod
     async def leave(self, place: Place) -> None:
-        """Close it."""
+        """Close the place."""
 
     @abstractmethod
     async def give(self, gesture: Gesture) -> float:
-        """Give the stop; return when, monotonic clock of this machine."""
+        """Give the stop; return its time, monotonic clock of this machine."""
 
     @abstractmethod
     async def says(self) -> str:
-        """Return what the console says of itself."""
+        """Return the console's text about its own state."""
 
     @abstractmethod
     async def freeze(self) -> None:
@@ -88,14 +88,14 @@ class TriedConsole(ABC):
 
     @abstractmethod
     async def thaw(self) -> None:
-        """Let it go on."""
+        """Continue its process."""
 
     @abstractmethod
     async def _hold(self) -> None:
-        """Hold what drives until cancelled."""
+        """Hold the driving keys until cancelled."""
 
-    async def _release(self) -> None:  # noqa: B027  keys are let go by not being pressed any more
-        """Let go what ``_hold`` held."""
+    async def _release(self) -> None:  # noqa: B027  keys are released by not being pressed any more
+        """Release the keys that ``_hold`` held."""
 
 
 class Terminal(TriedConsole):
@@ -121,12 +121,12 @@ class Terminal(TriedConsole):
         try:
             await self._shows(r"you hold|watching|waiting")
             shell = psutil.Process(int(await self._tmux("display-message", "-p", "#{pane_pid}")))
-            [console] = shell.children()  # tmux continues its own child when that is stopped, so it is not that one
+            [console] = shell.children()  # tmux continues its own child if that is stopped, but not the console
             self._pid = console.pid
             if self.name == "monitor":
-                await self._press("BTab " * 3)  # it begins at the timeline
+                await self._press("BTab " * 3)  # the cursor begins at the timeline
                 await self._shows(ROBOT)
-                await self._press("] ]")  # and its cursor goes to the robot that is meant
+                await self._press("] ]")  # and moves to the robot that is meant
                 await self._shows(f"STOP {ROBOT}")
             yield self
         finally:
@@ -224,7 +224,7 @@ class Terminal(TriedConsole):
             raise NotSeen(f"{error}\n{await self._screen()}") from None
 
     async def _closed(self, place: Place) -> None:
-        """Press escape again where a busy console took it for the begin of another key."""
+        """Press escape again if a busy console took it for the begin of another key."""
         for _ in range(MOST_ESCAPES):
             if re.search(place.shows, await self._screen()) is None:
                 return

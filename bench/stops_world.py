@@ -1,4 +1,4 @@
-"""The mission of the table of stops: where its robots are, who drives them meanwhile, who lifts their stops."""
+"""The mission of the table of stops: its robots' poses, the operators who drive them meanwhile and lift their stops."""
 
 from __future__ import annotations
 
@@ -34,23 +34,23 @@ ROBOTS = (*OTHERS, ROBOT)
 TURN = DriveWish(3.0, -3.0)  # on the spot, so that no wall is in the way
 LOOK_EVERY_S = 0.015  # chosen: twice in each frame of the world
 KEPT_S = 8.0  # chosen: longer than a cell is watched
-STILL_RAD, STILL_M = 0.004, 0.001  # chosen: a thirtieth of what a robot turns or drives in a tenth of a second
+STILL_RAD, STILL_M = 0.004, 0.001  # chosen: a thirtieth of a robot's turn or drive in a tenth of a second
 TURNING_WITHIN_S = 0.25  # chosen: at this speed a robot turns fifteen times ``STILL_RAD`` meanwhile
 SAY_EVERY_S = 0.08  # chosen: three times within ``STICK_LASTS_S``
-LATE_S = 0.3  # chosen: an order that waited on a link is there long before
+LATE_S = 0.3  # chosen: an order that waited on a link arrives long before
 WITHIN_S = 15.0
-HIGH, LOW = 200, 50  # of those who take the robot, and of those who only ask for it; consoles have 100
+HIGH, LOW = 200, 50  # priorities of operators who take the robot, and of those who only ask for it; consoles have 100
 
 
 class NotSeen(Exception):
-    """What a cell needs did not come in time."""
+    """A state that a cell needs did not come in time."""
 
 
 async def until(holds: Callable[[], bool | Awaitable[bool]], what: str, within_s: float = WITHIN_S) -> None:
-    """Return once it holds.
+    """Return when the condition holds.
 
     Raises:
-        NotSeen: It did not in time.
+        NotSeen: It did not hold in time.
     """
     try:
         async with asyncio.timeout(within_s):
@@ -64,14 +64,14 @@ async def until(holds: Callable[[], bool | Awaitable[bool]], what: str, within_s
 
 
 class Poses:
-    """Where the robots were in the last seconds, asked of the world."""
+    """The robots' poses in the last seconds, asked of the world."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
         self._seen: dict[str, deque[Pose]] = {name: deque(maxlen=int(KEPT_S / LOOK_EVERY_S)) for name in ROBOTS}
 
     async def watch(self) -> None:
-        """Look repeatedly; until cancelled."""
+        """Ask repeatedly until cancelled."""
         while True:
             with suppress(LinkError):
                 await asyncio.gather(*map(self._look, ROBOTS))
@@ -83,12 +83,12 @@ class Poses:
         return bool(seen) and self.moved_last_s(robot, seen[-1].at_s - TURNING_WITHIN_S) is not None
 
     def moved_last_s(self, robot: str, since_s: float) -> float | None:
-        """Return the last time since then at which it was not yet where it is now; None: it stood."""
+        """Return the last time since then at which it was not yet at its present pose; None: it stood."""
         seen = self._seen[robot]
         return max((pose.at_s for pose in seen if pose.at_s >= since_s and _differs(pose, seen[-1])), default=None)
 
     def moved_by(self, robot: str, last_s: float) -> tuple[float, float]:
-        """Return how far it turned and went in the last moment: radians and meters."""
+        """Return its turn and its way in the last moment: radians and meters."""
         now = self._seen[robot][-1]
         then = next(pose for pose in self._seen[robot] if pose.at_s >= now.at_s - last_s)
         turned_rad = math.remainder(now.heading_rad - then.heading_rad, math.tau)
@@ -118,7 +118,7 @@ class Operator:
 
     @asynccontextmanager
     async def present(self) -> AsyncIterator[Operator]:
-        """Be there until the block ends."""
+        """Be present until the block ends."""
         bus = await ZenohBus.open_when_up(
             self._found.mission, self.launch.address, self._clock, client_config(self._found.endpoint)
         )
@@ -135,14 +135,14 @@ class Operator:
             await living
 
     async def turn(self) -> None:
-        """Hold the robot, and turn it until ``rest``; what was held before is let go first."""
+        """Take the robot and turn it until ``rest``; an earlier hold is released first."""
         await self.rest()
         self.console.take()
         await until(lambda: self.console.is_held, f"{self.launch.name} holds {self.robot}")
         self._turning = asyncio.create_task(self._turn(), name=f"{self.launch.name} turns")
 
     async def rest(self) -> None:
-        """Let the stick go."""
+        """Release the stick."""
         if self._turning is not None:
             self._turning.cancel()
             await asyncio.wait({self._turning})
@@ -150,7 +150,7 @@ class Operator:
             self.console.stop()
 
     async def leave(self) -> None:
-        """Give the robot back."""
+        """Release the robot."""
         await self.rest()
         await self.console.give_back()
 
@@ -167,7 +167,7 @@ class Operator:
 
 
 class World:
-    """What a cell needs of the mission."""
+    """The mission's state and operators, for the cells."""
 
     def __init__(self, bus: Bus, clock: MissionClock, operators: list[Operator]) -> None:
         self.bus, self.clock, self.poses = bus, clock, Poses(bus)
@@ -183,27 +183,27 @@ class World:
             self._acted_s = envelope.body.at_s
 
     def acted_s(self, since_s: float) -> float | None:
-        """Return when a console began to carry the stop out that was given then; None: it did not say."""
+        """Return when a console began to carry out a stop given since then; None: no console reported one."""
         return self._acted_s if self._acted_s >= since_s else None
 
     def _heard(self, state: StopState) -> None:
         self._stops[state.rc] = state
 
     def stopped_s(self, robot: str, since_s: float) -> float | None:
-        """Return when an order to stop that was given since then reached the robot's RC; None: none did.
+        """Return when an order to stop given since then reached the robot's RC; None: no order did.
 
-        An order to a robot that is stopped already is no new stop, but has a number: see ``orders``.
+        An order to a robot that is stopped already is not a new stop, but counts in ``orders``.
         """
         state = self._stops.get(robot)
         return state.at_s if state is not None and state.is_stopped and state.at_s >= since_s else None
 
     def orders(self, robot: str) -> int:
-        """Return how many orders to stop the robot has had."""
+        """Return the number of orders to stop that the robot got."""
         state = self._stops.get(robot)
         return 0 if state is None else state.number
 
     async def stop(self, robot: str) -> None:
-        """Stop it as another operator does."""
+        """Stop the robot as another operator does."""
         await stop_robot(self.bus, robot, "a person stands there", "olga")
 
     async def all_may_move(self) -> None:
@@ -216,19 +216,19 @@ class World:
         state = await ask_stop(self.bus, robot)
         was_stopped = state.is_stopped
         while state.is_stopped:
-            with suppress(OtherStop):  # an order that was late came in between
+            with suppress(OtherStop):  # a late order came in between
                 state = await lift_stop(self.bus, state, "olga")
                 continue
             state = await ask_stop(self.bus, robot)
         return was_stopped
 
     async def console_asks(self) -> bool:
-        """Return whether the console that is tried is there and asks for a robot."""
+        """Return whether the tried console is present and requests a robot."""
         schedule = await self._schedule()
         return any(self._is_tried(request.owner) for request in schedule.requests)
 
     async def console_holds(self) -> bool:
-        """Return whether the console that is tried has the robot."""
+        """Return whether the tried console holds the robot."""
         schedule = await self._schedule()
         owners = {request.arc: request.owner for request in schedule.requests}
         holders = [owners.get(one.arc, "") for rc in schedule.rcs if rc.rc == ROBOT for one in rc.holders]
@@ -241,7 +241,7 @@ class World:
         return await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=2.0)
 
     async def others_turn(self, robots: Iterable[str]) -> None:
-        """Have these other robots turn."""
+        """Make these other robots turn."""
         await asyncio.gather(*(self._turn(driver) for driver in self._drivers if driver.robot in robots))
 
     async def _turn(self, driver: Operator) -> None:
@@ -252,7 +252,7 @@ class World:
 
 @asynccontextmanager
 async def world_of(mission: str) -> AsyncIterator[World]:
-    """Watch the mission's robots, and have other operators there, until the block ends."""
+    """Watch the mission's robots, and run other operators, until the block ends."""
     found = run_files.find(mission)
     wishes = [*((f"driver-{robot}", robot, HIGH) for robot in OTHERS), ("holder", ROBOT, HIGH), ("asker", ROBOT, LOW)]
     async with connected(mission, None, address(Subsystem.UI_CONSOLE, "table")) as (bus, clock):

@@ -1,13 +1,13 @@
 """A context switch on real processes: from the revocation of one ARC to the grant of the next.
 
-Runs the mission of IROS 2001, figure 2, with short slices, and reads what the RC manager measured: the
-gate closes, four RCs disconnect, four connect, the ARC prepares and opens. The time the picture needs
-to settle is the mission's own and not counted; what is done meanwhile hides in it.
+Runs the mission of IROS 2001, figure 2, with short slices, and reads the RC manager's measurements: the gate closes,
+four RCs disconnect, four connect, the ARC prepares and opens. The settling time of the picture belongs to the mission
+and is not counted; work during that time does not show.
 
 Variants, which can be combined:
 
-* ``--no-settling``: the picture stands at once, so nothing hides and the whole chain is seen.
-* ``--clean-stop``: the watchers stop their robots' wheels before they give them up, and are waited for.
+* ``--no-settling``: the picture settles at once, so that the whole chain shows.
+* ``--clean-stop``: the watchers stop their robots' wheels before they release them, and the switch waits for that.
 
 Prints one JSON line; the floor is one question through the same hub, asked in the same run.
 """
@@ -38,9 +38,9 @@ def fast_mission(folder: Path, *, settling: bool, clean_stop: bool) -> Path:
     """Write the mission with short slices; return its path.
 
     Args:
-        folder: Where to.
-        settling: The picture of a new transmitter needs the time that the mission file says; else none.
-        clean_stop: The watchers have something to bring to rest at the end of a slice.
+        folder: Folder of the file.
+        settling: True: the picture of a new transmitter settles in the time of the mission file; False: at once.
+        clean_stop: True: the watchers must stop their robots at the end of a slice.
     """
     text = MISSION_XML.read_text()
     text = re.sub(r'minimum-runtime-s="[^"]*"', f'minimum-runtime-s="{SLICE_S}"', text)
@@ -55,7 +55,7 @@ def fast_mission(folder: Path, *, settling: bool, clean_stop: bool) -> Path:
 
 
 async def measure(seconds: float) -> tuple[dict[str, float], list[float]]:
-    """Return the RC manager's statistics after some seconds, and the times of bare questions meanwhile."""
+    """Return the RC manager's statistics after some seconds, and the durations of bare questions meanwhile."""
     questions = []
     async with connected("switching", None, "ui_console/bench") as (bus, clock):
         ends_s = clock.now_s() + seconds

@@ -1,10 +1,10 @@
-"""Where a simulated trial of the surveillance experiment spends its processor time, the RC manager's prediction first.
+"""Processor time of a simulated trial of the surveillance experiment by part, the RC manager's prediction first.
 
-Every trial runs as the experiment runs it, in one process on a virtual clock. The parts are timed at their doors:
-``prediction`` is what the RC manager spends on expected starts (the published schedule, replies, ``why`` and revoked
-ARCs), ``decisions`` is the rest of the scheduling core, the others are the simulated world and the watchers' vision;
-``rest`` is bus, components and event loop. Prints one JSON line; shares of the processor time, which another program
-on the machine changes little.
+Every trial runs as in the experiment, in one process on a virtual clock. The parts are timed at their entry points:
+``prediction`` is the RC manager's time for expected starts (the published schedule, replies, ``why`` and revoked ARCs),
+``decisions`` is the rest of the scheduling core, the others are the simulated world and the watchers' vision; ``rest``
+is bus, components and event loop. Prints one JSON line with shares of the processor time, on which other programs of
+the machine have little influence.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ Spent = Counter[str]
 
 
 def timed(spent_s: Spent, part: str, of: type[Any], name: str) -> None:
-    """Count the processor time of this method from now on, without that of other parts in it."""
+    """Count the processor time of this method from now on, without that of other parts called in it."""
     method: Callable[..., Any] = getattr(of, name)
 
     @wraps(method)
@@ -67,7 +67,7 @@ def main() -> None:
     asked = parser.parse_args()
     if asked.trials < 1:
         parser.error(f"--trials {asked.trials}: at least 1")
-    run_order(TrialOrder(EVERYTHING[0], asked.seed, 0, ""))  # imports and compiled worlds are no part of a trial
+    run_order(TrialOrder(EVERYTHING[0], asked.seed, 0, ""))  # imports and compiled worlds are not part of a trial
     spent_s: Spent = Counter()
     for part, of, name in DOORS:
         timed(spent_s, part, of, name)

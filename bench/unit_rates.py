@@ -1,9 +1,9 @@
-"""Rates of execution units: what share of its rounds a unit of 1 to 200 Hz has while half of the processors are busy.
+"""Rates of execution units: the share of its rounds that a unit of 1 to 200 Hz gets while half the processors are busy.
 
 ``bench/unit_rates.py [--for S] [--idle] [--nice N]``. All units run at once for the whole time, in two processes: in
-the event loop of the one, and each in a thread of its own in the other; beside them other processes compute. So ten
-minutes of all rates are ``--for 600``. One JSON line a unit; ``share`` is the number of rounds by the number that the
-frequency asks for. The last line names every unit that missed rounds: how many, and how late its latest was.
+one in the event loop, in the other each in a thread of its own. Beside them other processes compute. So ten minutes of
+all rates are ``--for 600``. Prints one JSON line for each unit; ``share`` is the number of rounds divided by the number
+that the frequency demands. The last line names every unit that missed rounds: how many, and how late its latest was.
 
 Exit code 1: a unit had less than 99 % of its rounds.
 """
@@ -68,7 +68,7 @@ class FreeUnit(UnitComponent):
 
 @contextmanager
 def half_busy(processes: int) -> Iterator[None]:
-    """Keep so many processors busy."""
+    """Keep this number of processors busy."""
     busy = [subprocess.Popen([sys.executable, "-c", COMPUTES]) for _ in range(processes)]
     try:
         yield
@@ -79,7 +79,7 @@ def half_busy(processes: int) -> Iterator[None]:
 
 
 async def rates(for_s: float, own_thread: bool, nice: int) -> dict[float, dict[str, float]]:
-    """Return rate → statistics of the unit that is to have it."""
+    """Return rate → statistics of the unit with this frequency."""
     clock, network = MissionClock.started_now(), LocalNetwork()
     units: dict[float, FreeUnit] = {}
     for rate_hz in RATES_HZ:
@@ -104,7 +104,7 @@ def rates_of(for_s: float, own_thread: bool, nice: int) -> dict[float, dict[str,
 
 
 def told(rate_hz: float, one: dict[str, float], for_s: float, **how: object) -> tuple[float, str]:
-    """Print the line of a unit; return its share, and what it missed, in words."""
+    """Print the line of a unit; return its share, and its missed rounds in words."""
     asked = int(for_s * rate_hz) or 1
     share = one["rounds"] / asked
     report(
@@ -121,7 +121,7 @@ def told(rate_hz: float, one: dict[str, float], for_s: float, **how: object) -> 
 
 
 def main() -> int:
-    """Print one line for each unit, without and with a thread, and one with what was missed."""
+    """Print one line for each unit, without and with a thread, and one about missed rounds."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--for", dest="for_s", type=float, default=20.0, help="seconds, of all units at once")
     parser.add_argument("--idle", action="store_true", help="leave the processors idle")

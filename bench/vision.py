@@ -1,8 +1,8 @@
-"""What vision costs: tracking beside OpenCV's template match on the same pictures, acquisition, pose, motion.
+"""Cost of vision: tracking beside OpenCV's template match on the same pictures, acquisition, pose, motion.
 
-A Scout drives up to the board; its noisy pictures are drawn before anything is measured.  Times are of
-the process, one core.  Prints one JSON line; ``ratio`` is tracking over the template match of the same
-subimage with the whole picture, ``ratio_in_reach`` over one within the tracker's reach only.
+A Scout drives up to the board; its noisy pictures are drawn before the measurement. Times are of the process, one core.
+Prints one JSON line; ``ratio`` is tracking over the template match of the same subimage with the whole picture,
+``ratio_in_reach`` over a match within the tracker's reach only.
 """
 
 from __future__ import annotations
@@ -95,13 +95,13 @@ def followed(pictures: list[Picture]) -> tuple[list[float], list[float], list[fl
 
 
 def matched(picture: NDArray[np.uint8], subimage: Picture) -> tuple[float, float, tuple[int, int], tuple[int, int]]:
-    """OpenCV's way to find the subimage."""
+    """Find the subimage by OpenCV's template match."""
     found = cv2.minMaxLoc(cv2.matchTemplate(picture, subimage, cv2.TM_CCOEFF_NORMED))
     return found[0], found[1], (found[2][0], found[2][1]), (found[3][0], found[3][1])
 
 
 def in_reach(picture: Picture, model: TargetModel) -> Picture:
-    """Return the part of the picture the tracker looks at."""
+    """Return the part of the picture that the tracker examines."""
     (column, row), (height, width) = model.corner_px, model.subimage.shape
     top, left = max(0, row - REACH_ROWS_PX), max(0, column - REACH_COLUMNS_PX)
     return picture[top : row + height + REACH_ROWS_PX, left : column + width + REACH_COLUMNS_PX]

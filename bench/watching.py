@@ -1,19 +1,19 @@
-"""What watchers cost a person who drives: a hundred commands a second, while others attach, watch all, and leave.
+"""Cost of watchers for a person who drives: a hundred commands a second, while others attach, watch all, and leave.
 
-Brings the mission of IROS 2001 up and takes its third Scout as a console does. Turns it by a command every 10 ms, in
-parts of three kinds that take turns:
+Brings the mission of IROS 2001 up, takes its third Scout as a console does, and turns it by a command every 10 ms.
+Parts of three kinds take turns:
 
 * ``watched``: a process attaches to the mission, watches all keys as ``scout-backbone watch`` does, and leaves, several
   times. It is one process, so no interpreter starts meanwhile.
-* ``floor``: that process waits, as long.
-* ``busy``: it uses as much of a core for as long, and knows no mission: what a watcher costs by being on this machine.
+* ``floor``: that process waits for as long.
+* ``busy``: it uses as much of a core for as long, without a mission: the cost of a watcher merely on this machine.
 
-``applied`` is from the wish, or from when it was due if the command before was late, until the robot's RC had applied
-it; ``answered`` until the console knew. Prints one JSON line. Ratios are of ``applied``, with watchers over the floor;
-``ratio_p99_of_parts`` is of the median parts, so that a moment in which the machine did something else counts less, and
-``ratio_p99_of_busy_parts`` the same over ``busy``: what the mission does for watchers.
+``applied`` is the time from the wish, or from its due time if the command before was late, until the robot's RC had
+applied it; ``answered`` until the console knew. Prints one JSON line. Ratios are of ``applied``, with watchers over the
+floor. ``ratio_p99_of_parts`` uses the median parts, so that other work of the machine counts less;
+``ratio_p99_of_busy_parts`` is the same over ``busy``: the mission's own work for watchers.
 
-With ``--cycles 1 --seconds 10`` a watcher stays through its part: what watching costs, without attaching and leaving.
+With ``--cycles 1 --seconds 10`` a watcher stays for its part: the cost of watching without attaching and leaving.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ WHERE = Where("iros2001", None, None)
 CLAIM = {"robot": "scout3", "kind": "drive", "priority": 100}
 TURN = MoveWish(forward_m_s=0.0, turn_rad_s=0.3)  # chosen: the robot stays where it is
 PERIOD_S = 0.01  # a command loop of 100 Hz
-WATCHES_S = 0.2  # chosen: as long as a person needs to see that the mission speaks
-SETTLE_S = 1.0  # chosen: what a part began is over before the next
+WATCHES_S = 0.2  # chosen: as long as a person needs to see that messages come
+SETTLE_S = 1.0  # chosen: the effects of a part end before the next
 KINDS = ("watched", "floor", "busy")
 TURNS = (*KINDS, "watched", "busy", "floor")
-"""Each kind follows both others; the first is watched, because the others last as long."""
+"""Each kind follows both others; the first is watched, because the others last as long as it."""
 
 
 @dataclass
@@ -59,7 +59,7 @@ class Times:
     """Seconds of each command in the parts of one kind.
 
     Attributes:
-        late_s: Of each part, the time until applied under which 99 % of its commands lie.
+        late_s: For each part, the time until applied that 99 % of its commands do not exceed.
     """
 
     applied_s: list[float] = field(default_factory=list)
@@ -72,7 +72,7 @@ class Driver:
     """Turns the robot by a command every ``PERIOD_S``.
 
     Attributes:
-        times: Of each kind of part.
+        times: Times of each kind of part.
         shown: Number of messages that watchers showed.
     """
 
@@ -82,12 +82,12 @@ class Driver:
         self._applied_s = 0.0
 
     def heard(self, event: ConsoleEvent) -> None:
-        """Note when the RC applied a command."""
+        """Record when the RC applied a command."""
         if isinstance(event, CommandApplied):
             self._applied_s = event.at_s
 
     async def drive(self, console: Teleoperation, part: asyncio.Task[bytes], times: Times) -> None:
-        """Command until the part is over; mission times are those of the machine."""
+        """Command until the part is over; mission times equal those of the machine."""
         clock, due_s, before = console.clock, console.clock.now_s(), len(times.applied_s)
         while not part.done():
             due_s += PERIOD_S
@@ -105,7 +105,7 @@ class Driver:
 
 
 class Counter(io.TextIOBase):
-    """Counts what is printed; a terminal would cost more."""
+    """Counts printed lines; a terminal would cost more."""
 
     def __init__(self) -> None:
         self.lines = 0
@@ -117,7 +117,7 @@ class Counter(io.TextIOBase):
 
 
 def be_watcher(cycles: int, seconds: float) -> None:
-    """Do a part of the kind that each line of the input says; print how many messages were shown."""
+    """Run a part for each line of the input, which names its kind; print how many messages were shown."""
     go_behind_others()  # as the command does
     message_classes()  # read once, not at each attaching
     lasted_s = used_s = 0.0

@@ -1,9 +1,9 @@
-"""What three videos in a browser cost while their mission runs: ``bench/web_console.py [SECONDS [PICTURES_PER_S]]``.
+"""Cost of three videos in a browser while their mission runs: ``bench/web_console.py [SECONDS [PICTURES_PER_S]]``.
 
 Starts the shipped mission with three video frequencies, so that three behaviors see at once, and ``scout-console
-serve`` beside it. A client watches all three and says that a picture is drawn as soon as it has it, as a page does. The
-claim: 15 pictures of 320 × 240 a second of each, at a small share of one core, a moment after they were taken. A rate
-is that of the pictures from the first to the last counted one; ``longest_gap_ms`` tells whether they came all the time.
+serve`` beside it. A client watches all three and, like a page, confirms each picture as soon as it arrives. The claim:
+15 pictures of 320 × 240 a second of each, at a small share of one core, a moment after they were taken. A rate counts
+the pictures from the first to the last one; ``longest_gap_ms`` shows whether they came steadily.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def with_three_frequencies(mission: str, pictures_per_s: float) -> str:
 
 
 class Watcher:
-    """Counts what arrives."""
+    """Counts arrivals."""
 
     def __init__(self, socket: ClientConnection, clock: MissionClock) -> None:
         self._socket, self._clock = socket, clock
@@ -72,7 +72,7 @@ class Watcher:
         self._own_changed = asyncio.Event()
 
     async def take_over(self) -> float:
-        """Take scout1 from its behavior and give it back; return the ms from the wish until the client knows it."""
+        """Take scout1 from its behavior and release it; return the ms from the wish until the client knows of it."""
         asked_s = time.perf_counter()
         await self._socket.send('{"do":"take","robot":"scout1"}')
         await self._wait_own(lambda own: own["is_held"])
@@ -88,7 +88,7 @@ class Watcher:
                 await self._own_changed.wait()
 
     async def listen(self) -> None:
-        """Say of each picture that it is drawn; until cancelled."""
+        """Confirm each picture as drawn, until cancelled."""
         async for message in self._socket:
             self.received_bytes += len(message) * self.is_counting
             if isinstance(message, str):
@@ -106,7 +106,7 @@ class Watcher:
 
 
 def rate_hz(times_s: list[float]) -> float:
-    """Return how many a second there were from the first to the last.
+    """Return the rate a second from the first time to the last.
 
     Example:
         >>> rate_hz([0.0, 0.1, 0.2]), rate_hz([1.0])
@@ -116,12 +116,12 @@ def rate_hz(times_s: list[float]) -> float:
 
 
 def longest_gap_ms(times_s: list[float]) -> float:
-    """Return the longest time between one and the next."""
+    """Return the longest gap between neighboring times."""
     return round(1000 * max(later - earlier for earlier, later in pairwise(times_s)), 1)
 
 
 async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -> dict[str, Any]:
-    """Watch all robots for so long; return what was measured."""
+    """Watch all robots for this time; return the measurements."""
     found = run_files.find()
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     async with connect(f"ws://127.0.0.1:{port}/socket", compression=None, proxy=None) as socket:

@@ -1,11 +1,11 @@
-"""Twelve bodies and six transmitting cameras: what physics and pictures cost, and whether two cores keep up.
+"""Twelve bodies and six transmitting cameras: the cost of physics and pictures, and whether two cores suffice.
 
-Ten Scouts, six of which drive about, a Pioneer and a person in the papers' room. Measured are physics alone, all
-Scouts standing and six of them driving; a picture by OpenGL and by the painter, and one that was drawn before; and the
-whole: physics in one process, the pictures of three cameras each in two others, noise of the air included, as fast
-as they go. ``real_time_factor`` is simulated over real seconds; below 1 a mission keeps its pace by taking fewer
-pictures, then ``pictures_per_s`` of each camera are what is left of thirty. ``cores_at_real_time`` is the CPU time of
-all three processes a simulated second, which a busy machine disturbs less. Prints one JSON line.
+Ten Scouts, six of which drive about, a Pioneer and a person in the papers' room. Measured are: physics alone, with all
+Scouts standing and with six of them driving; a picture by OpenGL and by the painter, and one that was drawn before; and
+the whole: physics in one process, the pictures of three cameras each in two others, noise of the air included, as fast
+as possible. ``real_time_factor`` is simulated over real seconds. If it is below 1, a mission keeps its pace by drawing
+fewer pictures: of thirty, ``pictures_per_s`` of each camera remain. ``cores_at_real_time`` is the CPU time of all three
+processes for a simulated second, on which a busy machine has less influence. Prints one JSON line.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LOADS = Path(__file__).with_name("world_loads.py")
 
 
 def measured(backend: str, frames: int, mujoco_gl: str) -> dict[str, float]:
-    """Return what the other program measures with this backend."""
+    """Return the measurements of the other program with this backend."""
     environment = {**os.environ, "MUJOCO_GL": mujoco_gl, "LP_NUM_THREADS": "0", "OPENBLAS_NUM_THREADS": "1"}
     told = subprocess.run(
         [sys.executable, str(LOADS), backend, "--frames", str(frames)],
@@ -38,7 +38,7 @@ def measured(backend: str, frames: int, mujoco_gl: str) -> dict[str, float]:
 
 
 def main() -> None:
-    """Measure with every backend this machine has."""
+    """Measure with every backend of this machine."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--frames", type=int, default=300)
     asked = parser.parse_args()

@@ -1,4 +1,4 @@
-"""The measuring of ``world.py`` with one backend; see there. OpenGL must be chosen by the environment."""
+"""The measurements of ``world.py`` with one backend; see there. OpenGL must be chosen by the environment."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def description() -> WorldDescription:
 
 
 def drive(world: World, frame: int) -> None:
-    """Let the transmitting Scouts drive in circles."""
+    """Drive the transmitting Scouts in circles."""
     if frame % PACKET_EVERY == 0:
         for network_id in range(1, TRANSMITTING + 1):
             world.hear(network_id, radio_link.encode_drive(4.0, 6.0))
 
 
 def physics_factor(frames: int, *, driving: bool) -> float:
-    """Return how many times faster than real time physics alone runs."""
+    """Return the speed of physics alone, as a multiple of real time."""
     world = World(description())
     for _ in range(WARM_UP):
         world.step_frame()
@@ -64,7 +64,7 @@ def physics_factor(frames: int, *, driving: bool) -> float:
 
 
 def picture_times_s(backend: Backend, frames: int) -> tuple[list[float], list[float]]:
-    """Return what new pictures cost, and pictures that were drawn before, in seconds of this thread."""
+    """Return the times of new pictures, and of pictures that were drawn before, in seconds of this thread."""
     world, new, known = World(description()), [], []
     with Camera(world.mjcf, backend) as camera:
         for frame in range(frames):
@@ -80,7 +80,7 @@ def picture_times_s(backend: Backend, frames: int) -> tuple[list[float], list[fl
 
 
 def render(backend: Backend, robots: list[str]) -> None:
-    """Be a drawing process: states come in on standard input until it ends; then the CPU time goes out."""
+    """Run as a drawing process: read states from standard input until it ends; then print the CPU time."""
     world = World(description())
     length = 8 * len(world.state())
     receivers = {robot: Receiver(1, robot) for robot in robots}
@@ -96,13 +96,13 @@ def render(backend: Backend, robots: list[str]) -> None:
 
 
 def answer(raw: bytes) -> None:
-    """Tell the process that draws with us."""
+    """Answer the process that draws with this one."""
     sys.stdout.buffer.write(raw)
     sys.stdout.buffer.flush()
 
 
 def whole(backend: Backend, frames: int) -> tuple[float, float]:
-    """Return how many times faster than real time six cameras see twelve bodies, and how many cores that takes."""
+    """Return the speed with six cameras and twelve bodies, as a multiple of real time, and the number of busy cores."""
     world = World(description())
     names = [f"scout{number}" for number in range(1, TRANSMITTING + 1)]
     program = [sys.executable, __file__, backend, "--render"]
@@ -139,7 +139,7 @@ def whole(backend: Backend, frames: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Measure with one backend and print a JSON line, or be one of the drawing processes."""
+    """Measure with one backend and print a JSON line, or run as a drawing process."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("backend", choices=["gl", "paint"])
     parser.add_argument("--frames", type=int, default=300)

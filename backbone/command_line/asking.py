@@ -1,4 +1,4 @@
-"""Questions of a person to a mission that is up: reasons, the events about a name, the log."""
+"""Questions to a mission that is up: the reasons for a state, the events about a name, the log."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link
 
 
 async def print_reasons(where: Where, name: str, *, as_json: bool) -> ExitCode:
-    """Print why the component, request, resource or alarm of this name is as it is."""
+    """Print why the component, request, resource or alarm of this name is in its present state."""
     async with connected(where) as (bus, clock):
         reasons = await reasons_for(bus, name, clock)
         show([json.dumps(reasons.to_json())] if as_json else reasons.lines(clock.now_s()))
@@ -43,7 +43,7 @@ async def print_story(where: Where, name: str, *, as_json: bool) -> ExitCode:
 
 
 async def print_log(where: Where, question: LogQuestion, most: int, *, as_json: bool) -> ExitCode:
-    """Print the newest events that match the question, at most so many, and what is left out."""
+    """Print the newest events that match the question, at most ``most``, and the number of omitted ones."""
     async with connected(where) as (bus, clock):
         now = Now(clock.now_s(), datetime.now(), clock.rate)
         asked = question.asked(now, most)

@@ -1,7 +1,7 @@
 """Attributes of a mission that is up: priorities, places in the behavior tree, run times, parameters.
 
-Each change goes to the owner of the value: priority and place to the RC manager, run times to the ARC, which puts them
-into its requests, parameters to the component.
+The owner of a value changes it: the RC manager changes priority and place; the ARC changes run times and puts them into
+its requests; the component changes its parameters.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from backbone.wire import plain
 PRIORITY, PARENT = "priority", "parent"
 RUN_TIMES = ("minimum_runtime_s", "maximum_runtime_s")
 
-REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
+REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 
 
 class WrongAttribute(Refusal):
@@ -83,7 +83,7 @@ async def attributes_of(bus: Bus, name: str) -> ShownAttributes:
     """Return the attributes of a component, an ARC's request, or a node of the behavior tree.
 
     Raises:
-        UnknownName: Nothing has this name; the detail suggests the nearest name.
+        UnknownName: No component or node has this name; the detail suggests the nearest name.
         LinkError: Nameserver, RC manager or component did not answer.
     """
     values, requests, unknown = None, list[RequestAttributes](), None

@@ -14,7 +14,7 @@ from backbone.spoken import counted
 
 
 async def bridge(where: Where, host: str, port: int, keys: tuple[str, ...]) -> ExitCode:
-    """Show a mission to viewers until a signal, or until the mission has ended.
+    """Show a mission in viewers until a signal, or until the mission has ended.
 
     Raises:
         PortUnusable: The port cannot be opened.

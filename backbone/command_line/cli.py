@@ -53,7 +53,7 @@ app = typer.Typer(
     "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
 )
 
-# Named, as a mission names its classes: imports run downwards only.
+# Named as text, as a mission names its classes, because imports run downwards only.
 EXPERIMENTS = "mission_control.laboratory.experiments.cli"
 SIMULATION = "mission_control.laboratory.simulation.campaign"
 LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to compute
@@ -333,7 +333,7 @@ def down(
     now: Annotated[bool, typer.Option("--now", help="Without the last branch; a second 'down' ends it, too.")] = False,
     mission: MissionName = None,
 ) -> None:
-    """Stop a mission of this machine: its last branch, then all; ask, then SIGTERM, then SIGKILL; says what helped."""
+    """Stop a mission of this machine: its last branch, then all; ask, SIGTERM, then SIGKILL; prints what helped."""
     from backbone.launcher.detached import take_down
 
     run(lambda: take_down(mission, at_once=now))
@@ -347,7 +347,7 @@ def creator(
     secret_file: SecretFile = None,
     tag: Annotated[list[str] | None, typer.Option("--tag", help="A tag of this machine; repeatable.")] = None,
     record_to: Annotated[
-        Path | None, typer.Option("--record", metavar="FILE.mcap", help="Record all that components here say.")
+        Path | None, typer.Option("--record", metavar="FILE.mcap", help="Record all messages of the components here.")
     ] = None,
 ) -> None:
     """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""

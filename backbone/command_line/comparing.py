@@ -1,4 +1,4 @@
-"""The work of ``scout-backbone compare``: two recordings side by side, or what their watchers saw of marks."""
+"""The work of ``scout-backbone compare``: compares two recordings, or what watchers detected of marks in each."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ async def compare(
 
 
 async def compare_detection(paths: Sequence[Path], marks_file: Path, later_s: float, *, as_json: bool) -> ExitCode:
-    """Print what was seen of the marks in each recording; ``REFUSED`` if one is worse than the first.
+    """Print the detection rates of the marks in each recording; ``REFUSED`` if one is worse than the first.
 
     Args:
         later_s: See ``worse``.
@@ -79,7 +79,7 @@ def _detection_json(path: Path, found: DetectionRates, worse_in: list[str]) -> d
 
 
 def print_comparison(found: Mapping[Named, KeyComparison], *, as_json: bool) -> ExitCode:
-    """Print what differs; ``REFUSED`` if anything differs by more than was tolerated."""
+    """Print the differences; ``REFUSED`` if anything differs by more than the tolerance."""
     for named, comparison in found.items():
         show([json.dumps(_json(named, comparison))] if as_json else _lines(named, comparison))
     differing = sum(not comparison.is_same for comparison in found.values())

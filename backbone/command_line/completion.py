@@ -1,6 +1,6 @@
-"""Names of a mission that is up, asked of the mission: for shells, where no file has them (``run_names``).
+"""Names for shell completion, asked of a mission that is up, if no file has them (``run_names``).
 
-A person waits for the completion, so names that do not arrive at once are left out, and errors are not printed.
+A person waits for the completion, so names that arrive too late are left out, and errors are not printed.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ from backbone.recording.reader import Recorded, Recording
 from backbone.recording.tables import FIRST_COLUMNS, Commanders, row_of, table_of
 from backbone.spoken import counted
 
-VIDEOS = "mission_control.vision.recorded_video"  # named, because imports run downwards only
-DATA_SETS = "mission_control.training_data.lerobot_dataset"  # the same
+VIDEOS = "mission_control.vision.recorded_video"  # named as text, because imports run downwards only
+DATA_SETS = "mission_control.training_data.lerobot_dataset"  # as text for the same reason
 ROWS_AT_ONCE = 1000  # chosen: so many rows of each table are in memory, and in a row group of Parquet
 
 
@@ -40,7 +40,7 @@ class TableWriter(Protocol):
 
 
 class CsvTables:
-    """CSV files; an open one for a moment only, because there may be hundreds."""
+    """CSV files. Each file is open only while rows are written, because there may be hundreds."""
 
     splits_lists: ClassVar[bool] = True
 
@@ -64,13 +64,13 @@ class CsvTables:
             writer.writerows({**row, "at_s": f"{row['at_s']:.6f}"} for row in rows)
 
     def close(self) -> None:
-        """Do nothing: each file is whole."""
+        """Do nothing: each file is complete already."""
 
 
 async def export(
     path: Path, folder: Path, keys: tuple[str, ...], make_tables: Callable[[Path], TableWriter], *, with_videos: bool
 ) -> ExitCode:
-    """Write a file for each key and schema into a new folder, and if wanted an MP4 file for each camera."""
+    """Write a file for each key and schema into a new folder, with ``with_videos`` also an MP4 file for each camera."""
     with opened(path) as recording, new_folder(folder):
         with closing(make_tables(folder)) as tables:
             names, rows = _write_tables(recording, tables, keys)
@@ -126,10 +126,10 @@ def _batches(rows: Iterable[tuple[Recorded, dict[str, object]]]) -> Iterator[tup
 
 @contextmanager
 def new_folder(folder: Path) -> Iterator[None]:
-    """Make a folder for what a command writes.
+    """Make a folder for the output of a command.
 
     Raises:
-        FileUnusable: It exists, or a file cannot be written into it.
+        FileUnusable: The folder exists, or a file cannot be written into it.
     """
     try:
         folder.mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""Extras: libraries that only some commands need, and the refusal where one is not installed."""
+"""Extras: libraries that only some commands need, and the refusal if one is not installed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ExtraMissing(Refusal):
 
 @contextmanager
 def needing_extras() -> Iterator[None]:
-    """Import what may need an extra; where it is missing, tell which to install, and end the command."""
+    """Import libraries that need an extra; if one is missing, print which extra to install, and end the command."""
     try:
         yield
     except ModuleNotFoundError as error:

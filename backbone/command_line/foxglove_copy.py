@@ -13,11 +13,11 @@ from backbone.spoken import counted
 
 
 async def copy_for_foxglove(path: Path, to: Path, keys: tuple[str, ...]) -> ExitCode:
-    """Write a copy of the recording in a new file, with what Foxglove shows.
+    """Write a copy of the recording to a new file, with messages that Foxglove shows.
 
     Raises:
         FileUnusable: The recording cannot be read, or the new file exists or cannot be written.
-        NoRecording: The file is none, or its recorder was killed.
+        NoRecording: The file is not a recording, or its recorder was killed.
     """
     with opened(path) as recording:
         try:

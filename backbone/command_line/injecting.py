@@ -1,4 +1,4 @@
-"""The work of ``scout-backbone inject``: a person says something on the bus, checked, and told in the mission's log."""
+"""The work of ``scout-backbone inject``: a person sends a message on the bus; it is validated and logged."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEFT_OUT = (Conversation.ALIVE, *COPIED)
 
 
 class NoKey(Refusal):
-    """Nothing can be said at this key."""
+    """No message can be sent at this key."""
 
     code = "usage.key"
     remedy = "Name a key as 'watch' prints it: <subsystem>/<component>/<conversation>; questions go to '/ask'."
@@ -33,14 +33,14 @@ async def inject(where: Where, key: str, text: str, within_s: float) -> ExitCode
     """Send the message, and print the answer to a question.
 
     Raises:
-        NoKey: The key is none.
-        OtherForm: The text is no message, or one with other fields or values.
+        NoKey: The text is not a key of one component.
+        OtherForm: The text is not a message, or its fields or values do not fit the schema.
         Refusal: The component refused it.
     """
     try:
         said = json.loads(text)
     except ValueError as error:
-        raise OtherForm(f"it is no JSON: {error}") from error
+        raise OtherForm(f"the text is not JSON: {error}") from error
     async with connected(where) as (bus, clock):
         address, conversation = _place(key, bus.mission)
         classes = await mission_classes(bus)
@@ -61,7 +61,7 @@ def _place(key: str, mission: str) -> tuple[str, Conversation]:
     """Return address and conversation of a key, with or without ``scout/<mission>/``.
 
     Raises:
-        NoKey: It has none.
+        NoKey: The text is not a key of one component.
     """
     short = key.removeprefix(f"{ROOT}/{mission}/")
     address, _, name = short.rpartition("/")

@@ -34,7 +34,7 @@ from backbone.rc_manager.messages import AskSchedule, AskUtilization
 from backbone.scheduling.requests import UnknownRc
 from backbone.scheduling.views import Schedule, Utilization
 
-REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
+REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 
 
 async def print_types(where: Where, name: str, *, as_json: bool, width: int | None) -> ExitCode:

@@ -79,7 +79,7 @@ def _field_cells(field: FieldForm) -> tuple[str, str, str, str, str]:
 
 
 def range_text(field: FieldForm) -> str:
-    """Return the legal values of a field, for people; empty: any.
+    """Return the legal values of a field, for people; empty: any value is legal.
 
     Example:
         >>> range_text(FieldForm("turn_rad_s", ValueKind.NUMBER, "rad/s", -2.0, 2.0))
@@ -103,7 +103,7 @@ def range_text(field: FieldForm) -> str:
 # ---------------------------------------------------------------------- resources
 @dataclass(frozen=True)
 class ResourceUse:
-    """One resource: its place in the schedule, its host and its utilization.
+    """A resource with its place in the schedule, its host and its utilization.
 
     Attributes:
         host: Host of its RC; empty: its RC does not run.

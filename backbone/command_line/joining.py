@@ -1,4 +1,4 @@
-"""Carries out ``scout-backbone record join``, and prints the clocks that were off."""
+"""Carries out ``scout-backbone record join``, and prints which clocks were off."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from backbone.spoken import counted
 
 
 async def join_to(paths: Sequence[Path], to: Path) -> ExitCode:
-    """Write the messages of several recordings of one mission to a new file, and tell whose clock was off.
+    """Write the messages of several recordings of one mission to a new file, and print which clocks were off.
 
     Raises:
-        FileUnusable: One cannot be read, or the new file exists or cannot be written.
-        NoRecording: One is damaged, or its recorder was killed.
-        OtherMission: They are of different missions or starts.
+        FileUnusable: A recording cannot be read, or the new file exists or cannot be written.
+        NoRecording: A recording is damaged, or its recorder was killed.
+        OtherMission: The recordings are of different missions or starts.
     """
     with ExitStack() as stack:
         recordings = {str(path): _opened(path, stack) for path in paths}
@@ -57,7 +57,7 @@ def _opened(path: Path, stack: ExitStack) -> Recording:
 
 
 def clock_lines(clocks: ClockOffsets) -> Iterator[str]:
-    """Yield a line for each clock that cannot have been right, by the causes of messages."""
+    """Yield a line for each clock that was wrong according to the causes of messages."""
     for host, offset in clocks.wrong.items():
         told = f"the clock of {host} was {_how_far(offset)} that of {clocks.reference}"
         yield f"{told}, and changed by at least {offset.moved_s:.4f} s" if offset.moved_s else told
@@ -81,7 +81,7 @@ def _how_far(offset: Offset) -> str:
 
 
 def clocks_json(clocks: ClockOffsets) -> dict[str, dict[str, float | None]]:
-    """Return what is known of each clock but the reference's; None: no cause bounds it on that side."""
+    """Return the bounds of each clock except the reference's; None: no cause bounds it on that side."""
     return {
         host: {
             "at_least_s": _finite(offset.at_least_s),

@@ -1,4 +1,4 @@
-"""What ``scout-backbone top`` shows of a key beside its rate: quality, and what its listeners did not get."""
+"""Facts that ``scout-backbone top`` shows of a key beside its rate: quality, drops, missed deadlines."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ from backbone.spoken import counted
 from backbone.wire import Message
 
 TrafficRow = dict[str, Any]
-"""What was heard of one key, sender and schema, as plain data."""
-REPLY_TIME_S = 1.0  # chosen: a component that hangs does not make a person wait for the others
+"""The traffic of one key, sender and schema, as plain data."""
+REPLY_TIME_S = 1.0  # chosen: a hung component delays the answers of the others by no more
 
 
 @dataclass(slots=True)
 class KeyFacts:
-    """What the components of a mission say of their keys; keys are without ``scout/<mission>/``.
+    """Reports of a mission's components about their keys; keys are without ``scout/<mission>/``.
 
     Attributes:
-        dropped: Key, or pattern of keys → messages that came for listeners and were not handed to them.
-        missed: Key → how often a listener missed its deadline.
-        declared: Key → quality, where it is not that of its conversation.
+        dropped: Key, or pattern of keys → messages that arrived for listeners but were dropped before delivery.
+        missed: Key → number of deadlines that its listeners missed.
+        declared: Key → quality, if it differs from the quality of its conversation.
         silent: Components that did not answer.
     """
 
@@ -50,7 +50,7 @@ class KeyFacts:
     silent: list[str] = field(default_factory=list)
 
     def take_statistics(self, values: Mapping[str, float]) -> None:
-        """Add what one component counted."""
+        """Add the counts of one component."""
         for name, count in values.items():
             for begin, counts in ((MESSAGES_DROPPED, self.dropped), (DEADLINES_MISSED, self.missed)):
                 if name.startswith(begin):
@@ -77,10 +77,10 @@ class KeyFacts:
 def with_facts(
     rows: Sequence[TrafficRow], facts: KeyFacts, mission: str, patterns: Sequence[str] = ()
 ) -> list[TrafficRow]:
-    """Return the rows with the facts of their keys, and then a row for each other key that has a count.
+    """Return the rows with the facts of their keys, followed by a row for each other key that has a count.
 
     Args:
-        patterns: Of the keys that are meant; none: all.
+        patterns: Patterns of the selected keys; none: all keys.
     """
     keys = [one["key"].split("/", 2)[-1] for one in rows]
     counted_keys = dict.fromkeys([*facts.dropped, *facts.missed])
@@ -122,7 +122,7 @@ def _is_meant(key: str, patterns: Collection[str]) -> bool:
 
 
 async def ask_facts(bus: Bus) -> KeyFacts:
-    """Return what all components of the mission say now, without those that do not answer in time."""
+    """Return the present reports of all components, except those that do not answer in time."""
     facts = KeyFacts()
     found = await _asked(bus, NAMESERVER, ListComponents(), Components)
     components = found.components if found is not None else []

@@ -15,7 +15,7 @@ GONE_AFTER_S = 5.0  # chosen: a restarted hub is back within two; seconds of the
 
 
 class PortUnusable(Refusal):
-    """The command cannot listen there."""
+    """The command cannot listen at this host and port."""
 
     code = "usage.port"
     remedy = "Name another port by --port, or an address of this machine by --host."
@@ -26,7 +26,7 @@ def opening_port(host: str, port: int) -> Iterator[None]:
     """Open a port.
 
     Raises:
-        PortUnusable: It cannot be opened.
+        PortUnusable: The port cannot be opened.
     """
     try:
         yield

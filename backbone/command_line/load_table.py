@@ -23,11 +23,11 @@ from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import plain
 
-REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
+REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 
 
 async def print_loads(where: Where, for_s: float, *, as_json: bool, width: int | None) -> ExitCode:
-    """Print the loads between two readings that are so far apart.
+    """Print the loads between two readings, ``for_s`` seconds apart.
 
     Raises:
         LinkError: The nameserver did not answer.
@@ -78,7 +78,7 @@ def _draw(found: Loads, width: int | None) -> None:
         if rows := list(rows):
             console.print(table(title, columns, rows))
     if found.silent:
-        say(f"no numbers of {', '.join(found.silent)}")
+        say(f"no answer from {', '.join(found.silent)}")
 
 
 def _robot_rows(found: Loads) -> Iterable[tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""Messages, heard or recorded, as lines for people and as plain data for programs. Pure."""
+"""Live or recorded messages as lines for people and as plain data for programs. Pure."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def short_key(key: str) -> str:
 
 
 def field_of(body: Any, path: str) -> Any:
-    """Return the value of a field of a body; parts of the path are names, or numbers in a list. None: there is none.
+    """Return the value of a field of a body, or None. Parts of the path are names, or numbers in a list.
 
     Example:
         >>> field_of({"rcs": [{"rc": "radio"}, {"rc": "scout1"}]}, "rcs.1.rc")
@@ -67,7 +67,7 @@ def field_of(body: Any, path: str) -> Any:
 
 @dataclass(slots=True)
 class Traffic:
-    """What was heard of one key, sender and schema."""
+    """Number and size of the messages of one key, sender and schema."""
 
     messages: int = 0
     size_bytes: int = 0
@@ -75,7 +75,7 @@ class Traffic:
 
 @dataclass(slots=True)
 class TrafficTable:
-    """Rates and sizes of keys since it was made or cleared."""
+    """Rates and sizes of keys since the table was made or cleared."""
 
     rows: dict[tuple[str, str, str], Traffic] = field(default_factory=dict)
 

@@ -37,15 +37,15 @@ from backbone.spoken import counted
 from backbone.wire import Envelope
 
 EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
-PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start is over by then
-REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds; more costs a core that the mission needs
+PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start takes less
+REDRAW_EVERY_S = 0.5  # chosen: slices of seconds stay visible; a faster picture takes a core that the mission needs
 
 
 class ConsoleObserver:
-    """Tells a person what happens: lines while it comes up and goes down, a live picture or lines between.
+    """Shows a mission to a person: lines while it comes up and goes down; meanwhile a live picture or lines.
 
     Args:
-        console: Where to.
+        console: The terminal.
         live: True: a picture that is redrawn; False: lines.
         verdict: Pipe to the command that waits until all is ready; None: no command waits.
     """
@@ -57,7 +57,7 @@ class ConsoleObserver:
         self._is_up, self._last_progress_s = False, 0.0
 
     def began(self, step: str) -> None:
-        """Say nothing yet: a step that hangs is named by ``Outcome.failure``."""
+        """Print nothing, because ``Outcome.failure`` names a step that hangs."""
 
     def done(self, step: str, took_s: float) -> None:
         """Print the step with its time."""
@@ -68,7 +68,7 @@ class ConsoleObserver:
         self.tell(f"  {line}")
 
     def connected(self, bus: Bus) -> None:
-        """Listen to what components tell people, and to the mission's health."""
+        """Subscribe to the events of components and to the mission's health."""
         self._picture.mission = bus.mission
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
         consoles = f"{Subsystem.UI_CONSOLE}/*"
@@ -83,7 +83,7 @@ class ConsoleObserver:
             self._verdict.talk(line)
 
     def decide(self, exit_code: int) -> None:
-        """Give the command that waits its exit code, unless it has one."""
+        """Send the exit code to the command that waits, unless it has one already."""
         if self._verdict is not None:
             self._verdict.decide(exit_code)
 
@@ -126,7 +126,7 @@ class ConsoleObserver:
             self._print(f"{'':9}    {absence_line(absence, envelope.stamp_s)}")
 
     def _heard_while_coming_up(self, heard: MissionHealth, at_s: float) -> None:
-        """Say every now and then what a start that takes long waits for."""
+        """From time to time print the components that a long start waits for."""
         if at_s - self._last_progress_s >= PROGRESS_EVERY_S:
             self._last_progress_s = at_s
             for absence in heard.absent:
@@ -150,7 +150,7 @@ class ConsoleObserver:
 
 
 def _tell_if_possible(line: str, file: IO[str]) -> None:
-    """Print the line; a mission goes on also when its disk is full or its reader has left."""
+    """Print the line; if the disk is full or the reader is gone, the mission continues."""
     with contextlib.suppress(OSError):
         print(line, file=file, flush=True)
 
@@ -158,7 +158,7 @@ def _tell_if_possible(line: str, file: IO[str]) -> None:
 async def bring_up_on_console(
     description: MissionDescription, options: UpOptions, *, live: bool, verdict: VerdictPipe | None = None
 ) -> int:
-    """Run the mission, tell a person about it, and return the exit code."""
+    """Run the mission, show it to a person, and return the exit code."""
     zenoh_threads.few_threads()
     console = Console(file=sys.stdout if live else sys.stderr, markup=False, emoji=False)
     observer = ConsoleObserver(console, live=live, verdict=verdict)
@@ -179,12 +179,12 @@ async def bring_up_on_console(
 
 
 def last_lines(outcome: Outcome) -> list[str]:
-    """Return what a person should know of a mission that has ended."""
+    """Return the last lines about a mission that has ended."""
     lines = []
     if outcome.ready_after_s is not None:
         lines.append(f"was ready after {outcome.ready_after_s:.2f} s")
     if outcome.pushed:
-        lines.append("more than asking was needed: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
+        lines.append("needed a signal to end: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
     if outcome.failure is not None:
         return [*lines, f"the mission failed: {outcome.failure}"]
     return [*lines, f"down: {counted(len(outcome.ended), 'component')} ended, nothing is left"]

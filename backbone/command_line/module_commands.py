@@ -20,7 +20,7 @@ from backbone.command_line.options import (
     run,
 )
 
-LONGEST_S = 3_600.0  # chosen: an hour; who proves longer leaves it to the next fault
+LONGEST_S = 3_600.0  # chosen: an hour; a longer proof is not useful
 PROVE_S = 5.0  # as in exchange
 READY_WITHIN_S = 10.0  # as in exchange
 SILENT_S = 1.0  # as in exchange

@@ -1,4 +1,4 @@
-"""Shared parts of the command lines: options, completed names, whole summaries, and a table of commands.
+"""Shared parts of the command lines: options, completed names, uncut summaries, and a table of commands.
 
 A completion imports its modules when a shell asks for it, so that ``--help`` stays quick.
 """
@@ -29,7 +29,7 @@ DISTRIBUTION = "scout-backbone"
 
 
 class CommandTable(TyperGroup):
-    """Shows each command's summary whole, and converts only those values that need it.
+    """Shows each command's whole summary, and converts only values that need conversion.
 
     Typer cuts summaries at the end of the line. It also loads pydantic to convert a value, even if the value is absent,
     is a text that a command wants as it is, or a shell asks for completions; that import takes a third of the processor
@@ -57,8 +57,8 @@ class CommandTable(TyperGroup):
 def run_table(table: typer.Typer) -> None:
     """Run the command line of this process.
 
-    It builds the command that the words name, for a version none, and else all: that takes a third of a short command's
-    time.
+    If the words name a command, only that command is built; for ``--version`` none is built, else all are. Building all
+    takes a third of the time of a short command.
     """
     tables: tuple[list[Any], ...] = (table.registered_commands, table.registered_groups)
     named = _words_before_the_cursor()[:1]
@@ -100,7 +100,7 @@ def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
 
 
 def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: object) -> Any:
-    """Return the value as the command gets it; an absent optional value, or one beside completions, stays as it is."""
+    """Return the value for the command; an optional value that is absent, or typed beside completions, is unchanged."""
     is_absent = value is None and not is_required
     return value if is_absent or ctx.resilient_parsing else process_value(ctx, value)
 
@@ -134,7 +134,7 @@ ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/]+:[0-9]{1,5}([?#]\S*)?|unixs
 
 
 def hub_endpoint(value: str | None) -> str | None:
-    """Refuse a text that is no endpoint of a hub; for options that take an endpoint."""
+    """Refuse a text that is not a hub endpoint; for options that take an endpoint."""
     if value is not None and ENDPOINT.fullmatch(value) is None:
         raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
     return value
@@ -163,7 +163,8 @@ def typed_mission(ctx: typer.Context) -> tuple[str | None, str | None, Path | No
 def names_for(ctx: typer.Context) -> Any:
     """Return the names of the mission that the typed words name; None if it is not up.
 
-    On this machine its run folder has them. The bus is loaded only for a mission elsewhere, or one without that file.
+    For a mission on this machine, they come from its run folder. The bus is loaded only if that file is missing, or for
+    a mission elsewhere.
     """
     typed = typed_mission(ctx)
     if typed is None:
@@ -252,7 +253,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 def finite(value: float | None) -> float | None:
-    """Refuse NaN, which no range refuses; for options with a range."""
+    """Refuse NaN, which passes every range check; for options with a range."""
     if value is not None and not math.isfinite(value):
         raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
     return value
@@ -267,7 +268,7 @@ def named_value(given: str) -> tuple[str, object]:
 
 
 def json_or_text(text: str) -> object:
-    """Return the value of a text that is JSON; any other text as it is."""
+    """Return the value of a JSON text; return any other text unchanged."""
     try:
         return json.loads(text)
     except json.JSONDecodeError:

@@ -1,4 +1,4 @@
-"""``scout-backbone`` ``record``, ``recording``, ``watch``, ``top``, ``inject``: recordings, and what is said live.
+"""``scout-backbone`` ``record``, ``recording``, ``watch``, ``top``, ``inject``: recorded and live messages.
 
 Rules of this file: as those of ``cli``.
 """
@@ -96,7 +96,7 @@ def record_mission(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Record all that is said on a mission that is up, until Ctrl-C; a file that exists is refused."""
+    """Record all messages of a mission that is up, until Ctrl-C; a file that exists is refused."""
     if context.invoked_subcommand is not None:
         return
     from backbone.command_line.recording_work import OfLauncher, Splitting, record_to
@@ -134,7 +134,7 @@ def join(
 
 @recording.command()
 def info(file: File, as_json: AsJson = False) -> None:
-    """Print what a recording is of: mission, times, versions, numbers of messages."""
+    """Print facts about a recording: mission, times, versions, numbers of messages."""
     from backbone.command_line.recording_work import print_info
 
     run(lambda: print_info(file, as_json=as_json))
@@ -142,7 +142,7 @@ def info(file: File, as_json: AsJson = False) -> None:
 
 @recording.command()
 def check(file: File, as_json: AsJson = False) -> None:
-    """Read a recording to its end, and tell whose messages are missing in it; a damaged one is refused."""
+    """Read a recording to its end, and print which senders' messages are missing; a damaged file is refused."""
     from backbone.command_line.recording_work import check_whole
 
     run(lambda: check_whole(file, as_json=as_json))
@@ -279,7 +279,7 @@ def replay(
     keys: Keys = None,
     without: Annotated[
         str | None,
-        typer.Option("--without", metavar="NAME", help="Run this component for real, and compare what it says."),
+        typer.Option("--without", metavar="NAME", help="Run this component for real, and compare its messages."),
     ] = None,
     class_path: Annotated[
         str, typer.Option("--class", metavar="MODULE:CLASS", help="With --without: another class.")
@@ -355,7 +355,7 @@ def watch(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Print what is said at these keys of a mission that is up, questions and answers too, until Ctrl-C."""
+    """Print the messages at these keys of a mission that is up, questions and answers too, until Ctrl-C."""
     from backbone.command_line import watching
     from backbone.operating_system.own_process import go_behind_others
 
@@ -393,7 +393,7 @@ def inject(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Say something on the bus of a mission that is up, checked against its schema; the log tells who did."""
+    """Send a message on the bus of a mission that is up, checked against its schema; the log names its sender."""
     from backbone.command_line.injecting import inject as inject_message
 
     where = chosen(mission, connect, secret_file)

@@ -56,11 +56,11 @@ VERSIONS_OF = (DISTRIBUTION, "eclipse-zenoh", "msgspec", "mcap")
 # ---------------------------------------------------------------------- making one
 @dataclass(frozen=True)
 class Splitting:
-    """When a recording goes on in a further file.
+    """Limits after which a recording continues in a further file.
 
     Attributes:
         after_s: Longest time in one file, seconds of the machine.
-        megabytes: Largest size.
+        megabytes: Largest size of one file.
         keep: Number of files to keep; 0: all.
     """
 
@@ -74,11 +74,12 @@ class OfLauncher:
     """Settings that a launcher, an offer or a person passes to the recorder that it starts.
 
     Attributes:
-        is_described: True: the mission is described on standard input, because it cannot be asked yet.
+        is_described: True: the launcher describes the mission on standard input, because it cannot be asked yet.
         host_folder: Folder of the mission's files on this host, where its processes leave copies; None: see
             ``_folder_by_hand``.
-        host_only: True: record those alone, until standard input ends; False: those, and of others all but pictures.
-        is_lossless: A person wants every message, see ``Bus.overhear``: then the recorder hears the bus alone.
+        host_only: True: record only these copies, until standard input ends; False: record them, and all messages of
+            other hosts except pictures.
+        is_lossless: True: a person wants every message, see ``Bus.overhear``; then the recorder overhears only the bus.
     """
 
     is_described: bool = False
@@ -120,7 +121,7 @@ async def record_to(
             beats = RecorderBeats(bus, path) if told.host_folder is None else None  # else its starter watches it
             recorder.on_flushed = beats.give if beats is not None else RecorderSigns().give
             gc.collect()
-            gc.freeze()  # else the collector looks through all that was imported again and again
+            gc.freeze()  # else the collector examines all imported objects again and again
             await _run(recorder, path, for_s, ends_with_input=told.host_only)
             if beats is not None:
                 beats.end()
@@ -128,14 +129,14 @@ async def record_to(
     if recorder.dropped:
         say(f"incomplete: {counted(recorder.dropped, 'message')} came faster than they could be written")
     if recorder.full:
-        say(f"it ended because {recorder.full}")
+        say(f"the recording ended because {recorder.full}")
     return ExitCode.REFUSED if recorder.full else ExitCode.DONE
 
 
 async def _run(recorder: Recorder, path: Path, for_s: float | None, *, ends_with_input: bool) -> None:
     loop = asyncio.get_running_loop()
     if ends_with_input:
-        loop.add_reader(sys.stdin, recorder.end)  # nothing comes but the end, when the offer is gone
+        loop.add_reader(sys.stdin, recorder.end)  # the input only ends, when the offer is gone; it has no content
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, recorder.end)
     timer = loop.call_later(for_s, recorder.end) if for_s is not None else None
@@ -150,7 +151,7 @@ async def _run(recorder: Recorder, path: Path, for_s: float | None, *, ends_with
 def _folder_by_hand(where: Where, mission: str, keys: list[str]) -> Path | None:
     """Return the folder where processes of this host leave copies; None: overhear the bus instead.
 
-    That is better for few keys, and for pictures of other hosts, of which no process sends copies.
+    Overhearing suits few keys, and pictures of other hosts, because no process sends copies of those.
     """
     if where.connect is not None or keys:
         return None
@@ -167,7 +168,7 @@ async def _mission_file(bus: Bus) -> str:
 
 
 async def _begun(bus: Bus, clock: MissionClock) -> datetime:
-    """Return the time of day of mission time 0, by the nameserver's machine if possible: one for all recorders."""
+    """Return the time of day of mission time 0; if possible by the nameserver's clock, the same for all recorders."""
     try:
         told = await bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)
     except (LinkError, Refusal):
@@ -203,12 +204,12 @@ def _new_files(path: Path, keep: int) -> Iterator[RecordingFiles]:
     try:
         yield files
     finally:
-        with suppress(OSError):  # the disc is full, which the recorder has told
+        with suppress(OSError):  # the disc is full, which the recorder has reported
             files.close()
 
 
 async def recover_to(path: Path, to: Path) -> ExitCode:
-    """Write what is readable to a new file, read it back, and print how much it is."""
+    """Write all readable messages to a new file, read it back, and print their number."""
     try:
         count = recover_file(path, to)
     except FileExistsError as error:
@@ -216,14 +217,14 @@ async def recover_to(path: Path, to: Path) -> ExitCode:
     except OSError as error:
         raise FileUnusable(f"{error.filename or path}: {error.strerror or error}") from error
     with opened(to) as made:
-        assert made.contents().messages == count  # noqa: S101  what was written can be read
+        assert made.contents().messages == count  # noqa: S101  all written messages are readable
     say(f"{to}: {counted(count, 'message')}")
     return ExitCode.DONE
 
 
 # ---------------------------------------------------------------------- looking into one
 async def print_info(path: Path, *, as_json: bool) -> ExitCode:
-    """Print facts, times and numbers."""
+    """Print facts about the mission, times and numbers."""
     with opened(path) as recording:
         found = recording.contents()
     facts = found.about | {
@@ -242,7 +243,7 @@ async def print_info(path: Path, *, as_json: bool) -> ExitCode:
 
 
 async def check_whole(path: Path, *, as_json: bool) -> ExitCode:
-    """Print whose messages are missing, and how many, and whose clock was off."""
+    """Print which senders' messages are missing, how many, and which clocks were off."""
     observer = ClockObserver()
     with opened(path) as recording:
         found, missing = recording.contents(), missing_numbers(observer.watched(recording.messages()))
@@ -278,7 +279,7 @@ async def print_keys(path: Path, *, as_json: bool) -> ExitCode:
 async def print_messages(
     path: Path, keys: tuple[str, ...], since_s: float, until_s: float | None, most: int, *, as_json: bool
 ) -> ExitCode:
-    """Print a line for each message, at most so many."""
+    """Print a line for each message, at most ``most``."""
     left_out = 0
     with opened(path) as recording:
         for number, message in enumerate(recording.messages(keys, since_s, until_s)):
@@ -330,8 +331,8 @@ def opened(path: Path) -> Iterator[Recording]:
     """Yield the recording in this file.
 
     Raises:
-        FileUnusable: It cannot be read.
-        NoRecording: It is none, or its recorder was killed.
+        FileUnusable: The file cannot be read.
+        NoRecording: The file is not a recording, or its recorder was killed.
     """
     try:
         file = path.open("rb")

@@ -1,4 +1,4 @@
-"""``check --dry-run``: prints what a mission would do, and writes its trace."""
+"""``check --dry-run``: prints the predicted placement and schedule of a mission, and writes the trace."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def print_dry_run(
         description: The mission.
         for_s: Mission seconds; None: the first minute.
         trace: File for the trace.
-        width: Of tables; None: as the terminal.
+        width: Width of tables; None: the terminal's.
     """
     try:
         dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)

@@ -46,19 +46,19 @@ from backbone.waiting import first_to_end
 from backbone.wire import plain
 
 REPLAY = "replay"
-COLLECT_GAP_S = 0.03  # chosen: a multiple of what it takes; a mission without such a gap is a rare one
-COLLECT_EACH_S = 2.0  # chosen: what two seconds leave is collected within a millisecond or two
-LEAD_S = 0.05  # chosen: a run file is written within it; seconds of the machine
+COLLECT_GAP_S = 0.03  # chosen: a multiple of a collection's duration; nearly every mission has such gaps
+COLLECT_EACH_S = 2.0  # chosen: the garbage of two seconds is collected within a millisecond or two
+LEAD_S = 0.05  # chosen: writing a run file takes less; seconds of the machine
 
 
 async def run_without(
     path: Path, name: str, class_path: str, parameters: dict[str, Any], tolerances: dict[str, float], *, as_json: bool
 ) -> ExitCode:
-    """Run one component for real on the recording, and compare what it says with what the recorded one said.
+    """Run one component for real on the recording, and compare its messages with those of the recorded component.
 
     Args:
-        class_path: Of another class; empty: the recorded one.
-        parameters: That are to be other than recorded.
+        class_path: Path of another class; empty: the recorded class.
+        parameters: Parameters that differ from the recorded ones.
         tolerances: See ``compared``.
     """
     with opened(path) as recording:
@@ -72,13 +72,13 @@ async def run_without(
         recorded = recording.messages(source=launch.address)
         result = print_comparison(compared(recorded, rerun.said, tolerances), as_json=as_json)
     if rerun.fell is not None:
-        say(f"it fell: {type(rerun.fell).__name__}: {rerun.fell}")
+        say(f"the component failed: {type(rerun.fell).__name__}: {rerun.fell}")
         return ExitCode.REFUSED
     return result
 
 
 async def print_reasons_at(path: Path, name: str, at_s: float | None, *, as_json: bool) -> ExitCode:
-    """Print why something was as it was at a mission time; None: at the end."""
+    """Print the reasons for a state at a mission time; None: at the end."""
     with opened(path) as recording:
         asked_s = recording.contents().end_s if at_s is None else at_s
         reasons = reasons_at(recording, name, asked_s)
@@ -87,7 +87,7 @@ async def print_reasons_at(path: Path, name: str, at_s: float | None, *, as_json
 
 
 async def decide_anew(path: Path, since_s: float, rules: dict[str, Any], *, as_json: bool) -> ExitCode:
-    """Let today's scheduler decide on the recorded events; print the first decision that is not as recorded."""
+    """Let today's scheduler decide on the recorded events; print the first decision that differs from the recording."""
     with opened(path) as recording:
         found = decided_anew(recording, since_s, **rules)
     if as_json:
@@ -97,7 +97,7 @@ async def decide_anew(path: Path, since_s: float, rules: dict[str, Any], *, as_j
     made = f"{counted(found.decisions, 'decision')} made anew, {counted(found.grants, 'grant')} among them"
     say(f"{made}: {'all as recorded' if found.difference is None else 'the last one is not as recorded'}")
     if found.missing:
-        say(f"nothing is said of {counted(found.missing, 'decision')} that the recording does not have whole")
+        say(f"not compared, because incomplete in the recording: {counted(found.missing, 'decision')}")
     return ExitCode.DONE if found.difference is None else ExitCode.REFUSED
 
 
@@ -106,10 +106,10 @@ class Playing:
     """How a recording is played.
 
     Attributes:
-        mission: Name under which it is up; None: ``replay-`` and its name, so that no command takes it for the mission.
-        since_s: Mission time at which it begins; None: with its first message.
+        mission: Name of the replay; None: ``replay-`` and the mission's name, so that commands cannot confuse the two.
+        since_s: Mission time at which the replay begins; None: with the first message.
         speed: Mission seconds per second of the machine.
-        is_stepped: True: message by message, each after a line from standard input.
+        is_stepped: True: each message waits for a line from standard input.
         keys: Patterns of the keys whose publications are played; none: all.
     """
 
@@ -160,8 +160,8 @@ async def _play_in(
         player.catch_up()
         player.begin()
         gc.collect()
-        gc.freeze()  # a collection of all that was imported takes tens of milliseconds (measured)
-        gc.disable()  # and one of what was decoded takes milliseconds, at any time
+        gc.freeze()  # collecting all imported objects takes tens of milliseconds (measured)
+        gc.disable()  # and a collection of decoded messages takes milliseconds, at any time
         clock.origin_monotonic_s = time.monotonic() + LEAD_S - since_s / wanted.speed
         run_files.write(
             run_files.RunFile(
@@ -202,12 +202,12 @@ class _Collector:
 async def _play_to_end(player: Player) -> None:
     await player.run()
     gc.enable()
-    say(f"that was all, {counted(player.played, 'publication')}; questions are still answered")
+    say(f"the recording is over, {counted(player.played, 'publication')}; questions are still answered")
     await asyncio.Event().wait()
 
 
 async def _asked_for_step(message: Recorded) -> None:
-    """Print the message that comes next, and return when a line was read."""
+    """Print the next message, and return when a line was read."""
     show([message_line(message)])
     line = await asyncio.to_thread(sys.stdin.readline)
     if not line:

@@ -65,7 +65,7 @@ async def show_status(where: Where, display: Display, *, watch: bool) -> ExitCod
         watch: Again and again, until Ctrl-C.
 
     Raises:
-        MissionNotUp: None of this name is up on this machine.
+        MissionNotUp: No mission of this name is up on this machine.
         LinkError: The nameserver did not answer, and no launcher of the mission lives on this machine.
     """
     found = run_files.find(where.mission) if where.connect is None else None
@@ -92,7 +92,7 @@ async def _show(pictures: AsyncGenerator[MissionPicture, None], display: Display
 async def _pictures(
     bus: Bus, clock: Clock, found: run_files.RunFile | None, every_s: float
 ) -> AsyncGenerator[MissionPicture, None]:
-    """Yield how the mission is, without end."""
+    """Yield the state of the mission, without end."""
     before = None
     while True:
         try:
@@ -106,7 +106,7 @@ async def _pictures(
 
 
 def picture_without_hub(found: run_files.RunFile, error: LinkError) -> MissionPicture:
-    """Return what is known of a mission from its run file alone: its launcher lives, its hub does not answer."""
+    """Return the picture of a mission from its run file alone: its launcher lives, its hub does not answer."""
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     now_s, pid = clock.now_s(), found.launcher_pid
     silence = f"no answer: {error}" if not isinstance(error, HubUnreachable) else f"nothing answers at {found.endpoint}"
@@ -114,7 +114,7 @@ def picture_without_hub(found: run_files.RunFile, error: LinkError) -> MissionPi
         remedy = f"Let it go on with 'kill -CONT {pid}', or end the mission with 'scout-backbone down'."
         missed = [
             Absence("launcher", now_s, f"its process {pid} is paused", "", remedy, vital=True),
-            Absence("nameserver", now_s, silence, "", "Let the launcher go on, which restarts it.", vital=True),
+            Absence("nameserver", now_s, silence, "", "Continue the launcher, which restarts it.", vital=True),
         ]
     else:
         missed = [Absence("nameserver", now_s, silence, f"the launcher, process {pid}, restarts it", vital=True)]

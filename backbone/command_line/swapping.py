@@ -1,4 +1,4 @@
-"""The work of ``scout-backbone swap``: a person exchanges a class, and the mission's log tells who did."""
+"""The work of ``scout-backbone swap``: a person exchanges a class, and the mission's log names the person."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from backbone.placer.messages import ListPlacements, Placements
 from backbone.spoken import counted
 from backbone.wire import UnknownMessage
 
-REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
+REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 READ_WITHIN_S = 60.0  # chosen: an import of a large library on a busy machine, and the answer
 
 
 async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
-    """Exchange the module, the behavior's class or the resource's driver of this name, and print which goes on.
+    """Exchange the module, the behavior's class or the resource's driver of this name, and print which one is in use.
 
     Raises:
-        UnknownModule: Nothing of the mission that can be exchanged has this name.
-        Silent: What has this name does not answer; nothing was changed.
-        Refusal: The new one cannot take the place; nothing was changed.
-        LinkError: It did not answer; the outcome is unknown.
+        UnknownModule: No exchangeable part of the mission has this name.
+        Silent: The part of this name does not answer; nothing was changed.
+        Refusal: The new class cannot be used; nothing was changed.
+        LinkError: The part did not answer; the outcome is unknown.
     """
     async with connected(where) as (bus, clock):
         at, question = await _question(bus, asked)
@@ -63,7 +63,7 @@ def _told(asked: SwapModule, swapped: Swapped, counts: str) -> str:
 
 
 async def _question(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | SwapClass]:
-    """Return whom to ask for the exchange, and what."""
+    """Return the address to ask for the exchange, and the question."""
     listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
     units = [one.address for one in listed.components if one.type == EXECUTION_UNIT]
     at, silent = await _modules_of(bus, units)
@@ -87,7 +87,7 @@ def _may_be_exchanged(one: ComponentState) -> bool:
 
 
 async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str]) -> Refusal:
-    """Return why nothing of this name can be exchanged."""
+    """Return the refusal that explains why no part of this name can be exchanged."""
     if silent:
         units = ", ".join(map(component_of, silent))
         return Silent(f"{name} is not known: {units} does not answer and may run it")
@@ -96,13 +96,13 @@ async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str])
     except LinkError:
         stopped = {}
     if name in stopped:
-        remedy = "Start it: its owner does, or 'scout-backbone start'; then swap again."
+        remedy = "Start it through its owner or by 'scout-backbone start', then swap again."
         return Silent(f"{name} is stopped: {stopped[name]}", remedy=remedy)
     return UnknownModule(f"no module, behavior or resource {name!r} runs{did_you_mean(name, known)}")
 
 
 async def _modules_of(bus: Bus, units: list[str]) -> tuple[dict[str, str], list[str]]:
-    """Return module → address of the unit that runs it, and the units that did not answer."""
+    """Return a table from module to the address of its unit, and the units that did not answer."""
 
     async def ask(unit: str) -> Parameters | None:
         try:

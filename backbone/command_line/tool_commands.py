@@ -1,4 +1,4 @@
-"""``scout-backbone`` ``bridge``, ``metrics``: a mission that is up, for other tools. They change nothing in it.
+"""``scout-backbone`` ``bridge``, ``metrics``: show a mission that is up in other tools. They change nothing in it.
 
 Rules of this file: as those of ``cli``.
 """
@@ -18,7 +18,7 @@ METRICS_PORT = 9464  # OpenTelemetry's port for Prometheus
 MOST_PORT = 65_535
 
 Host = Annotated[
-    str, typer.Option("--host", help="Address to listen at; anybody who reaches it reads all. Default: this machine.")
+    str, typer.Option("--host", help="Address to listen at; every client there can read all. Default: this machine.")
 ]
 
 

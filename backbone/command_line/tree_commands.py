@@ -85,7 +85,7 @@ def remove(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """End a behavior and all below it, and take them out of the tree."""
+    """End a behavior and its descendants, and remove them from the tree."""
     from backbone.command_line.tree_orders import remove_branch
 
     where = chosen(mission, connect, secret_file)
@@ -105,7 +105,7 @@ def move(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Put a branch elsewhere; below another parent it ends and begins anew."""
+    """Move a branch; below another parent, it ends and starts again."""
     from backbone.command_line.tree_orders import move_branch
 
     where = chosen(mission, connect, secret_file)
@@ -121,7 +121,7 @@ def replace(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """End a behavior and all below it, and start another branch in its place."""
+    """End a behavior and its descendants, and start another branch in its place."""
     from backbone.command_line.tree_orders import replace_branch
 
     where = chosen(mission, connect, secret_file)
@@ -149,7 +149,7 @@ def set_(
 
 @tree.command()
 def save(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The file; one that is there is replaced as a whole.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The file; an existing file is replaced as a whole.")],
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,

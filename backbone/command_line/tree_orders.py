@@ -1,4 +1,4 @@
-"""Orders of a person about the behavior tree of a mission that is up; the launcher checks and carries them out."""
+"""A person's changes to the behavior tree of a mission that is up; the launcher checks and carries them out."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 from backbone.spoken import value_text
 
-REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
-CHANGED_WITHIN_S = 240.0  # chosen: a new root whose start takes as long as it may
+REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
+CHANGED_WITHIN_S = 240.0  # chosen: longer than the longest start of a new root
 
 
 async def print_tree(where: Where, *, as_json: bool) -> ExitCode:
@@ -55,29 +55,29 @@ async def print_tree(where: Where, *, as_json: bool) -> ExitCode:
 
 
 async def add_branch(where: Where, file: Path, below: str, place: int, seen: int | None) -> ExitCode:
-    """Add the branch in the file, and say what became of it."""
+    """Add the branch in the file, and print the outcome."""
     branch, source = _read(file)
     return await _change(where, seen, lambda now: AddBranch(now.version, below or _mission(now), branch, source, place))
 
 
 async def remove_branch(where: Where, name: str, seen: int | None) -> ExitCode:
-    """Remove the branch, and say what became of it."""
+    """Remove the branch, and print the outcome."""
     return await _change(where, seen, lambda now: RemoveBranch(now.version, name), name)
 
 
 async def move_branch(where: Where, name: str, parent: str, place: int, seen: int | None) -> ExitCode:
-    """Move the branch, and say what became of it."""
+    """Move the branch, and print the outcome."""
     return await _change(where, seen, lambda now: MoveBranch(now.version, name, parent, place), name)
 
 
 async def replace_branch(where: Where, name: str, file: Path, seen: int | None) -> ExitCode:
-    """Replace the branch by the one in the file, and say what became of it."""
+    """Replace the branch by the one in the file, and print the outcome."""
     branch, source = _read(file)
     return await _change(where, seen, lambda now: ReplaceBranch(now.version, name, branch, source), name)
 
 
 async def set_value(where: Where, name: str, parameter: str, value: object, seen: int | None) -> ExitCode:
-    """Set the value in the tree, and say what became of it."""
+    """Set the value in the tree, and print the outcome."""
     detail = f"{parameter} = {value_text(value)}"
     return await _change(where, seen, lambda now: SetInTree(now.version, name, parameter, value), name, detail)
 
@@ -86,7 +86,7 @@ async def save_tree(where: Where, file: Path) -> ExitCode:
     """Replace the file by the mission file with all changes of the tree.
 
     Raises:
-        FileUnusable: It cannot be written; what was there is unchanged.
+        FileUnusable: The file cannot be written; its old content is unchanged.
     """
     async with connected(where) as (bus, _):
         tree = await _tree(bus)
@@ -134,7 +134,7 @@ async def _tree(bus: Bus) -> Tree:
 
 
 def _read(file: Path) -> tuple[str, str]:
-    """Return a branch and the name of its file."""
+    """Return the text of a branch and the name of its file."""
     try:
         data = sys.stdin.buffer.read() if str(file) == "-" else file.read_bytes()
         return data.decode(), "stdin" if str(file) == "-" else str(file)
@@ -145,7 +145,7 @@ def _read(file: Path) -> tuple[str, str]:
 
 
 def _name_in(branch: str) -> str:
-    """Return the name of the branch; the launcher has read it before this is said."""
+    """Return the name of the branch, which the launcher has validated already."""
     return outline(branch.encode()).text("name")
 
 

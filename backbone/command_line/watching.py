@@ -1,6 +1,6 @@
-"""The work of ``scout-backbone watch`` and ``scout-backbone top``: what is said on a live mission, now.
+"""The work of ``scout-backbone watch`` and ``scout-backbone top``: the messages of a live mission.
 
-Both overhear, as a recorder does: no component waits for them, and copies are made for them only while they look.
+Both overhear, as a recorder does. No component waits for them, and senders copy messages for them only while they run.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ from backbone.waiting import first_of, set_within
 from backbone.wire import Message
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
-MOST_WAITING_BYTES = 16 * 1024 * 1024  # chosen: a person reads far less
-ANSWERS_HEARD_S = 0.1  # chosen: the answers to its own questions are overheard by then, and count for nothing
+MOST_WAITING_BYTES = 16 * 1024 * 1024  # chosen: far more than a person can read
+ANSWERS_HEARD_S = 0.1  # chosen: longer than overhearing the answers to its own questions, which are not counted
 LOOK_EACH_S = 1.0  # chosen: a rate over a second is readable and recent
 
 
 @dataclass(frozen=True)
 class Watched:
-    """What a person wants to see.
+    """A person's selection of messages.
 
     Attributes:
         keys: Patterns of keys; none: all.
-        field: Only this field of a body; empty: all.
-        most: End after so many messages; None: go on.
-        for_s: End after so many seconds of the machine; None: go on.
-        as_json: For programs.
+        field: Only this field of a body; empty: all fields.
+        most: End after so many messages; None: no limit.
+        for_s: End after so many seconds of the machine; None: no limit.
+        as_json: True: output for programs.
     """
 
     keys: tuple[str, ...]
@@ -121,7 +121,7 @@ async def mission_classes(bus: Bus, trouble: Callable[[str], None] = say) -> dic
 
     Args:
         bus: The bus.
-        trouble: Called with a sentence if those of the mission's component types are not known.
+        trouble: Called with a sentence if the classes of the mission's component types cannot be found.
     """
     modules: set[str] = set()
     try:
@@ -153,15 +153,15 @@ async def overhearing(
     classes: Mapping[str, type[Message]] | None = None,
     of: str = "",
 ) -> AsyncIterator[list[Overhearing]]:
-    """Call ``heard`` with key, message and mission time of all that is meant.
+    """Call ``heard`` with key, message and mission time of each selected message.
 
     Args:
         bus: The bus.
-        clock: The mission's.
+        clock: The mission's clock.
         keys: Patterns of keys; none: all.
         heard: Called in the event loop.
-        classes: Message classes by schema; None: those of the mission.
-        of: Address of the keys; empty: any.
+        classes: Message classes by schema; None: the mission's classes.
+        of: Address of the component; empty: any.
     """
     hearing = Hearing(await mission_classes(bus) if classes is None else classes, keys)
 

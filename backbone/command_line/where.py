@@ -12,12 +12,12 @@ from backbone.authentication import read_secret, read_secret_file
 
 @dataclass(frozen=True)
 class Where:
-    """Which mission a command or a console joins.
+    """The mission that a command or a console joins.
 
     Attributes:
-        mission: Its name; None: the one that is up on this machine.
-        connect: Endpoint of its hub, for a mission elsewhere, which then has a name.
-        secret_file: File with that mission's secret.
+        mission: Name of the mission; None: the one that is up on this machine.
+        connect: Endpoint of the hub of a mission elsewhere; such a mission must have a name here.
+        secret_file: File with the secret of that mission.
     """
 
     mission: str | None
@@ -25,7 +25,7 @@ class Where:
     secret_file: Path | None
 
     def secret(self) -> str:
-        """Return the secret of a mission elsewhere; empty for one on this machine, whose folder holds it.
+        """Return the secret of a mission elsewhere; empty for a mission on this machine, because its folder holds it.
 
         Raises:
             NoSecret: The file or the input holds no secret.

@@ -1,1 +1,1 @@
-"""What other tools show of a mission without a plug-in: Foxglove, Lichtblick, Rerun."""
+"""A mission in viewers that need no plug-in for it: Foxglove, Lichtblick, Rerun."""

@@ -1,7 +1,7 @@
-"""Bridge: what is overheard on a live mission, for viewers that speak Foxglove's websocket protocol.
+"""Bridge: publishes the overheard messages of a live mission to viewers that speak Foxglove's websocket protocol.
 
-No viewer can publish through it: it offers no capability beside channels to read. Foxglove's library serves the
-viewers in threads of its own; of what a slow viewer does not take, the library drops the oldest.
+No viewer can publish through it, because it offers only channels to read. Foxglove's library serves the viewers in
+threads of its own. If a viewer is too slow, the library drops the oldest messages.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ JSON = "json"
 
 @dataclass(slots=True)
 class _Newest:
-    """The newest message of a channel, for viewers that come later."""
+    """The newest message of a channel, for viewers that subscribe later."""
 
     channel: Channel
     data: bytes = b""
@@ -38,9 +38,9 @@ class Bridge(ServerListener):
     """Serves viewers until it is closed.
 
     Args:
-        name: What viewers show as its name.
-        port: 0: any free one.
-        translations: What shows which message.
+        name: Name of the bridge in viewers.
+        port: Port to listen at; 0: any free one.
+        translations: The functions that translate messages to well-known schemas, by message class.
 
     Raises:
         RuntimeError: The port cannot be opened.
@@ -68,7 +68,7 @@ class Bridge(ServerListener):
         return self._server.port
 
     def heard(self, key: str, message: Translated, at_s: float) -> None:
-        """Show a message that was heard at a mission time."""
+        """Show a message that arrived at a mission time."""
         if not message.schema:
             return
         at_ns = max(0, round(at_s * NS))
@@ -86,11 +86,11 @@ class Bridge(ServerListener):
             self._show((topic_of(key, message.schema), JSON), described, message.data, at_ns)
 
     def close(self) -> None:
-        """Send all viewers away."""
+        """Disconnect all viewers."""
         self._server.stop()
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002  of the library
-        """Repeat the newest message for a viewer that comes later: some are said only on a change."""
+        """Send the newest message to a late viewer, because some messages are published only on a change."""
         newest = self._by_number.get(channel.id)
         if newest is not None and newest.data:
             newest.channel.log(newest.data, log_time=newest.at_ns)

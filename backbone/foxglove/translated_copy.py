@@ -1,8 +1,9 @@
-"""A translated copy of a recording, for tools that know no message of this project.
+"""A translated copy of a recording, for tools that do not know this project's messages.
 
-The recording stays as it is: it pays nothing for other tools, and each new translation is for old recordings, too. In
-the copy each message stands as recorded, with its schema, so that all its numbers can be plotted; beside it stands what
-shows it, and instead of it where that has all that it has. A copy has no profile, so no command takes it for one.
+The recording itself stays unchanged. So recording costs nothing for other tools, and a new translation serves old
+recordings, too. The copy contains each message as recorded, with its schema, so that all its numbers can be plotted.
+Beside it the copy contains its translation, or only the translation if that is complete. A copy has no profile, so that
+no command mistakes it for a recording.
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ def write_copy(recording: Recording, to: IO[bytes], translations: Translations, 
     """Write the copy; return how many of its messages are in well-known schemas.
 
     Args:
-        recording: What is copied.
-        to: Written from its beginning; not closed.
-        translations: What shows which message.
+        recording: The recording to copy.
+        to: File of the copy, written from its begin; not closed.
+        translations: The functions that translate messages to well-known schemas, by message class.
         keys: Only messages of keys that match one of these; none: all.
 
     Raises:
-        NoRecording: The recording is damaged; what was before that is written.
+        NoRecording: The recording is damaged; the messages before the damage are written.
     """
     classes = {schema_of(kind): kind for kind in translations}
     writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)

@@ -1,7 +1,7 @@
 """Messages in Foxglove's well-known schemas, which Foxglove, Lichtblick and Rerun show without a plug-in. Pure.
 
-A package names its tables of translations as entry points of the group ``scout_backbone.foxglove``: message class → a
-function from such a message to the well-known ones that show it. They are encoded as Protocol Buffers, because Rerun
+A package lists its tables of translations as entry points of the group ``scout_backbone.foxglove``: message class → a
+function from such a message to well-known ones that show it. They are encoded as Protocol Buffers, because Rerun
 reads these schemas in no other encoding.
 """
 
@@ -35,12 +35,12 @@ class Encodable(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class WellKnown:
-    """What a message is in one of Foxglove's schemas.
+    """A translation of a message to one of Foxglove's schemas.
 
     Attributes:
-        topic: One for each thing that is shown, because tools go on showing the last message of each topic.
-        message: In Foxglove's schema.
-        is_all: True: it has all that the message has, which then need not be shown beside it.
+        topic: One topic for each shown object, because tools keep showing the last message of each topic.
+        message: The message in Foxglove's schema.
+        is_all: True: the translation is complete, so that the original need not be shown beside it.
     """
 
     topic: str
@@ -58,11 +58,11 @@ def installed() -> Translations:
 
 
 def shown_as(message: Message | None, translations: Translations) -> list[WellKnown]:
-    """Return what shows this message; nothing if there is none, or no translation of its class."""
+    """Return the translations of this message; empty if there is no message, or no translation of its class."""
     translation = translations.get(type(message)) if message is not None else None
     return [*translation(message)] if translation is not None else []
 
 
 def moment(at_s: float) -> Timestamp:
-    """Return a mission time; one that Foxglove cannot say is the nearest that it can."""
+    """Return a mission time, limited to the times that Foxglove can represent."""
     return Timestamp.from_epoch_secs(min(max(at_s, 0.0), LATEST_S))

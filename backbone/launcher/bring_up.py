@@ -127,7 +127,7 @@ async def _with_hub(
     except BackboneError as error:
         launcher.outcome.failure = launcher.outcome.failure or error
     finally:
-        await bus.close()  # if the launcher did not come to it
+        await bus.close()  # if the launcher was not reached
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.remove_signal_handler(number)
         if recorder is not None:

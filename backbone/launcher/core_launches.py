@@ -29,10 +29,10 @@ class UpOptions:
         speed: Mission seconds per second of the machine.
         trace: File for the schedule trace, or None.
         for_s: Mission seconds from readiness to the end; None: until an order ends it.
-        text: What the mission file holds: its tree is changed there. Empty: its tree cannot be changed.
+        text: Content of the mission file, in which changes of the tree are made. Empty: the tree cannot be changed.
         record: File of the recording, or None.
-        pack: Number of processes of a host into which the placer packs components; 0: each has its own; None: types
-            with many components share some.
+        pack: Number of processes of a host into which the placer packs components; 0: a process for each component;
+            None: types with many components share processes.
     """
 
     speed: float = 1.0

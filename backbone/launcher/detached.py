@@ -25,7 +25,7 @@ from backbone.launcher.verdict import await_verdict
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.waiting import first_of, set_within
 
-ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty components on a busy machine needs 5 s
+ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: a busy machine needs 5 s to end forty components
 SKIP_S = 0.5  # chosen: two signals in quick succession may become one
 
 
@@ -78,7 +78,7 @@ def _died(launcher: subprocess.Popen[bytes]) -> int:
 async def take_down(mission: str | None, *, at_once: bool = False) -> int:
     """End a mission of this machine and return when its launcher has ended.
 
-    The time of its last branch does not count among the times after which the launcher is urged.
+    The waits before each signal to the launcher do not include the time of the last branch.
 
     Args:
         mission: Its name; None: the only one.
@@ -114,7 +114,7 @@ async def take_down(mission: str | None, *, at_once: bool = False) -> int:
 
 
 async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool) -> bool:
-    """Order the mission to end and wait for its last branch; return whether the launcher took the order."""
+    """Order the mission to end and wait for its last branch; return whether the launcher accepted the order."""
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     try:
         bus = await ZenohBus.open_when_up(
@@ -142,10 +142,10 @@ async def _ask(found: run_files.RunFile, ended: asyncio.Event, *, at_once: bool)
 
 
 async def _tell_last_branch(bus: Bus, within_s: float) -> None:
-    """Say how the last branch ended, as soon as it is over; ``within_s`` is machine time."""
+    """Print how the last branch ended, as soon as it is over; ``within_s`` is machine time."""
     try:
         over = await bus.ask(LAUNCHER, AwaitLastBranch(), LastBranchOver, within_s=within_s)
     except LinkError as error:
-        say(f"the launcher does not tell how the last branch ended: {error}")
+        say(f"the launcher did not report how the last branch ended: {error}")
     else:
         say(over.told)

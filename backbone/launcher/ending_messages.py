@@ -7,10 +7,10 @@ from backbone.wire import Message
 
 
 class EndMission(Message, frozen=True):
-    """Run the last branch, if there is one, and end the mission; the same order again ends the branch at once.
+    """Run the last branch, if the mission has one, then end the mission; a repeated order ends the branch at once.
 
     Attributes:
-        at_once: True: without the last branch.
+        at_once: True: the mission ends without the last branch.
     """
 
     at_once: bool = False
@@ -20,8 +20,8 @@ class MissionEnding(Message, frozen=True):
     """Answer to ``EndMission``: the mission is ending.
 
     Attributes:
-        told: What the last branch does, one line; empty: there is none.
-        within_s: Time the branch has from its start, mission seconds; 0: it does not run.
+        told: State of the last branch, one line; empty: the mission has none.
+        within_s: Longest run of the branch, mission seconds; 0: it does not run.
     """
 
     told: Text = ""
@@ -29,14 +29,14 @@ class MissionEnding(Message, frozen=True):
 
 
 class AwaitLastBranch(Message, frozen=True):
-    """Ask how the last branch ended; answered as soon as it is over."""
+    """Ask how the last branch ended. The launcher answers as soon as the branch is over."""
 
 
 class LastBranchOver(Message, frozen=True):
     """Answer to ``AwaitLastBranch``.
 
     Attributes:
-        told: How it ended, one line; empty: there is none.
+        told: How the branch ended, one line; empty: the mission has none.
     """
 
     told: Text = ""

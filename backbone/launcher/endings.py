@@ -1,6 +1,6 @@
 """Endings: a command's messages for the person at the terminal, and its exit codes.
 
-Data goes to stdout, talk to stderr. Exit codes are those of ARCHITECTURE.md, section 5.
+Data goes to stdout, messages to stderr. Exit codes are those of ARCHITECTURE.md, section 5.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Recorders that people began by hand: the launcher names each one that hangs, until it responds or has ended.
+"""Recorders that operators started by hand: the launcher reports each one that hangs, until it responds or has ended.
 
-Beats and claims (``recorder_beats``) come in, absences and lines for the log go out. The claim of a recorder that ends
-or is killed falls at once. The claim of a hung one falls only when its link expires, seconds after its last beat.
+Input: beats and claims (``recorder_beats``). Output: absences and lines for the log. If a recorder ends or is killed,
+its claim falls at once. If it hangs, its claim falls only when its link expires, seconds after its last beat.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from backbone.printable import printable_all
 from backbone.wire import Envelope
 
 LOOK_EACH_S = 0.5  # chosen: half of a beat; seconds of the machine, as all times of this file
-SILENT_AFTER_S = 3.0  # chosen: three beats, as ``recorder_signs`` allows; a recorder goes behind all that decides
-EXPIRED_AFTER_S = 1.5  # chosen: a link expires 2 s after its last message; one that closes, within a beat and a half
+SILENT_AFTER_S = 3.0  # chosen: three beats, as in ``recorder_signs``; recording yields to every deciding process
+EXPIRED_AFTER_S = 1.5  # chosen: a link expires 2 s after its last message; a closed link ends within 1.5 beats
 NAMED_FOR_S = 60.0  # chosen: time to read it; the launcher does not see the end of a process of another host
-MOST_KNOWN = 64  # chosen: far more than people begin; a faulty client fills no memory
+MOST_KNOWN = 64  # chosen: far more than operators start; a faulty client cannot fill the memory
 
 Event = tuple[str, str]
-"""Name of a recorder, and what to log about it, for people."""
+"""Name of a recorder, and the text to log about it."""
 
 
 @dataclass(slots=True)
 class _Recorder:
-    """One recorder.
+    """The state of one recorder.
 
     Attributes:
-        heard_s: When its last beat came.
-        fell_s: When its claim fell; ``math.inf``: it stands.
+        heard_s: Arrival of its last beat.
+        fell_s: End of its claim; ``math.inf``: the claim exists.
         is_silent: True if it counts as hung.
     """
 
@@ -49,10 +49,10 @@ class _Recorder:
 
 
 class HandRecorders:
-    """All recorders by hand of one mission.
+    """All recorders of one mission that operators started by hand.
 
     Args:
-        rate: Mission seconds a second; times that come in are mission time.
+        rate: Mission seconds per second of the machine; all arguments named ``now_s`` are mission time.
         may_exist: Returns whether this process of this host may still be there.
     """
 
@@ -79,7 +79,7 @@ class HandRecorders:
         return []
 
     def claim_changed(self, claim: str, now_s: float, *, stands: bool) -> None:
-        """Record that the claim of a recorder rose or fell; claims of others do not matter."""
+        """Record that the claim of a recorder appeared or fell; ignore the claims of other components."""
         if (known := self._known.get(claim)) is not None:
             known.fell_s = math.inf if stands else now_s
 
@@ -89,20 +89,20 @@ class HandRecorders:
         Args:
             is_deaf: True if no beat could come, because the hub does not respond or the link to it is down.
         """
-        is_deaf = is_deaf or now_s - self._looked_s > (LOOK_EACH_S + BEAT_EACH_S) * self._rate  # or stood still itself
+        is_deaf = is_deaf or now_s - self._looked_s > (LOOK_EACH_S + BEAT_EACH_S) * self._rate  # or itself was paused
         self._looked_s = now_s
         events: list[Event] = []
         for claim, one in tuple(self._known.items()):
             if is_deaf and not one.is_silent:
                 one.heard_s = now_s
                 if one.fell_s < math.inf:
-                    del self._known[claim]  # it comes back with the hub, or ended meanwhile
+                    del self._known[claim]  # either it returns with the hub, or it has ended meanwhile
             elif not one.is_silent and self._hangs(one, now_s):
                 one.is_silent = True
                 events.append((one.name, f"does not respond; it records to {one.beat.file}"))
             elif self._has_left(one, now_s) and not (one.is_silent and self._is_worth_naming(one, now_s)):
                 del self._known[claim]
-                left = f"left without a word; if {one.beat.file} is not whole, 'scout-backbone record recover' mends it"
+                left = f"ended without notice; if {one.beat.file} is incomplete, use 'scout-backbone record recover'"
                 events.append((one.name, left))
         return events
 
@@ -119,7 +119,7 @@ class HandRecorders:
         return now_s - one.fell_s >= LOOK_EACH_S * self._rate  # its last beat may come after the fall
 
     def _is_worth_naming(self, one: _Recorder, now_s: float) -> bool:
-        """Return whether a silent one whose claim has fallen may still be there."""
+        """Return whether a silent recorder whose claim has fallen may still exist."""
         return now_s - one.fell_s < NAMED_FOR_S * self._rate and self._may_exist(one.beat.host, one.beat.pid)
 
 
@@ -132,7 +132,7 @@ def _absence(one: _Recorder) -> Absence:
 
 
 class HandRecorderWatch:
-    """Listens to the recorders of a mission.
+    """Subscribes to the beats and claims of a mission's recorders.
 
     Args:
         is_deaf: Returns whether the hub does not respond.
@@ -151,7 +151,7 @@ class HandRecorderWatch:
         return self._recorders.absences()
 
     async def run(self) -> None:
-        """Listen until cancelled; while there is no recorder, only that."""
+        """Subscribe until cancelled; check for hung recorders only while a recorder is known."""
         hearing = [
             self._bus.watch_link(self._link_changed),
             self._bus.subscribe(f"{Subsystem.BACKBONE}/*", Conversation.BEAT, RecorderBeat, self._beat_came),

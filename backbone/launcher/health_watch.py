@@ -19,14 +19,14 @@ from backbone.printable import printable_all
 from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope
 
-REST_S = 5.0  # chosen: heartbeats, tokens and published states tell of every fault but one: a service without answers
+REST_S = 5.0  # chosen: heartbeats, tokens and states show every fault but one: a service that beats without answering
 
 
 class HealthWatch:
     """Examines the mission and publishes its health under the launcher's address.
 
-    While something is absent, it examines every ``LOOK_EVERY_S``. In a healthy mission it waits for news, and examines
-    every ``REST_S`` all the same, for a service that beats and does not answer.
+    While something is absent, it examines every ``LOOK_EVERY_S``. In a healthy mission it waits for news. It also
+    examines every ``REST_S``, to find a service that beats and does not answer.
 
     Args:
         changed: Called when ``absences`` changes.
@@ -85,7 +85,7 @@ class HealthWatch:
             await self._pause(news, 0.0, REST_S)
 
     async def _pause(self, news: asyncio.Event, troubled_s: float, healthy_s: float) -> None:
-        """Wait for the longer of these times of the machine in a healthy mission, at most until the news."""
+        """Wait ``troubled_s``; if the mission is healthy, wait ``healthy_s`` or until the news. Machine seconds."""
         if self.picture.problems or self._health().word is not HealthWord.OK:
             await self._clock.sleep_s(troubled_s * self._clock.rate)
         else:

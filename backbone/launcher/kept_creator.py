@@ -21,7 +21,7 @@ from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.launcher.mission_recorder import MissionRecorder
 
-READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
+READY_WITHIN_S = 20.0  # chosen: as for the creators that a launcher starts
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0)
 
@@ -33,8 +33,8 @@ class Offered:
     Attributes:
         endpoint: Endpoint of the mission's hub.
         host: Name of this machine in the mission.
-        secret: Secret of the mission; empty: the hub asks for none.
-        record: File for what this machine says; None: its processes leave no copies.
+        secret: Secret of the mission; empty: the hub requires none.
+        record: File for the messages of this machine; None: its processes send no copies.
     """
 
     mission: str

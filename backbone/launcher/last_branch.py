@@ -1,6 +1,6 @@
-"""Last branch: whether an order to end runs it, ends it, or takes the mission down.
+"""Last branch: decides whether an order to end runs the branch, ends the branch, or takes the mission down.
 
-Pure: orders and ends go in with the time of the event, the decision comes out. Times are mission seconds.
+Pure: orders and ends go in with the time of the event, decisions come out. Times are mission seconds.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ _FINISHED = {"success": "succeeded", "failure": "failed"}
 
 
 def ends_before(types: Iterable[ComponentType]) -> frozenset[str]:
-    """Return the types whose components end before the last branch: behaviors, not the units that it may see with."""
+    """Return the types whose components end before the last branch: behaviors, but not the units that it may need."""
     return frozenset(
         one.name for one in types if one.subsystem is Subsystem.MISSION_CONTROL and one.name != EXECUTION_UNIT
     )
 
 
 class LastStage(Enum):
-    """What became of the last branch; it only moves downwards in this list."""
+    """State of the last branch; it only moves downwards in this list."""
 
     WAITS = auto()  # no order to end was given
     FREES = auto()  # consoles and other behaviors are being stopped
@@ -45,21 +45,21 @@ class LastBranch:
         self._began_s = 0.0
         self.stage = LastStage.WAITS
         self.how = ""
-        """How it ended, as in *succeeded after 8.3 s*; empty before its end, and without a branch."""
+        """How the branch ended, as in *succeeded after 8.3 s*; empty before its end, and without a branch."""
 
     @property
     def name(self) -> str:
-        """Name of its root; empty: there is none."""
+        """Name of the branch's root; empty: the mission has no last branch."""
         return self._declared.behavior.name if self._declared is not None else ""
 
     @property
     def within_s(self) -> float:
-        """Time that it has from its start; 0: there is none."""
+        """Longest run of the branch; 0: the mission has no last branch."""
         return self._declared.within_s if self._declared is not None else 0.0
 
     @property
     def told(self) -> str:
-        """How it ended, as a line of its own; empty before its end, and without a branch."""
+        """How the branch ended, as a whole line; empty before its end, and without a branch."""
         return f"last branch {self.name}: {self.how}" if self.how else ""
 
     @property
@@ -69,17 +69,17 @@ class LastBranch:
 
     @property
     def doing(self) -> str:
-        """What it does or how it ended, one line; empty: there is none, or no order to end was given."""
+        """State or result of the branch, one line; empty: no branch, or no order to end was given."""
         if self.is_at_work:
             return f"last branch {self.name} runs, for at most {self.within_s:g} s; a second order ends it at once"
         return self.told
 
     def ordered(self, now_s: float, *, is_up: bool, at_once: bool = False) -> bool:
-        """Take in an order to end; return False if the branch goes first, True if the mission goes down now.
+        """Apply an order to end; return False if the branch runs first, True if the mission goes down now.
 
         Args:
             is_up: False: the mission is still coming up, so that no branch can run.
-            at_once: True: the order is to do without the branch.
+            at_once: True: the order skips the branch.
         """
         if self.stage is LastStage.WAITS and self._declared is not None and is_up and not at_once:
             self.stage, self._began_s = LastStage.FREES, now_s
@@ -92,13 +92,13 @@ class LastBranch:
         return True
 
     def began(self, now_s: float) -> float:
-        """Take in that all else is stopped and the branch starts; return the time at which it must be over."""
+        """Record that all other components have stopped and the branch starts; return the time of its deadline."""
         if self.stage is LastStage.FREES:
             self.stage, self._began_s = LastStage.RUNS, now_s
         return self._began_s + self.within_s
 
     def finished(self, how: str, now_s: float) -> None:
-        """Take in the end of the branch; an earlier end stands.
+        """Record the end of the branch; if it has ended already, change nothing.
 
         Args:
             how: As in *succeeded*, or *stopped by anna*.
@@ -106,7 +106,7 @@ class LastBranch:
         self._end_after(how, now_s)
 
     def not_started(self, why: str) -> None:
-        """Take in that the branch cannot start; an earlier end stands."""
+        """Record that the branch cannot start; if it has ended already, change nothing."""
         self._end(f"could not be started: {why}")
 
     def _end_after(self, how: str, now_s: float) -> None:
@@ -119,11 +119,11 @@ class LastBranch:
 
 
 def how_it_finished(events: Iterable[StoryEvent], name: str) -> str:
-    """Return how a behavior finished by its own story, *succeeded* or *failed*; empty: not yet.
+    """Return how a behavior finished according to its story, *succeeded* or *failed*; empty: not yet.
 
     Args:
-        events: Its story, oldest first.
-        name: Its name.
+        events: The behavior's story, oldest first.
+        name: The behavior's name.
     """
     for event in events:
         head, _, status = event.what.partition(": ")

@@ -1,4 +1,4 @@
-"""A run of the last branch: it is kept placed, and followed until it has finished or its time is over."""
+"""A run of the last branch: keep its root placed, and follow it until it has finished or its time is over."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from backbone.launcher.last_branch import LastBranch, how_it_finished
 from backbone.naming import component_of
 from backbone.waiting import first_of
 
-ASK_AGAIN_S = 1.0  # chosen: its news leads to a question at once; this is for news that were lost
+ASK_AGAIN_S = 1.0  # chosen: each published event leads to a question at once; this covers lost events
 STORY_TIME_S = 1.0  # chosen: a thousand round trips
 
 
 async def run_last(
     last: LastBranch, bus: Bus, clock: Clock, address: str, keeping: Coroutine[Any, Any, str], until_s: float
 ) -> None:
-    """Return when the branch is over; ``last`` has how. What it started is still to be stopped.
+    """Return when the branch is over; ``last`` then has the result. The caller stops what the branch started.
 
     Args:
-        last: The decisions about it.
-        address: Of its root.
+        last: The decisions about the branch.
+        address: Address of its root.
         keeping: Keeps its root placed; returns the reason of the order that stops it, or raises the refusal of its
             start.
-        until_s: Mission time at which it must be over.
+        until_s: Deadline of the branch, in mission time.
     """
     kept = asyncio.create_task(keeping, name="keep the last branch")
     followed = asyncio.create_task(_finished(bus, clock, address), name="follow the last branch")
@@ -46,13 +46,13 @@ async def run_last(
 
 
 async def _finished(bus: Bus, clock: Clock, address: str) -> str:
-    """Return how the behavior at this address finished, as soon as its story has it."""
+    """Return how the behavior at this address finished, as soon as its story contains the end."""
     name, news = component_of(address), asyncio.Event()
     heard = bus.subscribe(address, Conversation.LOG, StoryEvent, lambda _event: news.set())
     try:
         while True:
             news.clear()
-            with suppress(LinkError, Refusal):  # it is not there yet, or is being restarted
+            with suppress(LinkError, Refusal):  # the behavior has not started yet, or restarts
                 story = await bus.ask(address, AskStory(name), Story, within_s=STORY_TIME_S)
                 if how := how_it_finished(story.events, name):
                     return how

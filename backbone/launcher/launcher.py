@@ -151,7 +151,7 @@ class Launcher(Component[NoParameters]):
         self.end(f"ran for {mission_s:g} s")
 
     def end(self, reason: str, *, at_once: bool = False) -> None:
-        """Run the last branch and end then; without one, at the second order, or if ``at_once``, end now."""
+        """Run the last branch, then end. Without a branch, at a second order, or if ``at_once``, end now."""
         if self._last.ordered(self.clock.now_s(), is_up=self._is_up, at_once=at_once):
             self._last_is_over.set()
             super().end(reason)
@@ -192,7 +192,7 @@ class Launcher(Component[NoParameters]):
         return await super().answer(asked)
 
     def changed(self) -> None:
-        """Publish news soon, also about the mission's health."""
+        """Publish the launcher's state and the mission's health soon."""
         super().changed()
         self._health_watch.notice()
 
@@ -210,7 +210,7 @@ class Launcher(Component[NoParameters]):
         return [*core, *mission, *self._others.absences(), *recorders]
 
     def _being_started(self) -> str:
-        """Return the components for which the start waits, with their feedback."""
+        """Return the components that the start waits for, with their feedback."""
         processes = self._health_watch.picture.processes
         doing = {name: processes[name].doing for name in self._wishes.awaited if name in processes}
         starts = [f"{name} ({doing[name]})" if doing.get(name) else name for name in sorted(self._wishes.awaited)]
@@ -295,7 +295,7 @@ class Launcher(Component[NoParameters]):
         self.end(reason)
 
     async def _stop_consoles(self) -> None:
-        """Ask every console to stop; each gives its robot back."""
+        """Ask every console to stop; each console releases its robot."""
         with contextlib.suppress(LinkError):  # without a nameserver no console can be reached
             listing = await self.bus.ask(
                 NAMESERVER, ListComponents(subsystem=Subsystem.UI_CONSOLE), Components, within_s=LISTING_TIME_S
@@ -307,7 +307,7 @@ class Launcher(Component[NoParameters]):
             await asyncio.gather(*stops, return_exceptions=True)
 
     async def _stop_mission(self) -> None:
-        """Stop behaviors first, which stop their children, then the remaining ARCs, then hardware."""
+        """Stop behaviors first (each stops its children), then the remaining ARCs, then hardware."""
         description = self._tree.description
         hardware = [r.name for r in description.resources] + [c.name for c in description.components]
         if self._last.name:
@@ -335,7 +335,7 @@ class Launcher(Component[NoParameters]):
         self.outcome.ended.append(ProcessEnded(name, ended.by, 0))
 
     async def _stop_other_hosts(self) -> None:
-        """Ask the other machines to end their creators, and wait; a silent machine ends its creator by itself."""
+        """Ask the other machines to end their creators, and wait; an unreachable machine ends its creator by itself."""
         stops = (
             self.bus.ask(offer, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
             for offer in self._others.offering

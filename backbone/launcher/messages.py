@@ -30,8 +30,8 @@ class AddBranch(Message, frozen=True):
     """Add a branch to the running tree.
 
     Attributes:
-        version: Version of the tree that the operator saw. So it is in each change.
-        parent: The behavior below which it comes; the mission's name: it is a root.
+        version: Version of the tree that the operator saw; each change carries it.
+        parent: The new parent behavior; the mission's name: the branch becomes a root.
         branch: Its XML: one ``<behavior>`` with all that is in it.
         source: Name of the branch's file, for faults.
         place: Its number among its siblings, from 1; 0: the last.
@@ -45,17 +45,17 @@ class AddBranch(Message, frozen=True):
 
 
 class RemoveBranch(Message, frozen=True):
-    """End a behavior and all below it, and take them out of the tree."""
+    """End a behavior and its descendants, and remove them from the tree."""
 
     version: Count
     name: Mention
 
 
 class MoveBranch(Message, frozen=True):
-    """Put a branch elsewhere.
+    """Move a branch.
 
-    Below its present parent it only changes its place among its siblings. Below another parent it ends and begins anew
-    there, because its path changes.
+    Below the same parent, only its place among its siblings changes. Below another parent, the branch ends and starts
+    again there, because its path changes.
 
     Attributes:
         place: As in ``AddBranch``.
@@ -68,7 +68,7 @@ class MoveBranch(Message, frozen=True):
 
 
 class ReplaceBranch(Message, frozen=True):
-    """End a behavior and all below it; another branch begins in its place.
+    """End a behavior and its descendants; another branch starts in its place.
 
     Attributes:
         branch: As in ``AddBranch``.
@@ -99,11 +99,11 @@ TreeChange = AddBranch | RemoveBranch | MoveBranch | ReplaceBranch | SetInTree
 
 
 class TreeChanged(Message, frozen=True):
-    """Answer to a change: the tree is as ordered.
+    """Answer to a change: the tree is changed as ordered.
 
     Attributes:
-        version: Its version from now on.
-        remarks: What an operator should know, one line each.
+        version: The new version of the tree.
+        remarks: Further effects, for the operator, one line each.
     """
 
     version: Count
@@ -111,17 +111,17 @@ class TreeChanged(Message, frozen=True):
 
 
 class TreeChangedMeanwhile(Refusal):
-    """The tree has changed since the operator saw it; nothing is changed."""
+    """The tree has changed since the operator read it; this change had no effect."""
 
     code = "tree.changed_meanwhile"
-    remedy = "Look at it again with 'scout-backbone tree', then decide anew."
+    remedy = "Read the tree again with 'scout-backbone tree', then decide again."
 
 
 class TreeInvalid(Refusal):
-    """With this change the mission file would be wrong; nothing is changed. The detail has each fault on a line."""
+    """This change would make the mission file invalid; nothing is changed. The detail has one fault a line."""
 
     code = "tree.invalid"
-    remedy = "Mend the faults; the mission runs on as it was."
+    remedy = "Correct the faults; the mission runs on unchanged."
 
 
 class UnknownBehavior(Refusal):
@@ -132,7 +132,7 @@ class UnknownBehavior(Refusal):
 
 
 class NotUpYet(Refusal):
-    """The mission is coming up, or is ending; its tree is not changed meanwhile."""
+    """The mission is coming up or ending; its tree cannot be changed now."""
 
     code = "tree.not_up"
     remedy = "Try again when 'scout-backbone status' shows the mission."
@@ -143,9 +143,9 @@ class TakeBranch(Message, frozen=True):
     """The tree has changed at or around a behavior. The behavior ends the children that it no longer has.
 
     Attributes:
-        version: Of the tree; a behavior that has heard of a later one changes nothing.
-        place: Its parameters ``path``, ``arc`` and ``children`` from now on.
-        anew: Names of children that end and begin anew, because they are other ones now.
+        version: Version of the tree; a behavior that knows a later version changes nothing.
+        place: The new values of its parameters ``path``, ``arc`` and ``children``.
+        anew: Names of children that end and start again, because their declarations are new.
     """
 
     version: Count
@@ -154,10 +154,10 @@ class TakeBranch(Message, frozen=True):
 
 
 class BranchTaken(Message, frozen=True):
-    """Answer to ``TakeBranch``: children that are gone have ended.
+    """Answer to ``TakeBranch``: the removed children have ended.
 
     Attributes:
-        finished: The behavior's final status, if it has one: then it starts no children. Empty: it is at work.
+        finished: The behavior's final status; a finished behavior starts no children. Empty: it runs.
     """
 
     finished: Mention = ""

@@ -1,7 +1,7 @@
 """Connection to a mission that is up: by name on this machine, or by its hub's endpoint.
 
-A process on the machine of the launcher computes the mission's time from the monotonic clock of that machine. On
-another machine it asks the nameserver and assumes that question and answer took equally long.
+On the launcher's machine, a process computes the mission's time from the monotonic clock of that machine. On
+another machine, it asks the nameserver and assumes that question and answer took equally long.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ async def connected(
         mission: Name; may be None if exactly one mission is up on this machine.
         endpoint: Endpoint of a hub on another machine; needs the mission's name.
         source: Address of this client, which every envelope carries.
-        secret: Secret of the mission; empty: the hub asks for none.
+        secret: Secret of the mission; empty: the hub requires none.
 
     Raises:
         MissionNotUp: No mission of this name is up on this machine.

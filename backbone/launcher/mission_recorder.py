@@ -1,7 +1,7 @@
-"""The recorder of a mission, or of one of its hosts, that was told to ``--record``: a process of its own.
+"""The recorder of a mission, or of one of its hosts, that was started with ``--record``: a process of its own.
 
-It begins before the first component and ends after the last. If it ends early, the recording goes on in a further file;
-if its file can grow no more, it is absent with the reason. If it hangs, it is absent until it responds again.
+It begins before the first component and ends after the last. If it ends early, the recording continues in a further
+file. If its file cannot grow, it is absent with the reason. If it hangs, it is absent until it responds again.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from backbone.launcher.recorder_signs import watch
 from backbone.mission.model import MissionDescription
 
 BEGUN_WITHIN_S = 20.0  # chosen: as long as a component has to become ready
-ENDED_WITHIN_S = 10.0  # chosen: it writes the index of an hour in less than a second
-AGAIN_AFTER_S = 1.0  # chosen: what killed it may be over; seconds of the machine
+ENDED_WITHIN_S = 10.0  # chosen: writing the index of an hour takes less than a second
+AGAIN_AFTER_S = 1.0  # chosen: the cause of its end may be over by then; seconds of the machine
 NAME = "recorder"
 
 log = logging.getLogger(__name__)
@@ -41,10 +41,10 @@ class RecorderFailed(Refusal):
 
 
 def require_new(path: Path) -> None:
-    """Return if a recording can begin in this file.
+    """Return if a recording can begin in this file, else raise.
 
     Raises:
-        RecorderFailed: It exists, or this user may not write in its folder.
+        RecorderFailed: The file exists, or this user may not write in its folder.
     """
     if path.exists():
         raise RecorderFailed(f"{path} exists")
@@ -53,7 +53,7 @@ def require_new(path: Path) -> None:
 
 
 def first_free(path: Path) -> Path:
-    """Return the first name of a series of recordings that no file has: ``night.mcap``, ``night-2.mcap`` and so on."""
+    """Return the first unused name in a series of recordings: ``night.mcap``, ``night-2.mcap`` and so on."""
     numbered = (path.with_stem(f"{path.stem}-{number}") for number in itertools.count(2))
     return next(each for each in itertools.chain((path,), numbered) if not each.exists())
 
@@ -61,7 +61,7 @@ def first_free(path: Path) -> Path:
 def recorder_of_mission(
     description: MissionDescription, text: bytes, path: Path, clock: Clock, run_directory: str
 ) -> MissionRecorder:
-    """Return the recorder beside the launcher; it records the pictures of this host alone.
+    """Return the recorder on the launcher's host; of all pictures, it records only those of this host.
 
     Args:
         text: The mission file.
@@ -75,13 +75,13 @@ class MissionRecorder:
     """Keeps one recorder running.
 
     Args:
-        mission: Its name.
-        path: Of the recording; the first free name of its series is used.
+        mission: Name of the mission.
+        path: File of the recording; the first unused name of its series is used.
         options: Further options of the command ``record``.
-        facts: What it reads from standard input.
+        facts: The facts of the mission, which the recorder reads from standard input.
 
     Attributes:
-        on_changed: Called with one line for people when the recorder was lost, or goes on.
+        on_changed: Called with one line for people when the recorder was lost, or records again.
     """
 
     def __init__(self, mission: str, path: Path, clock: Clock, options: Sequence[str], facts: bytes = b"") -> None:
@@ -101,7 +101,7 @@ class MissionRecorder:
         """Start the recorder; return when it listens.
 
         Raises:
-            RecorderFailed: It did not begin; the detail says why.
+            RecorderFailed: The recorder did not begin; the detail has the reason.
         """
         path = first_free(self._path)
         command = ["-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
@@ -126,7 +126,7 @@ class MissionRecorder:
         self._watching = asyncio.create_task(watch(process.stdout, self._silent), name="whether the recorder responds")
 
     async def keep(self) -> None:
-        """Start the recorder again whenever it ended, until cancelled."""
+        """Start the recorder again whenever it has ended, until cancelled."""
         while self._process is not None:
             process, last = self._process, await self._ended()
             if process.returncode == ExitCode.REFUSED:
@@ -143,13 +143,13 @@ class MissionRecorder:
             self.on_changed("the recording goes on")
 
     async def end(self) -> None:
-        """End the recorder once its file is whole. Idempotent."""
+        """End the recorder after its file is complete. Idempotent."""
         process = self._process
         if process is None:
             return
         with suppress(ProcessLookupError):
             process.terminate()
-            process.send_signal(signal.SIGCONT)  # one that was paused can end its file, too
+            process.send_signal(signal.SIGCONT)  # a paused recorder can then complete its file, too
         try:
             async with asyncio.timeout(ENDED_WITHIN_S):
                 await self._ended()
@@ -162,7 +162,7 @@ class MissionRecorder:
     async def _tell_facts(self, process: Process) -> str:
         """Write the facts of the mission to the recorder; return the first line that the recorder prints.
 
-        Without facts the recorder's input stays open. When this process ends, the input ends, and the recorder with it.
+        Without facts the recorder's input stays open. When this process ends, that input closes, and the recorder ends.
         """
         assert process.stdin is not None and process.stderr is not None  # noqa: S101, PT018  both are pipes
         if self._facts:
@@ -199,7 +199,7 @@ class MissionRecorder:
 
 
 async def _last_line(process: Process) -> str:
-    """Return the last line that the process says, when it has ended."""
+    """Wait for the end of the process; return the last line that it printed."""
     assert process.stderr is not None  # noqa: S101  a pipe
     last = ""
     async for line in process.stderr:

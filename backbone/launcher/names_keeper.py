@@ -1,4 +1,4 @@
-"""Names keeper: the launcher keeps the file of the mission's names, from which shells complete."""
+"""Names keeper: the launcher maintains the file of the mission's names, which shells use for completion."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
-WRITE_EVERY_S = 0.5  # chosen: a person types no name of a component sooner; seconds of the machine
-LIST_AGAIN_S = 10.0  # chosen: a person who signs in, or a message that was lost, is caught up with soon
+WRITE_EVERY_S = 0.5  # chosen: no person types the name of a new component sooner; seconds of the machine
+LIST_AGAIN_S = 10.0  # chosen: soon enough to add an operator who signed in, or a name whose message was lost
 
 
 class NamesKeeper:
-    """Listens to components, asks the RC manager for its RCs, and writes the names whenever they have changed.
+    """Subscribes to components, asks the RC manager for its RCs, and writes the names after each change.
 
     Args:
-        bus: Of the launcher.
-        clock: The mission's.
+        bus: Bus of the launcher.
+        clock: The mission's clock.
         directory: The run folder.
     """
 
@@ -47,7 +47,7 @@ class NamesKeeper:
         self._has_old_schedule = True
 
     async def run(self) -> None:
-        """Keep the file until cancelled; at most one write in ``WRITE_EVERY_S``."""
+        """Keep the file up to date until cancelled; write at most once in ``WRITE_EVERY_S``."""
         hearing = [
             self._bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard),
             self._bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard),
@@ -80,7 +80,7 @@ class NamesKeeper:
             await self._clock.sleep_s(LIST_AGAIN_S * self._clock.rate)
 
     async def _ask_schedule(self) -> None:
-        """Ask once after components came and went: RCs change no sooner, and the schedule changes all the time."""
+        """Ask once after components came or went: RCs change only then, but the schedule changes all the time."""
         self._has_old_schedule = False
         try:
             schedule = await self._bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=LOOK_TIME_S)
@@ -108,6 +108,6 @@ class NamesKeeper:
         try:
             run_names.write(self._directory, names)
             self._written = names
-        except OSError as error:  # shells ask the mission then
+        except OSError as error:  # shells then ask the mission itself
             log.info("the names are not written: %s", error)
             self._written = None

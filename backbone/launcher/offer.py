@@ -39,11 +39,11 @@ from backbone.waiting import set_within
 from backbone.wire import Accepts, Envelope, Message
 
 OFFER_TYPE = "offer"
-CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease), a killed hub at once and is back within 3 s
+CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease); a killed hub shows at once and is back within 3 s
 SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, over a slow link by 0.1 s
 ASK_AGAIN_S = 0.1  # chosen: the nameserver answers that soon after the hub listens
 PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s
-DIAL_TIME_S = 3.0  # chosen: longer than a lost first packet takes to be repeated
+DIAL_TIME_S = 3.0  # chosen: longer than the retransmission of a lost first packet takes
 
 
 class Ending(StrEnum):
@@ -135,7 +135,7 @@ class MachineOffer(Component[NoParameters]):
             self._link_fell.set()  # stays set until the offer has examined it, even if the link is back at once
 
     async def _is_other_time(self) -> bool:
-        """Compare the clocks. The nameserver may answer a moment after the link to its hub is up."""
+        """Compare the clocks, retrying because the nameserver may answer a moment after the link is up."""
         while self._link_up.is_set():
             try:
                 again = await mission_clock(self.bus)
@@ -151,7 +151,7 @@ class MachineOffer(Component[NoParameters]):
 
 
 class Offering:
-    """Offers a machine again after every lost link. Use it inside one event loop.
+    """Offers a machine again after each lost link. Use it inside one event loop.
 
     Args:
         say: Called with lines for the person at the terminal.

@@ -1,4 +1,4 @@
-"""The machines of a mission besides its first, and which of them have a creator in the mission.
+"""The machines of a mission except its first, and whether each has a creator in the mission.
 
 Pure: liveliness tokens go in, absences come out. This file starts no machine: a person or the machine's own service
 manager runs the command on a missing machine.
@@ -24,7 +24,7 @@ def endpoint_for_others(description: MissionDescription) -> str:
 
 
 def command_on(host: Host, description: MissionDescription, record: Path | None = None) -> str:
-    """Return the command that offers this machine to the mission; the file ``secret`` is a copy of the mission's.
+    """Return the command that offers this machine; the file ``secret`` is a copy of the mission's secret.
 
     Args:
         record: Recording of the mission on its first host; None: it is not recorded.
@@ -45,7 +45,7 @@ class OtherHosts:
     """The other machines of a mission, present or missing.
 
     Args:
-        now_s: Mission time from which on they count as missing.
+        now_s: Mission time since which they count as missing.
         record: Recording of the mission on its first host; None: it is not recorded.
     """
 

@@ -26,7 +26,7 @@ class PortTaken(Refusal):
 
 
 def refuse_if_up(mission: str) -> None:
-    """Return if no mission of this name runs on this machine.
+    """Return if no mission of this name runs on this machine, else raise.
 
     Raises:
         MissionAlreadyUp: A mission of this name runs.
@@ -36,12 +36,12 @@ def refuse_if_up(mission: str) -> None:
     except run_files.MissionNotUp:
         return
     raise MissionAlreadyUp(
-        f"mission {mission} is up since before, launcher process {running.launcher_pid}", pid=running.launcher_pid
+        f"mission {mission} is up already, launcher process {running.launcher_pid}", pid=running.launcher_pid
     )
 
 
 def prepare_endpoint(description: MissionDescription, directory: Path) -> str:
-    """Return the endpoint of the hub on this machine; if the mission has other machines, their secret lies beside it.
+    """Return the endpoint of the hub on this machine; if the mission has other machines, write their secret beside it.
 
     Each run has a new secret, so that components of an earlier run cannot reach this one.
 
@@ -58,7 +58,7 @@ def prepare_endpoint(description: MissionDescription, directory: Path) -> str:
 
 
 def _refuse_taken_port(host: Host) -> None:
-    """Return if a hub can listen at the host's address and port.
+    """Return if a hub can listen at the host's address and port, else raise.
 
     Raises:
         PortTaken: The port is in use, or the address is not this machine's.

@@ -1,7 +1,8 @@
-"""Beats of a recorder that a person began, to the launcher of the mission.
+"""Beats that a recorder sends to the launcher of the mission, if a person started the recorder.
 
-No process watches such a recorder, unlike one of ``up --record`` (``recorder_signs``). So it raises a claim to its
-address, publishes a beat at its begin and after a flush each second, and a last one when its file is whole.
+No process watches such a recorder, unlike one of ``up --record`` (``recorder_signs``). Therefore it raises a claim to
+its address. It publishes a beat at its begin and after each flush (once a second), and a last one when its file is
+complete.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ from backbone.ranges import Line, Mention, Pid
 from backbone.wire import Message
 
 NAME_BEGIN = "recorder-"
-BEAT_EACH_S = 1.0  # chosen: named within seconds, and a small message each second costs nothing
+BEAT_EACH_S = 1.0  # chosen: a hung recorder is reported within seconds, and a small message each second costs nothing
 
 
 class RecorderBeat(Message, frozen=True):
     """A recorder begins, or has flushed its file; published under ``Conversation.BEAT``.
 
     Attributes:
-        host: Its machine, as the system names it.
-        pid: Its process there.
+        host: Host name of its machine.
+        pid: Process id on that machine.
         file: The first file of its recording, for people.
-        is_last: True if the recording is whole and the recorder ends.
+        is_last: True if the recording is complete and the recorder ends.
     """
 
     host: Mention
@@ -43,10 +44,10 @@ def address_of_recorder() -> str:
 
 
 class RecorderBeats:
-    """Publishes the beats of one recorder; its claim stands from now on.
+    """Publishes the beats of one recorder; its claim exists from now on.
 
     Args:
-        bus: Of the recorder; the claim falls when it is closed, or when the process dies.
+        bus: Bus of the recorder; the claim falls when the bus is closed, or when the process dies.
     """
 
     def __init__(self, bus: Bus, file: Path) -> None:
@@ -56,14 +57,14 @@ class RecorderBeats:
         self.give()
 
     def give(self) -> None:
-        """Publish a beat, if the last one is ``BEAT_EACH_S`` ago."""
+        """Publish a beat if the last one is at least ``BEAT_EACH_S`` old."""
         now_s = time.monotonic()
         if now_s >= self._next_s:
             self._next_s = now_s + BEAT_EACH_S
             self._publish()
 
     def end(self) -> None:
-        """Publish that the recording is whole."""
+        """Publish that the recording is complete."""
         self._publish(is_last=True)
 
     def _publish(self, *, is_last: bool = False) -> None:

@@ -1,6 +1,6 @@
-"""Signs of life of a recorder to the process that started it: lines on its standard output, which show nothing else.
+"""Signs of life of a recorder to the process that started it: lines on its standard output, which has no other use.
 
-A recorder gives one after a flush. If its event loop, its disc or its process hangs, none comes.
+A recorder prints one after a flush. If its event loop, its disc or its process hangs, it prints none.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
-EACH_S = 1.0  # chosen: named within seconds, and a line each second costs nothing
-LATE_S = 1.5  # chosen: half of a second more, for a busy machine
-MOST_LATE = 2  # chosen: a watcher that stood still itself finds one line late, and the next in time
+EACH_S = 1.0  # chosen: a hung recorder is reported within seconds, and a line each second costs nothing
+LATE_S = 1.5  # chosen: half a second more than the interval, for a busy machine
+MOST_LATE = 2  # chosen: a watcher that was paused itself sees one late line, and the next in time
 
 
 class RecorderSigns:
-    """Gives them. Never blocks, and does nothing when no process reads them any more."""
+    """Prints the signs. Never blocks, and does nothing when no process reads them any more."""
 
     def __init__(self) -> None:
         self._number, self._next_s = sys.stdout.fileno(), 0.0
         os.set_blocking(self._number, False)
 
     def give(self) -> None:
-        """Give a sign, if the last one is ``EACH_S`` ago."""
+        """Print a sign if the last one is at least ``EACH_S`` old."""
         now_s = time.monotonic()
         if now_s >= self._next_s:
             self._next_s = now_s + EACH_S

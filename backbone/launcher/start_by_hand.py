@@ -1,7 +1,7 @@
 """``start``: completes an operator's order with the mission file's declaration of the component.
 
-An RC that the file does not declare is completed with the declaration of another resource of its type: driver, sharing
-and links. Its own parameters (an address, a channel) are the operator's.
+If the file does not declare an RC, the declaration of another resource of its type completes it: driver, sharing and
+links. The operator gives the RC's own parameters (an address, a channel).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from backbone.dependency_database.messages import AskResources, Resource, Resour
 from backbone.errors import Refusal
 from backbone.placer.messages import Start
 
-REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
+REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 
 
 class OtherType(Refusal):

@@ -1,11 +1,11 @@
-"""Tree changes: what an operator's change of the behavior tree makes of the mission file, and of each behavior. Pure.
+"""Tree changes: how an operator's change of the behavior tree changes the mission file and each behavior. Pure.
 
 Rules of this file:
 
-* The change is made in the text of the mission file, which is then read and checked as any other; so a tree that
-  changed while it ran is always one that could have been brought up so.
+* The change is made in the text of the mission file, which is then read and checked as any other. Therefore a changed
+  tree is always a tree with which the mission could have come up.
 * A behavior *stays* if it has the same parent as before and its parent stays. The launcher sends it its new
-  place, and it keeps its process. Every other running behavior ends, and starts as the file now has it.
+  place, and it keeps its process. Every other running behavior ends, and starts as the file now declares it.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ PRIORITY, RUN_TIMES = "priority", ("minimum_runtime_s", "maximum_runtime_s")
 # ---------------------------------------------------------------------- the text
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """A branch as its own file has it.
+    """A branch as written in its own file.
 
     Attributes:
-        text: What the file holds.
-        source: Its name, for faults.
+        text: Content of the file.
+        source: Name of the file, for faults.
         root: Its ``<behavior>``.
     """
 
@@ -54,7 +54,7 @@ class Branch:
 
     @property
     def name(self) -> str:
-        """Name of its behavior."""
+        """Name of the root behavior."""
         return self.root.text("name")
 
 
@@ -63,9 +63,9 @@ class EditedFile:
     """The text of the mission file after a change.
 
     Attributes:
-        text: All of it.
-        anew: Names of behaviors that are other ones now, although the tree had such names.
-        branch: What came in; None: nothing.
+        text: Content of the whole file.
+        anew: Names of behaviors that start again although the tree had such names, because their declarations are new.
+        branch: The added branch; None: no branch was added.
     """
 
     text: bytes
@@ -73,7 +73,7 @@ class EditedFile:
     branch: Branch | None = None
 
     def invalid(self, faults: Sequence[Fault]) -> TreeInvalid:
-        """Return the refusal of this change; a fault in the new branch is named where its own file has it."""
+        """Return the refusal of this change; a fault in the new branch has its place in the branch's own file."""
         return TreeInvalid("\n".join(map(str, map(self._named, faults))), faults=len(faults))
 
     def _named(self, fault: Fault) -> Fault:
@@ -97,7 +97,7 @@ def changed(text: bytes, change: TreeChange) -> EditedFile:
 
     Raises:
         UnknownBehavior: The tree has no behavior of this name.
-        EditRefused: It cannot be written so.
+        EditRefused: The file cannot be changed so.
         TreeInvalid: The branch is no ``<behavior>``.
     """
     match change:
@@ -124,10 +124,10 @@ def changed(text: bytes, change: TreeChange) -> EditedFile:
 
 
 def written(name: str, parameter: str, value: object) -> str:
-    """Return a value as a mission file has it.
+    """Return a value as written in a mission file.
 
     Raises:
-        TreeInvalid: It is no text, number, true or false.
+        TreeInvalid: The value is not text, a number, true or false.
     """
     if isinstance(value, str):
         return value
@@ -184,7 +184,7 @@ def _path_of(whole: Element, name: str) -> Path:
 
 
 def _number(parent: Element, place: int, without: Path | None = None) -> int:
-    """Return the number among all elements of the parent, once one is taken out, of a place among its behaviors."""
+    """Convert a place among the behaviors of the parent to a place among all its elements, with ``without`` removed."""
     children = [child for child in parent.children if child.path != without]
     numbers = [number for number, child in enumerate(children) if child.tag == BEHAVIOR]
     if 0 < place <= len(numbers):
@@ -195,12 +195,12 @@ def _number(parent: Element, place: int, without: Path | None = None) -> int:
 # ---------------------------------------------------------------------- what follows
 @dataclass(frozen=True, slots=True)
 class NewPlace:
-    """A behavior that stays and has another place.
+    """A behavior that stays and changes its place.
 
     Attributes:
         order: The order that starts it from now on.
-        anew: Its children that begin anew.
-        gone: Its children that it has no more.
+        anew: Its children that end and start again.
+        gone: Its former children.
     """
 
     order: Start
@@ -210,13 +210,13 @@ class NewPlace:
 
 @dataclass(frozen=True, slots=True)
 class Consequences:
-    """What follows from a changed tree.
+    """The actions that a changed tree requires.
 
     Attributes:
         ended: Roots that end.
-        begun: Orders of the roots that begin.
-        told: Behaviors that stay and have another place, parents before their children.
-        priorities: Name → priority, where it is new or another one.
+        begun: Orders of the roots that start.
+        told: Behaviors that stay and change their place, parents before their children.
+        priorities: Name → priority, for each new or changed priority.
     """
 
     ended: list[str]
@@ -234,10 +234,10 @@ class _Known:
 
 
 def consequences(old: MissionDescription, new: MissionDescription, anew: Collection[str]) -> Consequences:
-    """Return what follows when the tree of a mission is another one.
+    """Return the actions that lead from the old tree to the new one.
 
     Args:
-        anew: Names of behaviors that are other ones now.
+        anew: Names of behaviors that start again, because their declarations are new.
     """
     before, after = _nodes(old), _nodes(new)
     stay: dict[str, bool] = {"": True}

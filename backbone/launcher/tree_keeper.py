@@ -1,7 +1,7 @@
-"""TreeKeeper: owns the behavior tree of a running mission, and has the mission follow its changes.
+"""TreeKeeper: owns the behavior tree of a running mission, and applies changes of the tree to the mission.
 
-Rule of this file: a change is checked as a whole and then carried out; what is refused changed nothing. Who cannot be
-reached meanwhile hears of it as soon as it is back, because each behavior that appears is told of its place.
+Rule of this file: a change is checked as a whole and then carried out. A refused change changes nothing. If a behavior
+cannot be reached during the change, it gets its new place as soon as it appears again.
 """
 
 from __future__ import annotations
@@ -65,17 +65,17 @@ AGAIN_AFTER_S = 0.2  # chosen: a restarted behavior is back within one or two of
 
 
 class TreeKeeper:
-    """Answers questions about the tree and carries its changes out.
+    """Answers questions about the tree and carries out its changes.
 
     Args:
         bus: Bus of the launcher.
         clock: The mission's clock.
         description: The mission as it came up.
-        text: What its file holds.
+        text: Content of its mission file.
         begin_root: Keeps a root running from now on; returns when it runs, or raises the refusal of its first start.
-        leave_root: Keeps a root running no longer.
+        leave_root: Stops keeping a root running.
         begin: Runs work as a task of the launcher.
-        note: Subject, event → the story.
+        note: Writes an event to the story; arguments: subject, event.
     """
 
     def __init__(
@@ -91,9 +91,9 @@ class TreeKeeper:
         note: Callable[[str, str], object],
     ) -> None:
         self.description = description
-        """The mission as it is now."""
+        """The mission with all changes."""
         self.text = text
-        """Its file as it is now."""
+        """Its mission file with all changes."""
         self.version = 0
         """Number of changes since it came up."""
         self._orders_of: MissionDescription | None = None
@@ -103,14 +103,14 @@ class TreeKeeper:
         self._one_at_a_time = asyncio.Lock()
         self._alive: set[str] = set()
         self._moved: set[str] = set()  # behaviors whose place has changed since the mission came up
-        self._owed: dict[str, set[str]] = {}  # behavior → children that begin anew as soon as it hears of it
+        self._owed: dict[str, set[str]] = {}  # behavior → children that it must start again, but has not yet
 
     def watch(self) -> None:
-        """From now on tell each behavior that appears of its place, if that has changed."""
+        """From now on send each behavior that appears its place, if that has changed."""
         self._bus.watch_alive(f"{Subsystem.MISSION_CONTROL}/*", self._token_changed)
 
     def tree(self) -> Tree:
-        """Return the tree as it is now."""
+        """Return the present tree."""
         return Tree(self.version, self.text.decode())
 
     def newest(self, order: Start) -> Start:
@@ -121,10 +121,10 @@ class TreeKeeper:
         """Change the tree and return its new version.
 
         Args:
-            user: Address of who asks.
+            user: Address of the operator.
 
         Raises:
-            Refusal: Nothing is changed.
+            Refusal: The change is refused; nothing is changed.
         """
         async with self._one_at_a_time:
             return await self._change(change, user)
@@ -153,7 +153,7 @@ class TreeKeeper:
             self._owed.setdefault(told.order.name, set()).update(told.anew)
         try:
             remarks = await self._carry_out(follows, insists=not isinstance(change, AddBranch))
-        except Refusal:  # of the start of a new root, before which nothing else was done
+        except Refusal:  # the start of a new root was refused; it is the first action of its change
             self.description, self.text, self.version = before
             raise
         self._note(self.description.name, f"{user} changed the tree, which has version {self.version} now")
@@ -167,13 +167,13 @@ class TreeKeeper:
             raise edited.invalid(invalid.faults) from None
 
     async def _carry_out(self, follows: Consequences, *, insists: bool) -> list[str]:
-        """End what is gone, begin what is new, and tell those that stay; return what an operator should know.
+        """End removed branches, start new ones, and inform those that stay; return remarks for the operator.
 
         Args:
-            insists: True: a root that is not started at once stays wanted, and is absent meanwhile.
+            insists: True: if a root does not start at once, it stays wanted and counts as absent.
 
         Raises:
-            Refusal: A new root was not started; there is no such wish then.
+            Refusal: A new root did not start; it is not wanted then.
         """
         await asyncio.gather(*(self._revise(told.order) for told in follows.told))
         remarks = [await self._tell(told) for told in follows.told if told.gone]
@@ -202,7 +202,7 @@ class TreeKeeper:
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
 
     async def _end(self, name: str) -> str:
-        """End a branch that the tree has no more, also if its parent cannot; return what an operator should know."""
+        """End a removed branch, even if its parent cannot; return a remark for the operator."""
         try:
             async with asyncio.timeout(ENDS_WITHIN_S):
                 await self._end_until_ended(name)
@@ -217,24 +217,24 @@ class TreeKeeper:
                 await self._bus.ask(PLACER, StopComponent(name, "it left the tree"), Ended, within_s=ENDS_WITHIN_S)
             except (LinkError, CreatorSilent) as error:
                 log.info("%s is not ended yet: %s", name, error)
-            except Refusal:  # the placer does not have it: its parent has ended it
+            except Refusal:  # the component is not placed, because its parent has ended it
                 return
             else:
                 return
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
 
-    # ------------------------------------------------------------------ those that stay
+    # ------------------------------------------------------------------ behaviors that stay
     async def _revise(self, order: Start) -> None:
-        """Have its next life begin with the new order; a component that is not placed gets it from its parent."""
+        """Make its next start use the new order; the parent starts a component that is not placed."""
         try:
             await self._ask(PLACER, ReviseStart(order.name, order.parameters), StartRevised)
         except NotPlaced:
             return
-        except (LinkError, Refusal) as error:  # its next life hears of its place when it appears
+        except (LinkError, Refusal) as error:  # when it appears again, it gets its place
             log.warning("%s: its order is not revised: %s", order.name, error)
 
     async def _tell(self, told: NewPlace) -> str:
-        """Tell a behavior that runs of its place; return what an operator should know."""
+        """Send a running behavior its place; return a remark for the operator."""
         name = told.order.name
         try:
             async with asyncio.timeout(ENDS_WITHIN_S):
@@ -247,7 +247,7 @@ class TreeKeeper:
         await self._tell_until_noted(name)
 
     async def _tell_until_noted(self, name: str) -> str:
-        """Return when the behavior has taken its place, or does not run."""
+        """Return when the behavior has accepted its place, or does not run."""
         at = address(Subsystem.MISSION_CONTROL, name)
         while at in self._alive and (order := self._orders_now().get(name)) is not None:
             owed = self._owed.get(name, set())
@@ -275,12 +275,12 @@ class TreeKeeper:
 
     # ------------------------------------------------------------------ values
     async def _set(self, change: SetInTree, user: str) -> None:
-        """Give the value to who uses it now: a run time to the ARC, a parameter to the behavior.
+        """Send the value to its present user: a run time to the ARC, a parameter to the behavior.
 
         A priority goes to the RC manager with the other consequences.
 
         Raises:
-            Refusal: It does not take the value, or it is unknown whether it did.
+            Refusal: The component rejects the value, or the outcome is unknown.
         """
         name, parameter = change.name, change.parameter
         value = parameter_value(written(name, parameter, change.value))
@@ -302,11 +302,11 @@ class TreeKeeper:
         except UnknownRequest:
             return []
         except LinkError as error:
-            raise OutcomeUnknown(f"the RC manager does not say what {name} claims: {error}") from error
+            raise OutcomeUnknown(f"the RC manager does not answer what {name} claims: {error}") from error
         return [request.arc for request in found.requests if component_of(request.owner) == name]
 
     async def _number(self, name: str, priority: int) -> str:
-        """Set a priority as every operator does; return what an operator should know."""
+        """Set a priority as an operator does; return a remark for the operator."""
         try:
             await self._ask(RC_MANAGER, SetPriority(name, priority), Done)
         except LinkError as error:

@@ -1,7 +1,7 @@
-"""The pipe from a launcher in the background to the command that started it: talk, then one verdict.
+"""The pipe from a launcher in the background to the command that started it: messages, then one verdict.
 
-Rules of this file: each line is one JSON object. Any number of lines for people come first; the verdict, which
-carries the exit code of the command, is the last line. A pipe that ends without a verdict means that the launcher died.
+Rules of this file: each line is one JSON object. The lines for people come first, then the verdict with the exit code
+of the command as the last line. A pipe that ends without a verdict means that the launcher died.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Verdict(msgspec.Struct, frozen=True, tag="verdict"):
     """The launcher's verdict on the start.
 
     Attributes:
-        exit_code: 0: the mission is up and continues; else the exit code of a mission that ended.
+        exit_code: 0: the mission is up and continues; else the exit code of the failed mission.
     """
 
     exit_code: int
@@ -67,7 +67,7 @@ class VerdictPipe:
 
 
 def await_verdict(lines: Iterable[str], say: Callable[[str], None]) -> int | None:
-    """Say every line for people until the verdict comes, and return its exit code; None: the pipe ended without one.
+    """Pass every line for people to ``say`` until the verdict; return its exit code. None: the pipe has no verdict.
 
     Example:
         >>> await_verdict(['{"type":"talk","line":"comes up"}', '{"type":"verdict","exit_code":6}'], print)

@@ -1,4 +1,4 @@
-"""Wish keeper: the launcher keeps what the mission file wishes placed, from the first start on."""
+"""Wish keeper: from the first start on, the launcher keeps the components of the mission file running."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from backbone.placer.messages import NoHost, Placement, Start
 from backbone.placer.wishes import Wish, keep_placed
 from backbone.waiting import end_tasks
 
-MEET_TIME_S = 5.0  # chosen: the placer knows a creator milliseconds after its token rises, on a busy machine later
-MEET_EACH_S = 0.1  # chosen: too short to notice, and a hundred times the cost of a question
+MEET_TIME_S = 5.0  # chosen: the placer knows a creator milliseconds after its token appears, or later on a busy machine
+MEET_EACH_S = 0.1  # chosen: too short to notice, and a hundred times as long as a question takes
 
 
 class WishKeeper:
-    """The wishes for hardware, units and roots of the behavior tree, each with a loop that keeps it.
+    """The wishes for hardware, units and roots of the behavior tree, each with a loop that fulfills it.
 
     Args:
         launcher: Owns the wishes.
-        newest: Returns an order as it is in the present tree.
+        newest: Returns an order with its place in the present tree.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class WishKeeper:
         self._wishes: list[Wish] = []
         self._keeping: dict[str, asyncio.Task[None]] = {}
         self.awaited: set[str] = set()
-        """Names of the components that are wanted and were not placed yet."""
+        """Names of the wanted components that were not placed yet."""
 
     def absences(self) -> list[Absence]:
         """Return the components that are wanted and missing."""
@@ -56,16 +56,16 @@ class WishKeeper:
         await asyncio.gather(*map(self._begin_keeping, orders))
 
     def _begin_keeping(self, order: Start) -> asyncio.Future[None]:
-        """Keep the component running from now on; the result is there when it runs, or is its refusal."""
+        """Keep the component running from now on; the future resolves when it runs, or to the refusal of its start."""
         placed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._keeping[order.name] = self._launcher.start_task(self._keep(order, placed), f"keep {order.name}")
         return placed
 
     async def begin_root(self, order: Start) -> None:
-        """Start a root that came into the tree.
+        """Start a root that was added to the tree.
 
         Raises:
-            Refusal: It was not started, and is not wanted.
+            Refusal: The root did not start, and is not wanted.
         """
         try:
             await self._begin_keeping(order)
@@ -74,14 +74,14 @@ class WishKeeper:
             raise
 
     async def leave_root(self, name: str) -> None:
-        """Want a root no longer."""
+        """Stop keeping a root running."""
         if (keeping := self._keeping.pop(name, None)) is not None:
             await end_tasks(keeping)
         self.awaited.discard(name)
         self._launcher.changed()
 
     async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
-        """Keep one wish of the mission file; an order to stop suspends it until the component is started again."""
+        """Fulfill one wish of the mission file; an order to stop suspends it until the component is started again."""
 
         def now_placed(_placement: Placement, _was_there: bool) -> None:
             self.awaited.discard(order.name)
@@ -115,17 +115,17 @@ class WishKeeper:
         *,
         was_started: bool = False,
     ) -> str:
-        """Keep a component placed; return the reason of the order that stops it.
+        """Keep a component placed; return the reason of the order that stopped it.
 
         A refused first start is repeated while another machine is missing or is new to the placer.
 
         Args:
             at: Address of the component.
             on_placed: See ``keep_placed``.
-            was_started: It ran before.
+            was_started: True: the component ran before.
 
         Raises:
-            Refusal: It was not started.
+            Refusal: The component did not start.
         """
         bus, clock, changed = self._launcher.bus, self._launcher.clock, self._launcher.changed
         wish = Wish(order.name, started=was_started)

@@ -1,1 +1,1 @@
-"""Metrics: what a mission's schedule did so far, in numbers that only grow, for Prometheus."""
+"""Metrics: the history of a mission's schedule, as numbers that only grow, for Prometheus."""

@@ -1,4 +1,4 @@
-"""The page that Prometheus reads: the tally and the components' own numbers, named as Prometheus wants them."""
+"""The page that Prometheus reads: the tally and the components' own numbers, under names in Prometheus' style."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ ENDS = [*map(str, BUCKETS_S), "+Inf"]
 
 @dataclass(frozen=True)
 class Numbers:
-    """What the page shows.
+    """The content of the page.
 
     Attributes:
-        tally: Up to now.
-        utilization: RC → share of the last minute in which it was held, or of its capacity that was given out.
-        statistics: Component and name → what it counts and measures itself.
-        dropped: Messages that came faster than they could be counted.
+        tally: The tally, counted up to now.
+        utilization: RC → share of the last minute in which it was held; of a sharable RC, share of its capacity.
+        statistics: Component and name → its own count or measurement.
+        dropped: Number of messages that came too fast to be counted.
     """
 
     tally: Tally

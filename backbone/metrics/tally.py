@@ -2,10 +2,10 @@
 
 Rules of this file:
 
-* No number falls. Time is counted up to the newest instant that was heard of, and what is heard of an earlier one
-  changes only what follows.
-* An RC that is not sharable is held for no longer than the time that was watched.
-* A hold counts until its lease is over: if the RC manager is silent, nobody knows more.
+* No number decreases. Time is counted up to the newest known instant. News about an earlier instant changes only what
+  is counted afterwards.
+* An RC that is not sharable is held for no longer than the watched time.
+* A hold counts until its lease expires: while the RC manager is silent, nothing newer is known.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ class SwitchHistogram:
 
     Attributes:
         counts: Hand-overs by bucket; the last bucket has no upper end.
-        sum_s: Of all times.
+        sum_s: Sum of all times.
     """
 
     counts: list[int] = field(default_factory=lambda: [0] * (len(BUCKETS_S) + 1))
     sum_s: float = 0.0
 
     def add(self, lasted_s: float) -> None:
-        """Count a hand-over that took so long."""
+        """Count a hand-over of this duration."""
         self.counts[bisect_left(BUCKETS_S, lasted_s)] += 1
         self.sum_s += lasted_s
 
 
 class Tally:
-    """Counts from the first schedule and leases on.
+    """Counts from the first schedule and the first leases on.
 
     Attributes:
         watched_s: Mission time that was watched.
@@ -72,7 +72,7 @@ class Tally:
         self._revoked: dict[str, tuple[float, str]] = {}
 
     def take_schedule(self, schedule: Schedule) -> None:
-        """Count up to the time of this schedule, which holds from then on; an older one than the last says nothing."""
+        """Count up to the time of this schedule, which is valid from then on; ignore one older than the last."""
         if self._schedule is not None and schedule.at_s < self._schedule.at_s:
             return
         self.advance(schedule.at_s)
@@ -83,7 +83,7 @@ class Tally:
                 self.switches.setdefault(rc.rc, SwitchHistogram())
 
     def take_leases(self, leases: Leases, at_s: float) -> None:
-        """Take leases that were sent at this time: what the schedule says is known for their duration."""
+        """Apply leases that were sent at this time: for their duration, the schedule is known."""
         if self._schedule is None:
             return
         if self._now_s == float("-inf"):
@@ -92,7 +92,7 @@ class Tally:
         self._known_until_s = max(self._known_until_s, at_s + leases.lease_s)
 
     def take_line(self, line: Mapping[str, Any]) -> None:
-        """Take one line of the trace of the schedule."""
+        """Apply one line of the trace of the schedule."""
         match line:
             case {"ev": "revoke", "t": at_s, "arc": arc, "why": why}:
                 for rc in self._held_by(arc):
@@ -103,7 +103,7 @@ class Tally:
                     self._granted_to(rc, arc, epoch, at_s)
 
     def advance(self, now_s: float) -> None:
-        """Count up to this time; an earlier one than before changes nothing."""
+        """Count up to this time; a time before the last one changes nothing."""
         if self._schedule is None or now_s <= self._now_s or self._now_s == float("-inf"):
             return
         self.watched_s += now_s - self._now_s
@@ -123,7 +123,7 @@ class Tally:
         return [rc.rc for rc in rcs if any(holder.arc == arc for holder in rc.holders)]
 
     def _granted_to(self, rc: str, arc: str, epoch: int, at_s: float) -> None:
-        """Count a grant; a restarted RC manager tells those before its start again, under their old epochs."""
+        """Count a grant once; a restarted RC manager repeats the grants before its start with their old epochs."""
         if epoch <= self._granted.get((rc, arc), -1):
             return
         self._granted[rc, arc] = epoch

@@ -1,6 +1,6 @@
-"""MetricsWatch: hears the RC manager, and asks all components for their own numbers.
+"""MetricsWatch: overhears the RC manager, and asks all components for their own numbers.
 
-It overhears the RC manager alone, as a recorder does, so no component waits for it, and no other makes copies for it.
+It overhears only the RC manager, as a recorder does. So no component waits for it, and no other component sends copies.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ class MetricsWatch:
     """Watches a mission until ``run`` is cancelled.
 
     Args:
-        bus: Not closed.
+        bus: Bus of the mission; not closed.
 
     Attributes:
-        tally: Of all that was heard.
+        tally: The tally of all overheard messages.
         utilization: RC → share of the last minute.
         statistics: Component and name → its newest number.
     """
@@ -52,11 +52,11 @@ class MetricsWatch:
 
     @property
     def dropped(self) -> int:
-        """Messages that it had no time for."""
+        """Number of messages that were lost because the watch was too slow."""
         return self._subscribed.dropped
 
     async def run(self) -> None:
-        """Ask for numbers again and again."""
+        """Ask for numbers repeatedly."""
         while True:
             await self._ask()
             await self._clock.sleep_s(ASK_EACH_S * self._clock.rate)

@@ -1,1 +1,1 @@
-"""From mission.xml to a checked mission description."""
+"""Reads mission.xml, checks it, and returns the mission description."""

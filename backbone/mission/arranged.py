@@ -1,23 +1,23 @@
-"""The answer of the class that runs execution units to a mission's modules: are they connected, and how?"""
+"""How the class that runs execution units connects a mission's modules, or why it cannot connect them."""
 
 from __future__ import annotations
 
 import msgspec
 
-CLASS = "class"  # as a port: the fault is about the module's class
+CLASS = "class"  # as a port: the fault is in the module's class
 
 
 class UnitFault(msgspec.Struct, frozen=True):
-    """Something that does not fit.
+    """A fault in the connections of modules.
 
     Attributes:
-        unit: The unit that it is about; empty: see the module or the key.
-        module: The module that it is about.
+        unit: The faulty unit; empty: see the module or the key.
+        module: The faulty module.
         port: An input, output or parameter of the module, or ``CLASS``.
         given: A key that is given from outside.
         quality: A key whose quality is declared.
         message: A sentence with the names.
-        remedy: What to do.
+        remedy: How to correct the fault.
     """
 
     message: str
@@ -41,13 +41,13 @@ class Arranged(msgspec.Struct, frozen=True):
 
 
 class UnitsQuestion(msgspec.Struct, frozen=True):
-    """How are these units connected?
+    """A question to the class that runs units: how are these units connected?
 
     Attributes:
         class_path: The class that runs units.
-        units: Name, frequency, modules and so on of each, as its class reads them.
-        given: Key → class and source of what comes from outside.
-        qualities: Key → how its values travel, where it is not as for all outputs.
+        units: Name, frequency, modules and so on of each unit, in the form that the class reads.
+        given: Key → class and source of values that are given from outside.
+        qualities: Key → quality of its values, if it differs from the default for outputs.
     """
 
     class_path: str

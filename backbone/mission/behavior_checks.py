@@ -16,7 +16,7 @@ TRIES_AT_MOST = 100_000  # chosen: a third of a second; a set that fits is found
 
 
 def check_behaviors(tables: Tables, report: Report) -> None:
-    """Report what does not fit in the behavior tree."""
+    """Report every fault in the behavior tree."""
     of_one: dict[str, Element] = {}
     behavior_types = [
         known
@@ -100,9 +100,9 @@ def _check_runtime(behavior: Element, arc: Element, report: Report) -> None:
         )
 
 
-# ---------------------------------------------------------------------- what an ARC wishes and needs
+# ---------------------------------------------------------------------- wishes and needs of an ARC
 def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
-    """Report wishes that no resource can fulfil; return whether there is none."""
+    """Report wishes that no resource can fulfil; return whether all can be fulfilled."""
     kind, needs = arc.text("kind"), tables.needs(arc.text("kind"))
     wishes = arc.all("wish")
     check_unique(wishes, "type", "wish for type", report)
@@ -125,7 +125,9 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
             continue
         if not name and not features:
             report.fault(
-                wish.place, f"a wish for a {wanted} without name and features", "Say which one, or remove the wish"
+                wish.place,
+                f"a wish for a {wanted} without name and features",
+                "Add a name or features, or remove the wish",
             )
         candidates = [tables.resources[name]] if name else there
         if there and not any(_has(resource, features) for resource in candidates):
@@ -149,7 +151,7 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
 
 
 def _check_set(behavior: Element, arc: Element, tables: Tables, sets: _Sets, report: Report) -> None:
-    """Report a demand no sharable resource can serve, and resources that cannot be used together."""
+    """Report a demand that no sharable resource can serve, and resources that cannot be used together."""
     kinds = tables.needs(arc.text("kind"))
     needs = [role for role, kind in kinds.items() if tables.resources_of(kind)]
     wishes = {wish.text("type"): wish for wish in arc.all("wish")}
@@ -197,7 +199,7 @@ def _check_demand(behavior: Element, arc: Element, report: Report) -> float | No
 
 
 class _Sets:
-    """Looks for one resource of each role that can be used together, with so many tries for a whole file."""
+    """Searches for compatible resources, one of each role, with a limited number of tries for a whole file."""
 
     def __init__(self, tables: Tables) -> None:
         self._tables, self._tries_left = tables, TRIES_AT_MOST

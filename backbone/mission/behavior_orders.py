@@ -1,10 +1,10 @@
-"""From the behavior tree of a mission file to the orders that start its roots.
+"""Converts the behavior tree of a mission file to the orders that start its roots.
 
-A behavior is launched with its own parameters as the file gives them, and those of the tree:
-``path`` (from the mission's root to this node), ``arc`` (what it claims), ``children`` (whole
-nodes, which the behavior starts itself, by the same rule), for the root of the last branch alone
-``is_last``, and for one that a console ordered ``keeper`` (the console). Nothing here imports the mission's model
-at run time, so a behavior's process can apply the rule to its children without loading pydantic.
+A behavior starts with its own parameters from the file, and with those of the tree: ``path`` (from the mission's root
+to this node), ``arc`` (its claim), ``children`` (whole nodes, which the behavior starts itself, by the same rule). The
+root of the last branch also gets ``is_last``. A behavior that a console ordered also gets ``keeper`` (the console).
+Nothing here imports the mission's model at run time, so a behavior's process can apply the rule to its children without
+loading pydantic.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ PathStep = tuple[str, int]
 Node = Mapping[str, Any]
 """A node of the behavior tree as plain data, with the nodes below it."""
 PLACE_PARAMETERS = ("path", "arc", "children")
-"""What a change of the running tree may change of a behavior."""
+"""Parameters that a change of the running tree may set."""
 TREE_PARAMETERS = (*PLACE_PARAMETERS, "is_last", "keeper")
-"""What starts a behavior sets, and the mission file does not."""
+"""Parameters that the starter of a behavior sets, not the mission file."""
 
 
 class ReservedParameter(Refusal):
     """A behavior's own parameter has a name that belongs to the tree."""
 
     code = "mission.reserved_parameter"
-    remedy = f"Give the parameter another name; {', '.join(TREE_PARAMETERS)} are set by what starts a behavior."
+    remedy = f"Give the parameter another name; {', '.join(TREE_PARAMETERS)} are set when a behavior is started."
 
 
 def behavior_orders(description: MissionDescription) -> list[Start]:
     """Return the orders that start the roots of the tree, in the mission file's order.
 
     Raises:
-        ReservedParameter: A behavior, also one further down, has a parameter of a reserved name.
+        ReservedParameter: A behavior, at any depth, has a parameter with a reserved name.
     """
     top = [(description.name, description.priority)]
     return [behavior_order(_node(behavior), top) for behavior in description.behaviors]
@@ -50,7 +50,7 @@ def last_order(description: MissionDescription) -> Start | None:
     """Return the order that starts the last branch; None: the mission has none.
 
     Raises:
-        ReservedParameter: A behavior of it has a parameter of a reserved name.
+        ReservedParameter: A behavior of the branch has a parameter with a reserved name.
     """
     if description.last is None:
         return None

@@ -1,4 +1,4 @@
-"""Messages between a behavior and what keeps it running: its parent in the tree, or the console that ordered it."""
+"""Messages between a behavior and its keeper: its parent in the tree, or the console that ordered it."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class BehaviorStatus(StrEnum):
 
 
 class ChildReport(Message, frozen=True, tag="ChildReport/2"):
-    """Progress of a behavior, sent to its parent on each change, and again until the parent notes it.
+    """Progress of a behavior, sent to its parent on each change, and repeated until the parent confirms it.
 
-    A behavior that a console ordered sends it to that console, also without a change, several times a second.
+    A behavior that a console ordered sends it to that console, several times a second, even without a change.
 
     Attributes:
         status: Its status; a final one is sent once and never changes.
         payload: Data for the parent's decision: plain values only.
-        suspended_because: Why it is not at work, also before its first grant; empty: it is, or has finished.
+        suspended_because: Why it does not run, also before its first grant; empty: it runs, or has finished.
     """
 
     child: Mention
@@ -43,7 +43,7 @@ class ReportNoted(Message, frozen=True):
 
 
 class BreakOff(Message, frozen=True):
-    """A console asks the behavior of its order to bring the robot to rest and to do nothing more.
+    """A console orders a behavior to stop the robot and to give no more commands.
 
     Afterwards the behavior has failed, and keeps the robot until it is ended, so that no other behavior gets it
     before the operator.
@@ -51,4 +51,4 @@ class BreakOff(Message, frozen=True):
 
 
 class BrokenOff(Message, frozen=True):
-    """Answer to ``BreakOff``: it gives no commands any more."""
+    """Answer to ``BreakOff``: the behavior gives no more commands."""

@@ -1,7 +1,7 @@
 """Consistency checks of a mission file: hosts, core services, types, resources, names.
 
-Pure: elements in, faults out. Values that the schema has refused are passed over here, so that one
-mistake is reported once. World and behaviors have files of their own.
+Pure: elements in, faults out. These checks skip values that the schema has refused, so that each mistake is reported
+once. World and behaviors have files of their own.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ from backbone.mission.world_checks import check_world
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, is_legal
 
 ARC = "behavior's ARC"  # its component is named <behavior>-<kind>
-LAUNCHER = "launcher"  # the component that 'up' is itself
+LAUNCHER = "launcher"  # the component that 'up' runs as
 FIRST_NETWORK_ID, LAST_NETWORK_ID = 1, 254  # as the radio's packets carry it: one byte, without 0 and 255
 SET_BY_RESOURCE = ("driver", "sharable", "capacity", "links")  # Resource.rc_parameters
 
 
 def check(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:
-    """Report everything that does not fit.
+    """Report every fault that these checks can find.
 
     Args:
         classes: Class path → facts of the class; parameters of other classes are not checked.
@@ -182,7 +182,7 @@ def _check_core_type(component_type: Element, report: Report) -> None:
 
 
 def _check_roles(needs: Sequence[Element], report: Report) -> None:
-    """Report every need with the role of another."""
+    """Report every need that repeats the role of another need."""
     first: dict[str, Element] = {}
     for needed in needs:
         role = role_of(needed)
@@ -358,7 +358,7 @@ def _check_network_id(resource: Element, ids: dict[int, Element], report: Report
 
 # ---------------------------------------------------------------------- names
 def _check_component_names(tables: Tables, report: Report) -> None:
-    """Report names that two components would have: RCs, world, units, behaviors, their ARCs, core services."""
+    """Report a name that two components would have: RCs, world, units, behaviors, their ARCs, core services."""
     reserved = _reserved(tables)
     first: dict[str, tuple[str, Place]] = {}
     for name, what, place in sorted(_components(tables), key=lambda component: component[2]):
@@ -386,7 +386,7 @@ def _reserved(tables: Tables) -> set[str]:
 
 
 def _components(tables: Tables) -> Iterator[tuple[str, str, Place]]:
-    """Yield name, what it is, and where it is named."""
+    """Yield name, kind and place of each named component."""
     for resource in section(tables.root, "resources"):
         yield resource.text("name"), "resource", resource.place_of("name")
     if tables.world is not None:

@@ -1,7 +1,7 @@
 """Ask classes for their facts, in a process of its own.
 
-To ask a class, its module is imported, and with it OpenCV or MuJoCo: the asking process stays light, and it goes on
-if a module raises, hangs, or ends its process.
+To ask a class, its module must be imported, and with it OpenCV or MuJoCo. In a separate process, the import costs the
+asking process no memory, and a module that raises, hangs, or ends its process does no harm.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
     """Return the facts of each class, or ``failure`` with the reason; a class is asked once in a process.
 
     Args:
-        class_paths: ``package.module:Class`` each. Their modules are run.
+        class_paths: Each as ``package.module:Class``. Their modules are run.
     """
     left = [path for path in dict.fromkeys(class_paths) if path not in _known]
     failed: dict[str, ClassFacts] = {}
@@ -42,7 +42,7 @@ def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
 
 
 def judge(questions: Sequence[Question]) -> list[str]:
-    """Return each class's objection to the parameters; empty: it starts with them, or gave no answer.
+    """Return each class's objection to its parameters; empty: it starts with them, or gave no answer.
 
     Args:
         questions: About classes that can be imported; their modules are run.
@@ -56,7 +56,7 @@ def judge(questions: Sequence[Question]) -> list[str]:
 
 
 def arrange(question: UnitsQuestion) -> Arranged:
-    """Return how the units are connected, or everything that does not fit; the same units are asked about once.
+    """Return how the units are connected, or all faults; a repeated question is answered from memory.
 
     Args:
         question: About classes that can be imported; their modules are run.
@@ -66,20 +66,20 @@ def arrange(question: UnitsQuestion) -> Arranged:
         printed, reason = _printed("arrange", [text])
         if not printed:
             remedy = "Mend the class of a module, so that its file can be imported"
-            return Arranged(faults=(UnitFault(f"the modules' classes tell nothing: {reason}", remedy),))
+            return Arranged(faults=(UnitFault(f"the modules' classes cannot be asked: {reason}", remedy),))
         _arranged[text] = msgspec.json.decode(printed[0], type=Arranged)
     return _arranged[text]
 
 
 def _asked(class_paths: Sequence[str]) -> tuple[dict[str, ClassFacts], str]:
-    """Return the answers up to the first class that ended or held up the process, and how it did so."""
+    """Return the answers up to the first class that ended or blocked the process, and the reason for that."""
     printed, reason = _printed("facts", class_paths)
     answers = [msgspec.json.decode(line, type=ClassFacts) for line in printed]
     return dict(zip(class_paths, answers, strict=False)), reason
 
 
 def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
-    """Return the lines that the other process printed, one for each question, and why there are not more."""
+    """Return the lines that the other process printed, one for each question, and why further lines are missing."""
     command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what, *about]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     reason = "the process that imports its module ends without an answer"

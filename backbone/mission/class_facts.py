@@ -1,6 +1,6 @@
 """Facts of a component class: its documentation, and the parameters that a mission file may set.
 
-Pure data and its judgement. ``class_asking`` gets the data from classes.
+Pure: data, and the checks of values against it. ``class_asking`` gets the data from classes.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ class ParameterFacts(msgspec.Struct, frozen=True):
 
     @property
     def is_required(self) -> bool:
-        """True if a mission file must set it."""
+        """True if a mission file must set this parameter."""
         return "default" not in self.schema
 
     @property
     def default(self) -> str:
-        """The value that holds if the file gives none, as JSON; empty: the file must give one."""
+        """Its default, as JSON; empty: a mission file must set it."""
         return "" if self.is_required else msgspec.json.encode(self.schema["default"]).decode()
 
     @property
@@ -55,7 +55,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words it can be; none if it takes other values."""
+        """The words that it accepts; empty if it accepts other values."""
         if self.schema.get("type") == "boolean":
             return ("true", "false")
         return tuple(map(str, self.schema.get("enum", ())))
@@ -80,7 +80,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
         return [f"{word} {self.schema[limit]:g}" for limit, word in _LIMITS.items() if limit in self.schema]
 
     def accepts(self, value: object) -> bool:
-        """Return whether the class starts with this value."""
+        """Return whether the class can start with this value."""
         try:
             msgspec.convert(value, _value_type(self.schema))
         except msgspec.ValidationError:
@@ -92,16 +92,16 @@ class ClassFacts(msgspec.Struct, frozen=True):
     """Facts of a class.
 
     Attributes:
-        parameters: What it can be given in a mission file.
-        options: Driver → what can be given besides, while this driver is used; None: the class uses no driver.
-        has_rules: Whether it has rules for its parameters besides their types; only the class itself can judge by them.
-        children: Fewest and most children of a behavior; None: as many as one likes.
-        may_claim: False: a behavior that has no ARC.
+        parameters: Parameters that a mission file may set.
+        options: Driver → further parameters while this driver is used; None: the class uses no driver.
+        has_rules: Whether it has rules for its parameters besides their types; only the class itself can check these.
+        children: Fewest and most children of a behavior; None: any number.
+        may_claim: False: a behavior of this class has no ARC.
         failure: Why the facts are unknown; empty: they are known.
-        abilities: What its components can be commanded to do, and what they report.
+        abilities: The commands that its components obey, and the values that they report.
         given: Parameters that other elements and attributes of the mission file set.
         shares_process: Whether the placer may put its components into a process with others.
-        alike_most: Most of its components that the placer puts into one process with each other; 1: none.
+        alike_most: Largest number of its components in one process; 1: they do not share one.
     """
 
     doc: str = ""
@@ -117,14 +117,14 @@ class ClassFacts(msgspec.Struct, frozen=True):
     alike_most: int = 1
 
     def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
-        """Return all that can be given while this driver is used; None if nothing is known of the driver."""
+        """Return all parameters that can be set while this driver is used; None if the driver is unknown."""
         if self.options is None:
             return self.parameters
         return None if driver not in self.options else (*self.parameters, *self.options[driver])
 
 
 class Question(msgspec.Struct, frozen=True):
-    """Does this class start with these parameters?
+    """A question to a class: does it start with these parameters?
 
     Attributes:
         class_path: The class.
@@ -136,7 +136,7 @@ class Question(msgspec.Struct, frozen=True):
 
 @lru_cache(maxsize=1)
 def shipped_classes() -> Mapping[str, ClassFacts]:
-    """Return the facts of every class that the project brings along, by class path."""
+    """Return the facts of every shipped class, by class path."""
     text = resources.files("backbone.mission").joinpath(SHIPPED).read_bytes()
     return msgspec.json.decode(text, type=dict[str, ClassFacts])
 
@@ -152,7 +152,7 @@ def parameters_of(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
 
 
 def _simple(one: ValueSchema, definitions: ValueSchema) -> ValueSchema:
-    """Return the part of a schema that a value in a mission file can meet: no objects, no lists."""
+    """Return the part of a schema that fits values in a mission file: no objects, no lists."""
     if "$ref" in one:
         return _simple(definitions[one["$ref"]], definitions)
     kept = {key: one[key] for key in ("type", "enum", "default", *_META) if key in one}
@@ -170,7 +170,7 @@ def _type_text(schema: ValueSchema) -> str:
 
 
 def _value_type(schema: ValueSchema) -> Any:
-    """Return the type that msgspec accepts the same values for."""
+    """Return a type for which msgspec accepts the same values as the schema."""
     if "enum" in schema:
         return Literal[tuple(schema["enum"])]
     if "anyOf" in schema:

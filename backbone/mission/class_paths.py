@@ -1,4 +1,4 @@
-"""Whether a class path leads to a class, found without running any of its code."""
+"""Checks whether a class path leads to a class, without running any of its code."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ CLASS_PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
 
 
 def class_path_fault(class_path: str) -> tuple[str, list[str]] | None:
-    """Return what is wrong with ``package.module:Class`` on this machine, and the names there are instead.
+    """Return the fault of ``package.module:Class`` on this machine, and the names that exist instead.
 
-    No module is imported: the source is looked at. A module that has no source is taken to be right.
+    No module is imported; only its source is read. A module without source counts as correct.
 
     Returns:
-        None if nothing is found wrong.
+        None if no fault is found.
     """
     module, _, name = class_path.partition(":")
     top, *below = module.split(".")

@@ -1,4 +1,4 @@
-"""The program that imports classes and prints what they say, one JSON line for each; see ``class_asking``."""
+"""The program that imports classes and prints their facts, one JSON line for each; see ``class_asking``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from backbone.component.field_docs import field_docs
 from backbone.mission.arranged import Arranged, UnitsQuestion
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
 
-ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; a hang or a kill of the process ends no more
+ALIKE_MOST = 16  # measured: 16 watchers take a twentieth of a core; a hang or kill of their process ends no more
 
 
 def facts_of(class_path: str) -> ClassFacts:
@@ -49,7 +49,7 @@ def _documented(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
 
 
 def refusal(question: Question) -> str:
-    """Return what the class says against its own parameters among these; empty: nothing."""
+    """Return the class's objection to its own parameters among these; empty: none."""
     module, _, name = question.class_path.partition(":")
     struct = getattr(importlib.import_module(module), name).parameters_type
     own = {field.encode_name for field in msgspec.structs.fields(struct)}
@@ -61,14 +61,14 @@ def refusal(question: Question) -> str:
 
 
 def arranged(question: UnitsQuestion) -> Arranged:
-    """Return what the class that runs execution units says of these units."""
+    """Return the arrangement of these units by the class that runs execution units."""
     module, _, name = question.class_path.partition(":")
     answer: Arranged = getattr(importlib.import_module(module), name).arrange(question)
     return answer
 
 
 def _answer(what: str, about: Sequence[str]) -> None:
-    """Print one answer a line, as soon as it is known; what the modules print goes nowhere."""
+    """Print each answer on a line as soon as it is known; the output of the modules is discarded."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     for one in about:

@@ -1,7 +1,7 @@
 """Completion of a mission: a host, the core services, and the shipped types need no declaration.
 
-The file's own declarations come first: a type of a shipped type's name replaces that type, because
-missions name types by name alone, and a class of one's own under a known name is how hardware is exchanged.
+The file's own declarations take precedence: a type with the name of a shipped type replaces that type. Missions name
+types by name alone, so a class of one's own under a known name exchanges the hardware.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ THIS_HOST = {"name": "base", "address": "127.0.0.1"}
 
 
 def complete(root: Element) -> None:
-    """Add hosts, core services and types that the mission leaves out; they stand where the mission begins."""
+    """Add hosts, core services and types that the mission leaves out; their place is the begin of the mission."""
     hosts, core, types = (_section(root, tag) for tag in ("hosts", "core", "types"))
     if not hosts.children:
         hosts.children.append(_element(root, "host", THIS_HOST))

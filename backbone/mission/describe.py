@@ -1,4 +1,4 @@
-"""From the declared elements of a mission without faults to its description."""
+"""Converts the declared elements of a faultless mission to its description."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def describe(
     """Return the description of a mission without faults.
 
     Args:
-        classes: Class path → what is known of the class.
+        classes: Class path → facts of the class.
         arranged: Execution unit → parameters of its component.
     """
     hosts = () if mission.hosts is None else mission.hosts.host
@@ -199,7 +199,7 @@ def _world_content(world: WorldElement, given: Mapping[str, Mapping[str, object]
 
     Args:
         world: The declared world.
-        given: Robot → what its resource says of its body.
+        given: Robot → what its resource declares of its body.
         source: Path of the mission file.
     """
     return {
@@ -220,13 +220,13 @@ def _world_content(world: WorldElement, given: Mapping[str, Mapping[str, object]
 
 
 def _room(world: WorldElement) -> dict[str, object]:
-    """Return what stands in the room at the beginning, robots with it, as plain data of ``WorldDescription``."""
+    """Return the content of the room at the beginning, including robots, as plain data of ``WorldDescription``."""
     robots = [{**_body(robot, "class_path"), NETWORK_ID: 0} for robot in world.robot]
     return {**_standing(world), "robots": robots}
 
 
 def _standing(world: WorldElement) -> dict[str, object]:
-    """Return the size of the room and what never moves in it."""
+    """Return the size of the room and its immovable content."""
     return {
         "width_m": world.room.width_m,
         "depth_m": world.room.depth_m,

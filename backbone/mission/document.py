@@ -1,13 +1,12 @@
-"""A mission file as elements that know where they stand.
+"""A mission file as elements with their places in the file.
 
-One parser reads the file: expat, which knows the byte at which each tag begins. Validation, checks and editing work on
-its elements, so nothing can see something else in the same bytes.
+One parser reads the file: expat, which knows the byte at which each tag begins. Validation, checks and editing use its
+elements, so they cannot read the same bytes differently.
 
 Rules of this file:
 
-* A document type declaration is refused where it begins: without one there are no entities that
-  could grow or fetch anything.
-* Size is judged before reading, depth while reading; neither time nor memory follow a hostile file.
+* A document type declaration is refused. Without one there are no entities that could grow or fetch anything.
+* The size is checked before reading, the depth while reading, so that a hostile file costs little time and memory.
 """
 
 from __future__ import annotations
@@ -35,11 +34,11 @@ _ATTRIBUTE = re.compile(rb"""(\s+)([^\s=<>"'/]+)\s*=\s*("[^"]*"|'[^']*')""")
 
 
 Path = tuple[int, ...]
-"""Path of an element: its number among its parent's children, from 0, from the root down; the root's is empty."""
+"""Path from the root to an element: at each level its number among its siblings, from 0; empty for the root itself."""
 
 
 class EditRefused(Refusal):
-    """A change of a mission file that cannot be made; the text is as it was."""
+    """A mission file cannot be changed so; the text is unchanged."""
 
     code = "mission.edit"
     remedy = "Look at the tree: docs/reference/mission-file.md lists the place of each element."
@@ -47,10 +46,10 @@ class EditRefused(Refusal):
 
 @dataclass(slots=True)
 class Attribute:
-    """A value and where its name stands.
+    """A value and its place.
 
     Attributes:
-        place: Where its name stands.
+        place: Place of its name.
         is_written: False if the file leaves it out, and this is its default.
     """
 
@@ -64,9 +63,9 @@ class Span(NamedTuple):
 
     Attributes:
         begin: First byte of its tag.
-        content: First byte behind its tag.
-        close: First byte of its end tag; the same as ``content`` if it has none.
-        end: First byte behind it.
+        content: First byte after its tag.
+        close: First byte of its end tag; equal to ``content`` if it has none.
+        end: First byte after the element.
     """
 
     begin: int
@@ -80,13 +79,13 @@ NOWHERE = Span(0, 0, 0, 0)  # of an element that no file holds
 
 @dataclass(slots=True)
 class Element:
-    """An element and where it stands.
+    """An element and its place.
 
-    The reading methods never fail: a value that is missing or illegal is reported by the validation, and reads as
-    empty here.
+    The reading methods never fail: if a value is missing or illegal, they return an empty one, and the validation
+    reports the fault.
 
     Attributes:
-        path: Where it stands among the elements of its file.
+        path: Its path among the elements of its file.
     """
 
     tag: str
@@ -102,7 +101,7 @@ class Element:
         return {name: attribute.value for name, attribute in self.attributes.items()}
 
     def __iter__(self) -> Iterator[Element]:
-        """Yield this element and all below it, in the order of the file."""
+        """Yield this element and all its descendants, in the order of the file."""
         yield self
         for child in self.children:
             yield from child
@@ -111,7 +110,7 @@ class Element:
         """Return the element at a path below this one.
 
         Raises:
-            EditRefused: There is none.
+            EditRefused: No element has this path.
         """
         element = self
         for number in path:
@@ -121,22 +120,22 @@ class Element:
         return element
 
     def nearest(self, path: Path) -> Path:
-        """Return the path as far down as elements stand there."""
+        """Return the longest part of the path that leads to an element."""
         element, depth = self, 0
         while depth < len(path) and path[depth] < len(element.children):
             element, depth = element.children[path[depth]], depth + 1
         return path[:depth]
 
     def all(self, tag: str) -> list[Element]:
-        """Return the children of this tag."""
+        """Return the children with this tag."""
         return [child for child in self.children if child.tag == tag]
 
     def first(self, tag: str) -> Element | None:
-        """Return the first child of this tag, if there is one."""
+        """Return the first child with this tag, if there is one."""
         return next((child for child in self.children if child.tag == tag), None)
 
     def place_of(self, attribute: str) -> Place:
-        """Return where the attribute stands; the element's own place if it has none."""
+        """Return the place of the attribute, or of the element if it has no such attribute."""
         found = self.attributes.get(attribute)
         return self.place if found is None else found.place
 
@@ -146,7 +145,7 @@ class Element:
         return found is not None and found.is_written
 
     def text(self, attribute: str) -> str:
-        """Return the value as it stands, empty if there is none."""
+        """Return the value as written; empty if there is none."""
         found = self.attributes.get(attribute)
         return "" if found is None else found.value
 
@@ -155,7 +154,7 @@ class Element:
         return self.text(attribute).split()
 
     def number(self, attribute: str) -> float | None:
-        """Return the value as a number; None if it is none."""
+        """Return the value as a number; None if it is not one."""
         return decimal(self.text(attribute))
 
     def flag(self, attribute: str) -> bool | None:
@@ -170,7 +169,7 @@ class AttributeSpan(NamedTuple):
         blanks: First byte of the blanks before it.
         name: First byte of its name.
         quote: First byte of its value, which is a quotation mark.
-        end: First byte behind it.
+        end: First byte after it.
     """
 
     blanks: int
@@ -180,12 +179,12 @@ class AttributeSpan(NamedTuple):
 
 
 def attribute_spans(data: bytes, begin: int, content: int) -> dict[str, AttributeSpan]:
-    """Return where the attributes of a tag stand, by name.
+    """Return the spans of the attributes of a tag, by name.
 
     Args:
         data: A text that expat has read.
         begin: First byte of the tag.
-        content: First byte behind it.
+        content: First byte after it.
     """
     return {
         match[2].decode(): AttributeSpan(match.start(1), match.start(2), match.start(3), match.end())
@@ -194,7 +193,7 @@ def attribute_spans(data: bytes, begin: int, content: int) -> dict[str, Attribut
 
 
 def read_bytes(path: FilePath, report: Report) -> bytes | None:
-    """Return what the file holds; None, with a fault, if it cannot be a mission file."""
+    """Return the content of the file; None, with a fault, if it cannot be a mission file."""
     try:
         if path.exists() and not path.is_file():
             report.fault(BEGINNING, "is no file", "Name a mission file.")
@@ -212,7 +211,7 @@ def read_bytes(path: FilePath, report: Report) -> bytes | None:
 
 
 def parse(data: bytes, report: Report) -> Element | None:
-    """Return the root element; None, with a fault, if the bytes are no well-formed, harmless XML."""
+    """Return the root element; None, with a fault, if the bytes are not well-formed XML or are hostile."""
     lines = _Lines(data)
     try:
         data.decode()
@@ -223,10 +222,10 @@ def parse(data: bytes, report: Report) -> Element | None:
 
 
 def outline(data: bytes) -> Element:
-    """Return the root of a mission file's text, as it is written: nothing is filled in.
+    """Return the root of a mission file's text as written, without defaults.
 
     Raises:
-        MissionInvalid: It is not well-formed XML, or is hostile; with the reader's faults.
+        MissionInvalid: The text is not well-formed XML, or is hostile; with the reader's faults.
     """
     report = Report("mission")
     root = parse(data, report)
@@ -236,7 +235,7 @@ def outline(data: bytes) -> Element:
 
 
 def _first_byte(data: bytes) -> int:
-    """Return where the text begins: behind the byte order mark."""
+    """Return the begin of the text, after a byte order mark."""
     return len(_BYTE_ORDER_MARK) if data.startswith(_BYTE_ORDER_MARK) else 0
 
 
@@ -245,7 +244,7 @@ class _Refused(Exception):
 
 
 class _Lines:
-    """Finds line and column of a position in UTF-8 bytes."""
+    """Converts a position in UTF-8 bytes to line and column."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data

@@ -1,13 +1,13 @@
-"""Changes of a mission file's text, made where they are meant and nowhere else.
+"""Changes of a mission file's text, each only at its own place.
 
-Pure: bytes in, bytes out. Comments, order and layout of what is not changed stay as they are; what is added looks
-as a person would have written it: one element a line, indented like its neighbors, attributes in the declared order.
+Pure: bytes in, bytes out. Comments, order and layout of all else stay unchanged. Added elements have the usual layout:
+one element a line, indented like its neighbors, attributes in the declared order.
 
 Rules of this file:
 
-* What stands where is the reader's to say: an element is one of those it found.
-* A change is made in text, then read again; one after which the text could not be read is refused.
-* Only what can be written down is refused here. Whether names and values fit is the reader's to say.
+* The places of elements are those that the reader found.
+* A change is made in the text, which is then read again. If the new text cannot be read, the change is refused.
+* This file refuses only what cannot be written. The reader checks whether names and values fit.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 LINE_LENGTH = 120  # chosen: as mission.xml; longer tags get a second line of attributes
-STEP = "  "  # the indentation of what has no neighbor to copy it from
+STEP = "  "  # the indentation of an element without a neighbor
 
 _WHOLE = re.compile(rb"""<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<(?:[^>"']|"[^"]*"|'[^']*')*>""", re.DOTALL)
 _QUOTED = re.compile(rb"""("[^"]*"|'[^']*')""")
@@ -49,7 +49,7 @@ class NewElement:
 
     Attributes:
         tag: Its tag.
-        attributes: Its attributes; they are written in the order of the schema.
+        attributes: Its attributes; they are written in the declared order.
         children: Elements in it, in this order.
     """
 
@@ -60,14 +60,14 @@ class NewElement:
 
 # ---------------------------------------------------------------------- changes
 def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> bytes:
-    """Return the text with another value; its quotes stay, and a new attribute stands where the schema has it.
+    """Return the text with another value; its quotes stay, and a new attribute gets its place in the declared order.
 
     Args:
         name: The attribute.
-        value: What it shall be; None: left out.
+        value: The new value; None: the attribute is removed.
 
     Raises:
-        EditRefused: There is no such element, it can have no such attribute, or the value cannot be written in XML.
+        EditRefused: The element does not exist, cannot have the attribute, or the value cannot be written in XML.
     """
     node = outline(data).at(path)
     _may_have(node.tag, name)
@@ -93,15 +93,15 @@ def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> byte
 
 
 def add(data: bytes, parent: Path, new: NewElement, at: int | None = None) -> bytes:
-    """Return the text with one more element, on lines of its own if its neighbors stand on such.
+    """Return the text with one more element, on lines of its own if its neighbors have lines of their own.
 
     Args:
-        parent: Where it goes in.
+        parent: Path of its parent.
         new: The element.
-        at: Its number among its siblings afterwards; None: the last of its tag, where the schema's order has it.
+        at: Its number among its siblings afterwards; None: after those of its tag, in the declared order of tags.
 
     Raises:
-        EditRefused: It cannot stand there.
+        EditRefused: The parent cannot have it.
     """
     root = outline(data)
     node = root.at(parent)
@@ -114,15 +114,15 @@ def add(data: bytes, parent: Path, new: NewElement, at: int | None = None) -> by
 
 
 def insert(data: bytes, parent: Path, other: bytes, at: int) -> bytes:
-    """Return the text with the root of another text in it, as it is written there, comments inside too.
+    """Return the text with the root of another text inserted unchanged, with the comments in it.
 
     Args:
-        parent: Where it goes in.
+        parent: Path of its parent.
         other: The other text.
         at: Its number among its siblings afterwards.
 
     Raises:
-        EditRefused: It cannot stand there.
+        EditRefused: The parent cannot have it.
         MissionInvalid: The other text cannot be read.
     """
     node, new = outline(data).at(parent), outline(other)
@@ -137,9 +137,9 @@ def place_for(parent: Element, tag: str, at: int | None = None) -> int:
     """Return the number a new child would have among its siblings.
 
     Args:
-        parent: Where it goes in; may hold such a child.
+        parent: Its parent.
         tag: Its tag.
-        at: The number wished for; None: behind the last of its tag, else behind what a person would write before it.
+        at: The wanted number; None: after the last of its tag, else after the tags that come before it by declaration.
     """
     if at is not None:
         return min(max(at, 0), len(parent.children))
@@ -153,10 +153,10 @@ def place_for(parent: Element, tag: str, at: int | None = None) -> int:
 
 
 def remove(data: bytes, path: Path) -> bytes:
-    """Return the text without an element, all in it, and the lines it alone stood on.
+    """Return the text without an element, its content, and the lines that only it occupied.
 
     Raises:
-        EditRefused: There is no such element, or it is the root.
+        EditRefused: The element does not exist, or is the root.
     """
     if not path:
         raise EditRefused("the mission itself cannot be removed", remedy="Begin another file.")
@@ -165,14 +165,14 @@ def remove(data: bytes, path: Path) -> bytes:
 
 
 def move(data: bytes, path: Path, parent: Path, at: int) -> bytes:
-    """Return the text with an element elsewhere, with all that stands in it, comments too.
+    """Return the text with an element moved, including its content and the comments in it.
 
     Args:
-        parent: Where it goes in, as paths are before the change.
+        parent: Path of its new parent before the change.
         at: Its number among its siblings afterwards.
 
     Raises:
-        EditRefused: It cannot stand there.
+        EditRefused: The new parent cannot have it.
     """
     root = outline(data)
     node, target = root.at(path), root.at(parent)
@@ -190,7 +190,7 @@ def move(data: bytes, path: Path, parent: Path, at: int) -> bytes:
     return _insert(cut, after, min(max(at, 0), len(after.children)), text)
 
 
-# ---------------------------------------------------------------------- what may be written
+# ---------------------------------------------------------------------- limits of what can be written
 def _may_have(tag: str, name: str) -> None:
     rule = vocabulary().get(tag)
     if rule is None or name not in rule.attributes:
@@ -207,7 +207,7 @@ def _may_hold(node: Element, tag: str) -> None:
         there = listed([f"<{one}>" for one in allowed])
         raise EditRefused(
             f"<{tag}> does not belong in <{node.tag}>",
-            remedy=f"In <{node.tag}> may stand: {there}" if there else f"<{node.tag}> has no elements inside.",
+            remedy=f"<{node.tag}> may contain: {there}" if there else f"<{node.tag}> has no elements inside.",
         )
     if len(node.all(tag)) >= allowed[tag][1]:
         raise EditRefused(f"<{node.tag}> has its <{tag}> already", remedy="Change that one, or remove it first.")
@@ -225,7 +225,7 @@ def _may_be(new: NewElement) -> None:
 
 def _quoted(value: str, quote: str = '"') -> bytes:
     if strange := _NOT_XML.search(value):
-        raise EditRefused(f"the character {strange[0]!r} cannot stand in XML", remedy="Leave it out.")
+        raise EditRefused(f"the character {strange[0]!r} is not allowed in XML", remedy="Leave it out.")
     escaped = value.replace("&", "&amp;").replace("<", "&lt;").replace("\r", "&#13;")
     escaped = escaped.replace("\n", "&#10;").replace("\t", "&#9;")
     escaped = escaped.replace('"', "&quot;") if quote == '"' else escaped.replace("'", "&apos;")
@@ -245,7 +245,7 @@ def _readable(data: bytes) -> bytes:
 
 # ---------------------------------------------------------------------- layout
 def _written(new: NewElement, indent: str) -> bytes:
-    """Return the element as lines without the first indentation and without the last line's end."""
+    """Return the element as lines, without the first indentation and the last line end."""
     order = {name: number for number, name in enumerate(vocabulary()[new.tag].attributes)}
     values = [
         f"{name}={_quoted(value).decode()}"
@@ -298,7 +298,7 @@ def _insert(data: bytes, parent: Element, number: int, text: bytes, *, apart: bo
 
 
 def _behind(data: bytes, node: Element) -> int:
-    """Return where the element ends, with a comment that ends its line."""
+    """Return the end of the element, including a comment that ends its line."""
     comment = _LINE_END_COMMENT.match(data, node.span.end)
     return comment.end() if comment else node.span.end
 

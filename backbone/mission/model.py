@@ -30,7 +30,7 @@ class CoreServiceDescription(_Part):
     """A core service and where it runs.
 
     Attributes:
-        parameters: What the file sets of its parameters.
+        parameters: Its parameters from the file.
     """
 
     type: str
@@ -39,10 +39,10 @@ class CoreServiceDescription(_Part):
 
 
 class ComponentDescription(_Part):
-    """A component the mission starts at its beginning, besides RCs and behaviors: the world, an execution unit.
+    """A component that the mission starts at its beginning, except RCs and behaviors: the world, an execution unit.
 
     Attributes:
-        host: Where; empty: the placer decides.
+        host: Its host; empty: the placer decides.
         parameters: Values for the class's parameters.
         process: Name of the process it shares with others; empty: a process of its own.
     """
@@ -97,7 +97,7 @@ class MissionDescription(_Part):
 
     Attributes:
         name: Name of the mission; the default key of its run.
-        priority: Of the behavior tree's root among the consoles; larger is higher.
+        priority: Priority of the behavior tree's root among the consoles; larger is higher.
         hosts: Machines; the first runs the nameserver.
         core: Core services in the papers' order of start.
         types: Component types.
@@ -122,22 +122,22 @@ class MissionDescription(_Part):
 
     @property
     def other_hosts(self) -> tuple[Host, ...]:
-        """Machines besides the one that runs the nameserver; each offers itself by a command typed there."""
+        """Machines except the one that runs the nameserver; a command typed on each offers it to the mission."""
         return tuple(host for host in self.hosts[1:] if not host.is_loopback)
 
     @property
     def at_the_end(self) -> MissionDescription | None:
-        """The mission as it is while its last branch runs: that branch is its only behavior; None: it has none."""
+        """The mission while its last branch runs, which is then its only behavior; None: there is no last branch."""
         if self.last is None:
             return None
         return self.model_copy(update={"behaviors": (self.last.behavior,), "last": None})
 
     def core_parameters(self, service: str) -> dict[str, object]:
-        """Return what the file sets of a core service's parameters, of the first of this type."""
+        """Return the parameters that the file sets of a core service, of the first one of this type."""
         return next((dict(core.parameters) for core in self.core if core.type == service), {})
 
     def placed_types(self) -> Iterator[str]:
-        """Yield the type of each component, unit and behavior of the file; resources and ARCs are others."""
+        """Yield the type of each component, unit and behavior in the file, but not of resources and ARCs."""
         yield from (one.type for one in (*self.components, *self.units))
         waiting = [*self.behaviors]
         while waiting:

@@ -17,7 +17,7 @@ from backbone.mission.tables import EXECUTION_UNIT, Tables, check_host, check_pa
 
 
 def check_modules(tables: Tables, report: Report) -> None:
-    """Report every fault of units and modules that the mission file alone shows."""
+    """Report every fault of units and modules that can be seen without their classes."""
     section = tables.root.first("modules")
     if section is None:
         return
@@ -40,7 +40,7 @@ def check_modules(tables: Tables, report: Report) -> None:
 
 
 def units_question(tables: Tables) -> UnitsQuestion | None:
-    """Return what the class that runs units is asked; None: there are none, or what is wrong with them is plain."""
+    """Return the question to the class that runs units; None: there are no units, or their faults are plain."""
     section = tables.root.first("modules")
     if section is None or not tables.units:
         return None
@@ -65,7 +65,7 @@ def units_question(tables: Tables) -> UnitsQuestion | None:
 
 
 def report_units(tables: Tables, faults: tuple[UnitFault, ...], report: Report) -> None:
-    """Report each fault where the file has what it is about."""
+    """Report each fault at its place in the file."""
     for fault in faults:
         report.fault(_place(tables, fault), fault.message, fault.remedy)
 

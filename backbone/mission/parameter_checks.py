@@ -1,7 +1,7 @@
-"""Whether the parameters of resources, behaviors, world and core services are those their classes have.
+"""Checks that the parameters of resources, behaviors, world and core services are those of their classes.
 
-Pure: elements and facts in, faults out. The classes' own types judge the values, so a value that passes here is one
-the component starts with.
+Pure: elements and facts in, faults out. The classes' own types check the values, so the component can start with every
+value that passes here.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from backbone.mission.tables import (
 )
 from backbone.scheduling.rules import SchedulingRules
 
-_NAME = re.compile(r"[a-z][a-z0-9_]*")  # other names are the schema's to refuse
+_NAME = re.compile(r"[a-z][a-z0-9_]*")  # the schema refuses other names
 PLANNER = "planner"
 SERVICE_PARAMETERS = {"rc_manager": parameters_of(SchedulingRules)}
-"""Core service → what the file may set of its parameters."""
+"""Core service → parameters that the file may set."""
 
 
 def check_service_parameters(service: Element, report: Report) -> None:
-    """Report parameters that the core service does not have, that come twice, or that it would refuse."""
+    """Report parameters that the core service does not have, that occur twice, or that it would refuse."""
     kind = service.text("type")
     if kind not in CORE_SERVICES:
         return
@@ -44,11 +44,11 @@ def check_service_parameters(service: Element, report: Report) -> None:
 
 
 def check_class_parameters(element: Element, reserved: Collection[str], tables: Tables, report: Report) -> None:
-    """Report parameters that the element's class does not have or would refuse, and those it lacks.
+    """Report parameters that the element's class does not have or would refuse, and required ones that are missing.
 
     Args:
         element: A resource, a behavior or the world.
-        reserved: Names that the rest of the file gives; they are judged elsewhere.
+        reserved: Names that other parts of the file set; they are checked elsewhere.
         tables: The mission.
     """
     kind = element.text("type")
@@ -65,7 +65,7 @@ def check_class_parameters(element: Element, reserved: Collection[str], tables: 
     for one in known:
         if one.is_required and one.name not in given:
             if one.name == NETWORK_ID and any(element is robot for robot in tables.robots()):
-                continue  # that a robot among others has no id is reported with them
+                continue  # missing network ids of robots are reported together elsewhere
             report.fault(
                 element.place,
                 f"{kind} {element.text('name')} lacks parameter {one.name}",
@@ -74,7 +74,7 @@ def check_class_parameters(element: Element, reserved: Collection[str], tables: 
 
 
 def open_questions(tables: Tables) -> list[tuple[Element, Question]]:
-    """Return the elements whose parameters are each legal, and that have to be judged together by their class."""
+    """Return the elements whose parameters are legal one by one, and whose class must check them together."""
     resources = section(tables.root, "resources")
     found = []
     for element in [*resources, *tables.behaviors]:
@@ -89,7 +89,7 @@ def open_questions(tables: Tables) -> list[tuple[Element, Question]]:
 
 
 def report_refusal(element: Element, refusal: str, tables: Tables, report: Report) -> None:
-    """Report what a class says against the parameters of an element, at the one that it speaks of."""
+    """Report a class's objection to the parameters of an element, at the parameter that it names."""
     given = element.all("parameter")
     named = (one for one in given if re.search(rf"\b{re.escape(one.text('name'))}\b", refusal))
     quoted = (one for one in given if any(repr(word) in refusal for word in (one.text("value"), *one.words("value"))))

@@ -13,7 +13,7 @@ PROCESS = "process"
 
 
 def check_processes(tables: Tables, core: Collection[str], report: Report) -> None:
-    """Report processes that would be on two hosts or on none, or that are named like a component.
+    """Report a process that would be on two hosts or on none, or that has the name of a component.
 
     Args:
         core: Names of the components that every mission has.
@@ -55,7 +55,7 @@ def _are_on_one_host(process: str, members: list[Element], tables: Tables, repor
 
 
 def _check_tags(process: str, members: list[Element], tables: Tables, report: Report) -> None:
-    """Report a process whose members each find a host, but not one for all of them."""
+    """Report a process if each member finds a host, but no host suits all members."""
     types = {name: tables.types[name] for member in members if (name := member.text("type")) in tables.types}
     fixed = {member.text("host") for member in members} & tables.hosts.keys()
     hosts = {name: host for name, host in tables.hosts.items() if not fixed or name in fixed}
@@ -76,5 +76,5 @@ def _check_tags(process: str, members: list[Element], tables: Tables, report: Re
         report.fault(
             members[0].place_of(PROCESS),
             f"no host can run all of process {process} ({listed([m.text('name') for m in members])}): {reasons}",
-            "Give a host all these tags, or let those who need them have another process",
+            "Give a host all these tags, or put the components that need them into another process",
         )

@@ -1,4 +1,4 @@
-"""From a mission file to a checked mission description, or to everything that is wrong with it."""
+"""Reads a mission file and returns its checked description, or raises all its faults."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ __all__ = ["Fault", "MissionInvalid", "read_mission", "read_mission_bytes", "rea
 
 
 def read_mission(path: str | Path) -> MissionDescription:
-    """Return the mission the file describes; see ``read_written_mission``."""
+    """Return the mission in the file; see ``read_written_mission``."""
     return read_written_mission(path)[0]
 
 
 def read_written_mission(path: str | Path) -> tuple[MissionDescription, bytes]:
-    """Return the mission the file describes, and what the file holds. No component is started.
+    """Return the mission in the file, and the file's content. No component is started.
 
-    The classes of the file's own types are asked for their parameters in a process of its own, which imports them.
+    A separate process imports the classes of the file's own types, to ask them for their parameters.
 
     Args:
-        path: The mission file; faults name it as it is given here.
+        path: The mission file; faults contain this path.
 
     Raises:
         MissionInvalid: With every fault of the file, in its order.
@@ -47,13 +47,13 @@ def read_written_mission(path: str | Path) -> tuple[MissionDescription, bytes]:
 
 
 def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFacts] | None = None) -> MissionDescription:
-    """Return the mission these bytes describe, as ``read_mission`` does of a file that holds them.
+    """Return the mission in these bytes, as ``read_mission`` does for a file.
 
     Args:
-        data: What the file holds or would hold.
-        source: Its path; faults name it, and files that the mission names are looked for beside it.
-        classes: What is known of classes besides the shipped ones; None: those that the mission names are asked, those
-            of modules, too. Otherwise the connections of modules are not worked out.
+        data: Content of the file, or planned content.
+        source: Its path, for faults; other files named in the mission are relative to it.
+        classes: Facts of classes besides the shipped ones; the connections of modules are not checked then. None: ask
+            the classes that the mission names, those of modules included.
 
     Raises:
         MissionInvalid: With every fault, in the order of the file.
@@ -78,7 +78,7 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
 
 
 def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:
-    """Report parameters that only their class can judge, and refuses."""
+    """Report parameters that their class refuses, by rules that only the class can check."""
     tables = Tables.of(root, classes)
     opened = open_questions(tables)
     for (element, _), refusal in zip(opened, judge([question for _, question in opened]), strict=True):
@@ -87,7 +87,7 @@ def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Repor
 
 
 def _arranged(root: Element, report: Report) -> Arranged:
-    """Report modules that cannot be connected; return how they are."""
+    """Return how the modules are connected; report those that cannot be connected."""
     tables = Tables.of(root)
     question = units_question(tables)
     answer = Arranged() if question is None else arrange(question)
@@ -96,7 +96,7 @@ def _arranged(root: Element, report: Report) -> Arranged:
 
 
 def known_classes(root: Element) -> dict[str, ClassFacts]:
-    """Return what the classes of a mission's types say of themselves; those of its own are imported elsewhere."""
+    """Return the facts of the classes of a mission's types; its own classes are imported in another process."""
     known = shipped_classes()
     paths = {one.text("class") for one in section(root, "types")}
     asked = [path for path in sorted(paths - known.keys()) if CLASS_PATH.fullmatch(path) and not class_path_fault(path)]

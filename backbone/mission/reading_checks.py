@@ -1,6 +1,6 @@
-"""Whether conditions on readings name a resource and a value that its class reports, and watchers a unit.
+"""Checks that conditions on readings name a resource and a value that it reports, and that watchers name a unit.
 
-Pure: elements and facts in, faults out. A class that is not known here is not judged.
+Pure: elements and facts in, faults out. A class without known facts is not checked.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ from backbone.mission.tables import Tables, parameter_value
 from backbone.naming import Subsystem, is_legal
 
 CONDITION = "mission_control.behaviors.condition:MessageCondition"
-"""Class of the behaviors that judge messages."""
+"""Class of the behaviors that check conditions on messages."""
 WATCHER = "mission_control.behaviors.watch_for_motion:WatchForMotion"
-"""Class of the behaviors whose pictures a unit may judge: their parameter ``vision``."""
+"""Class of the behaviors whose pictures a unit may evaluate, named in their parameter ``vision``."""
 READINGS = "Readings"
-"""Their ``message``, if they judge what an RC measures."""
+"""Value of their parameter ``message`` for conditions on measurements of an RC."""
 VALUES = "values."
-"""In front of a report's name in their ``field``."""
+"""Prefix of a report's name in their parameter ``field``."""
 ALWAYS_THERE = ("", "at_s", "rc")
-"""Fields of all readings; the first is none."""
+"""Fields of all readings; the first stands for no field."""
 
 
 def check_readings(behavior: Element, tables: Tables, report: Report) -> None:
-    """Report a condition on readings of a resource that there is not, or of a value that it does not report."""
+    """Report a condition on readings of an unknown resource, or on a value that the resource does not report."""
     kind = tables.types.get(behavior.text("type"))
     given = {one.text("name"): one for one in behavior.all("parameter")}
     if kind is None or kind.text("class") != CONDITION or _text(given, "message") != READINGS:
         return
     name = _text(given, "source").removeprefix(f"{Subsystem.RESOURCE_POOL}/")
     if not is_legal(name):
-        return  # the condition refuses it
+        return  # the condition itself refuses it
     if name not in tables.resources:
         report.fault(
             given["source"].place_of("value"),
@@ -63,7 +63,7 @@ def check_readings(behavior: Element, tables: Tables, report: Report) -> None:
 
 
 def check_vision(behavior: Element, tables: Tables, report: Report) -> None:
-    """Report a watcher whose pictures would be judged by a unit that there is not."""
+    """Report a watcher that names an unknown unit for its pictures."""
     kind = tables.types.get(behavior.text("type"))
     given = {one.text("name"): one for one in behavior.all("parameter")}
     name, units = _text(given, "vision"), [unit.text("name") for unit in tables.units]
@@ -76,7 +76,7 @@ def check_vision(behavior: Element, tables: Tables, report: Report) -> None:
 
 
 def _check_limits(given: Mapping[str, Element], rc: str, form: FieldForm, report: Report) -> None:
-    """Report limits that the value cannot come to, as 30 for a share of 0.3."""
+    """Report limits that the value can never reach, such as 30 for a share of 0.3."""
     for limit in ("above", "below"):
         value = parameter_value(_text(given, limit)) if limit in given else None
         if isinstance(value, bool) or not isinstance(value, int | float):

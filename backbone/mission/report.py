@@ -24,14 +24,14 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong.
+    """A fault in a mission file.
 
     Attributes:
         file: The file, as it was named to the reader.
         line: From 1.
         column: From 1, in characters.
-        message: What is wrong.
-        remedy: What to do about it.
+        message: The fault.
+        remedy: How to correct it.
     """
 
     file: str
@@ -45,7 +45,7 @@ class Fault:
 
 
 class MissionInvalid(BackboneError):
-    """A mission file cannot be used; its text is every fault, one a line.
+    """A mission file cannot be used; the text contains every fault, one a line.
 
     Attributes:
         faults: All of them, in the order of the file.
@@ -74,14 +74,14 @@ class Report:
         self._faults.append(Fault(self.file, place.line, place.column, message, remedy.rstrip(".")))
 
     def nearest(self, name: str, known: Collection[str]) -> str:
-        """Return the known name nearest to a wrong one; empty if none is near, or once enough were looked for."""
+        """Return the known name nearest to a wrong one; empty if none is near, or after ``HINTS_AT_MOST`` searches."""
         if self._hints_left == 0 or not known:
             return ""
         self._hints_left -= 1
         return next(iter(difflib.get_close_matches(name[:MAX_NAME_LENGTH], known, n=1)), "")
 
     def hint(self, name: str, known: Collection[str]) -> str:
-        """Return a remark on the nearest known name, to be put behind a wrong one."""
+        """Return a remark with the nearest known name, to follow the wrong one."""
         near = self.nearest(name, known)
         return f" (did you mean {near!r}?)" if near else ""
 

@@ -1,7 +1,7 @@
-"""Files of a room that a mission file names, read when the mission is: a room of one's own as MJCF, a drawn floor plan.
+"""Files of a room that a mission file names: a room of one's own as MJCF, a drawn floor plan; read with the mission.
 
-The mission carries what they hold, so that the machine that uses it need not have the file.
-Whether MuJoCo can build it is found out by the world; here is looked at what needs no MuJoCo.
+The mission contains their content, so that other machines need not have the files. Only the world can find out whether
+MuJoCo can build the room; the checks here do not need MuJoCo.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from backbone.mission.tables import FLOOR_PLAN
 MAX_BYTES = 1024 * 1024  # chosen: as a mission file's; a room of ten thousand boxes fits
 MAX_PLAN_BYTES = 384 * 1024  # in base64 512 KiB, the longest value of a parameter
 PICTURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")
-"""How PNG and JPEG files begin."""
+"""First bytes of PNG and JPEG files."""
 
 
 class RoomInvalid(Exception):
-    """A file of a room cannot be used: what is wrong, and the remedy."""
+    """A file of a room cannot be used: message and remedy."""
 
 
 def room_text(mission_file: str, name: str) -> str:
-    """Return what a room's file holds.
+    """Return the content of a room's file.
 
     Args:
         mission_file: The mission file that names it; a relative name is relative to its folder.
-        name: The file's name as it stands there.
+        name: The file's name as written there.
 
     Raises:
-        RoomInvalid: The file cannot be read, is too large, no MJCF, or needs further files.
+        RoomInvalid: The file cannot be read, is too large, is not MJCF, or needs further files.
     """
     data = _content(mission_file, name, "an MJCF file")
     if len(data) > MAX_BYTES:
@@ -59,7 +59,7 @@ def room_text(mission_file: str, name: str) -> str:
 
 
 def floor_plan_text(mission_file: str, name: str) -> str:
-    """Return what the picture of a floor plan holds, in base64.
+    """Return the picture of a floor plan in base64.
 
     Args:
         mission_file: As for ``room_text``.
@@ -77,7 +77,7 @@ def floor_plan_text(mission_file: str, name: str) -> str:
 
 
 def _content(mission_file: str, name: str, what: str) -> bytes:
-    """Return the first bytes of a file, one more than any may have."""
+    """Return the first bytes of a file, at most one more than the largest size allows."""
     path = Path(mission_file).parent / name
     try:
         if path.exists() and not path.is_file():
@@ -90,7 +90,7 @@ def _content(mission_file: str, name: str, what: str) -> bytes:
 
 
 def check_floor_plan(localizer: Element, report: Report) -> None:
-    """Report what is wrong with the picture that a localizer names, if it names one."""
+    """Report the faults of the picture that a localizer names, if any."""
     for given in localizer.all("parameter"):
         name = given.text("value")
         if given.text("name") == FLOOR_PLAN and name:
@@ -102,7 +102,7 @@ def check_floor_plan(localizer: Element, report: Report) -> None:
 
 
 def check_room_file(room: Element, report: Report) -> None:
-    """Report what is wrong with the file a room names, if it names one."""
+    """Report the faults of the file that a room names, if any."""
     name = room.text("mjcf")
     if not name:
         return

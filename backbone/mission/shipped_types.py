@@ -1,4 +1,4 @@
-"""The component types that the project brings along: no mission file need declare them."""
+"""The shipped component types, which no mission file needs to declare."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FILE = "shipped_types.xml"
 
 
 def shipped_text() -> bytes:
-    """Return the types as the text of a mission file that has nothing else."""
+    """Return the types as the text of a mission file without other content."""
     return resources.files("backbone.mission").joinpath(FILE).read_bytes()
 
 

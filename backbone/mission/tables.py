@@ -1,4 +1,4 @@
-"""The named elements of a mission file, so that checks and reader can find what a name means."""
+"""The named elements of a mission file, for checks and reader."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from backbone.naming import Subsystem, is_legal
 CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "dependency_database", "rc_manager")
 """In their order of start. Source: RAM 2002, "Backbone"."""
 
-SIMULATED = "simulated"  # the driver whose hardware is played by the mission's world
+SIMULATED = "simulated"  # the driver whose hardware is simulated by the mission's world
 EXECUTION_UNIT = "execution_unit"  # the shipped type that runs modules
-SIMULATED_WORLD = "simulated_world"  # the shipped type that plays it
-WORLD = "world"  # the parameter that names it, and the world's own
+SIMULATED_WORLD = "simulated_world"  # the shipped type of the simulated world
+WORLD = "world"  # the parameter that names the world, and the world's own parameter
 ROOM = "room"  # the parameter with the room, for classes that have it
-FLOOR_PLAN = "floor_plan"  # their parameter with a picture of the floor: a file in the mission file, then what it holds
+FLOOR_PLAN = "floor_plan"  # their parameter for a picture of the floor: in the file its name, later its content
 NETWORK_ID = "network_id"  # the parameter by which the radio distinguishes robots
 
 
 @dataclass(frozen=True)
 class Tables:
-    """Elements by name; of several with one name, the first.
+    """Elements by name; if several have one name, the first.
 
     Attributes:
         hosts: Machines.
         types: Component types.
-        by_type: Type → all resources of it, in the order of the file.
+        by_type: Type → all its resources, in the order of the file.
         world: The simulated world, if there is one.
         behaviors: Every node of the behavior tree, parents before their children.
-        classes: Class path → what is known of the class.
+        classes: Class path → facts of the class.
     """
 
     root: Element
@@ -68,24 +68,24 @@ class Tables:
         return [] if modules is None else modules.all("unit")
 
     def facts_of(self, kind: str) -> ClassFacts | None:
-        """Return what is known of the class of this type; None: nothing."""
+        """Return the facts of the class of this type; None: unknown."""
         found = self.classes.get(self.types[kind].text("class")) if kind in self.types else None
         return None if found is None or found.failure else found
 
     def needs(self, kind: str) -> dict[str, str]:
-        """Return role → type of resource that an ARC of this kind needs; none if it is no ARC."""
+        """Return role → type of resource that an ARC of this kind needs; empty if it is not an ARC."""
         found = self.types.get(kind)
         return {} if found is None else {role_of(needed): needed.text("type") for needed in found.all("needs")}
 
     def belongs_to(self, name: str, subsystem: Subsystem) -> bool:
-        """Return whether this type is, or if its subsystem is illegal may be meant to be, of the subsystem."""
+        """Return whether this type is of the subsystem; a type with an illegal subsystem may be of any."""
         found = self.types.get(name)
         return found is not None and (
             found.text("subsystem") == subsystem or found.text("subsystem") not in set(Subsystem)
         )
 
     def is_resource_type(self, name: str) -> bool:
-        """Return whether this type runs a piece of hardware, so is no service, ARC, behavior or world."""
+        """Return whether this type runs a piece of hardware, so is not a service, ARC, behavior or world."""
         return (
             self.belongs_to(name, Subsystem.RESOURCE_POOL)
             and not self.needs(name)
@@ -105,7 +105,7 @@ class Tables:
         return name in self.resources and self.resources[name].text("type") == kind
 
     def robots(self) -> list[Element]:
-        """Return the resources that a radio distinguishes: all of types of which any has a network id."""
+        """Return the resources that a radio distinguishes: all of each type that has a resource with a network id."""
         return [
             resource
             for same_type in self.by_type.values()
@@ -124,13 +124,13 @@ def role_of(needed: Element) -> str:
 
 
 def section(root: Element, tag: str) -> list[Element]:
-    """Return what stands in a section of the mission; nothing if it is left out."""
+    """Return the content of a section of the mission; empty if it is left out."""
     found = root.first(tag)
     return [] if found is None else found.children
 
 
 def parameter_value(text: str) -> bool | int | float | str:
-    """Return the value of a parameter: a JSON number, true or false if it reads as one, otherwise the text.
+    """Return the value of a parameter: a number, true or false if the text is JSON for it, otherwise the text.
 
     Example:
         >>> parameter_value("15"), parameter_value("0.5"), parameter_value("true"), parameter_value("/dev/video0")
@@ -149,13 +149,13 @@ def parameters(element: Element) -> dict[str, bool | int | float | str]:
 
 
 def host_tags_lacking(host: Element, component_type: Element) -> list[str]:
-    """Return the tags a type asks for and a host does not have."""
+    """Return the tags that a type requires and a host does not have."""
     return [tag for tag in component_type.words("tags") if tag not in host.words("tags")]
 
 
-# ---------------------------------------------------------------------- what all checks say alike
+# ---------------------------------------------------------------------- common to all checks
 def is_known(element: Element, attribute: str, what: str, known: Collection[str], report: Report) -> bool:
-    """Return whether the attribute names something that exists; if it is a legal name that does not, report it."""
+    """Return whether the attribute names something that exists; report a legal name that does not."""
     name = element.text(attribute)
     if name in known:
         return True
@@ -180,7 +180,7 @@ def check_unique(elements: Iterable[Element], attribute: str, what: str, report:
 
 
 def check_parameters(element: Element, reserved: Collection[str], report: Report) -> None:
-    """Report parameters given twice, and those that are set by something else."""
+    """Report parameters that occur twice, and those that other parts of the file set."""
     given = element.all("parameter")
     check_unique(given, "name", "parameter", report)
     for parameter in given:

@@ -1,7 +1,7 @@
-"""Whether a mission file holds what is declared, and nothing else.
+"""Checks that a mission file contains what is declared, and nothing else.
 
-What has no place in the file is taken out, or for what it was probably meant, before pydantic judges the rest: a
-stranger must not hide what is wrong beside it, for ``check`` reports everything at once.
+Undeclared elements and attributes are removed, or replaced by what was probably meant, before pydantic checks the rest.
+So an undeclared part does not hide other faults, because ``check`` reports everything at once.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from backbone.mission.declaration.vocabulary import ROOT, ElementRule, vocabular
 from backbone.mission.document import Attribute, Element
 from backbone.mission.report import Report, listed, quoted
 
-FOR_EDITORS = frozenset({"xmlns:xsi", "xsi:noNamespaceSchemaLocation"})  # let an editor complete; mean nothing here
+FOR_EDITORS = frozenset({"xmlns:xsi", "xsi:noNamespaceSchemaLocation"})  # for completion in editors; ignored here
 
 
 FORMER_ROBOT = "scout"
-"""Tag of a robot's body in mission files from before there were other robots; still read."""
+"""Tag of a robot's body in old mission files, when there was only one kind of robot; still read."""
 
 
 def repair(root: Element, report: Report) -> bool:
-    """Report what has no place in the file; afterwards the tree holds declared elements and attributes only.
+    """Report undeclared elements and attributes; afterwards the tree contains declared ones only.
 
     Returns:
-        False if this is no mission file at all, so that nothing further can be said.
+        False if this is not a mission file at all, so that no further check makes sense.
     """
     if root.tag != ROOT:
         report.fault(
@@ -43,7 +43,7 @@ def repair(root: Element, report: Report) -> bool:
 
 
 def validated(root: Element, report: Report) -> MissionElement | None:
-    """Return the mission with its values read; None, with every fault, if it lacks something or a value is illegal.
+    """Return the mission with its values read; None, with every fault, if a part is missing or a value is illegal.
 
     Args:
         root: A tree of declared elements and attributes.
@@ -75,14 +75,14 @@ def _judged(root: Element, report: Report) -> MissionElement | None:
 
 
 def fill_defaults(root: Element) -> None:
-    """Give every attribute that is left out its default, if it has one."""
+    """Set every attribute that is left out to its default, if it has one."""
     for element in root:
         for name, rule in vocabulary()[element.tag].attributes.items():
             if rule.default is not None and name not in element.attributes:
                 element.attributes[name] = Attribute(rule.default, element.place, is_written=False)
 
 
-# ---------------------------------------------------------------------- what has no place in the file
+# ---------------------------------------------------------------------- undeclared parts
 def _repair(element: Element, report: Report) -> None:
     rule = vocabulary()[element.tag]
     _repair_attributes(element, rule, report)
@@ -108,12 +108,12 @@ def _repair(element: Element, report: Report) -> None:
 
 
 def _rename(parent: Element, child: Element, rule: ElementRule, report: Report) -> bool:
-    """Report a stranger; give it the tag it was probably meant to have and say whether there is one."""
+    """Report an undeclared child; if its tag is near a declared one, give it that tag. Return whether there is one."""
     meant = report.nearest(child.tag, rule.children)
     known = child.tag in vocabulary()
     what = f"<{child.tag}> does not belong in <{parent.tag}>" if known else f"no element is called {quoted(child.tag)}"
     allowed = listed([f"<{tag}>" for tag in rule.children])
-    remedy = f"In <{parent.tag}> may stand: {allowed}" if allowed else f"<{parent.tag}> has no elements inside"
+    remedy = f"<{parent.tag}> may contain: {allowed}" if allowed else f"<{parent.tag}> has no elements inside"
     report.fault(child.place, what + _remark(meant), remedy)
     child.tag = meant or child.tag
     return bool(meant)
@@ -134,9 +134,9 @@ def _remark(meant: str) -> str:
     return f" (did you mean {meant!r}?)" if meant else ""
 
 
-# ---------------------------------------------------------------------- what pydantic judges
+# ---------------------------------------------------------------------- checks by pydantic
 def _values(element: Element) -> dict[str, object]:
-    """Return an element as the declared classes read it: attributes and children by their names."""
+    """Return an element in the form that the declared classes read: attributes and children by their names."""
     values: dict[str, object] = {name: attribute.value for name, attribute in element.attributes.items()}
     for tag, (_least, most) in vocabulary()[element.tag].children.items():
         inside = [_values(child) for child in element.all(tag)]
@@ -148,7 +148,7 @@ def _values(element: Element) -> dict[str, object]:
 
 
 def _located(root: Element, error: ErrorDetails) -> tuple[Element, str]:
-    """Return the element that an error is in, and the attribute or the kind of child that it is about."""
+    """Return the element that an error concerns, and its attribute or kind of child."""
     element, left = root, list(error["loc"])
     while left:
         name = str(left.pop(0))

@@ -25,14 +25,14 @@ from backbone.naming import Subsystem, is_legal
 BODY = 'Write class="package.module:Class" of the robot\'s body, importable on this machine'
 BODIES = ("furniture", "ramp", "landmark", "dark", "robot", "target")
 CARRIER = "carrier"  # the shape of a target that brings robots in
-NEAREST_SET_DOWN_M, FARTHEST_SET_DOWN_M = 0.45, 1.2  # as scout_model.dimensions has them; a test compares
+NEAREST_SET_DOWN_M, FARTHEST_SET_DOWN_M = 0.45, 1.2  # equal to those in scout_model.dimensions; a test compares
 CARRIER_PLACES = 6  # same
-TABLE_TOP_M, TABLE_LEGS_M = 0.03, 0.10  # what a table is more than: the thickness of its top, two of its legs
+TABLE_TOP_M, TABLE_LEGS_M = 0.03, 0.10  # least size of a table: the thickness of its top, two of its legs
 PAIRS_AT_MOST = 1_000_000  # chosen: half a second; a thousand robots among a thousand tables
 
 
 def check_world(tables: Tables, report: Report) -> None:
-    """Report what does not fit in the world, and robots that are only in it or only among the resources."""
+    """Report faults in the world, and robots that are only in it or only among the resources."""
     world = tables.world
     if world is None:
         return
@@ -168,7 +168,7 @@ def _check_not_in_ramps(robots: list[Element], ramps: list[Element], report: Rep
 
 
 def _is_within(point_m: float | None, middle_m: float | None, extent_m: float | None) -> bool:
-    """Return whether a point is between the ends of an extent; never where one of them is missing."""
+    """Return whether a point is between the ends of an extent; False if a number is missing."""
     if point_m is None or middle_m is None or extent_m is None:
         return False
     return abs(point_m - middle_m) < extent_m / 2
@@ -201,7 +201,7 @@ def _check_classes(world: Element, tables: Tables, report: Report) -> None:
 
 
 def _check_body(robot: Element, tables: Tables, report: Report) -> None:
-    """Report a robot without a class whose type names no body; a name of no robot is reported elsewhere."""
+    """Report a robot without a class whose type has no body either; an unknown robot is reported elsewhere."""
     kinds = {resource.text("name"): resource.text("type") for resource in tables.robots()}
     kind = kinds.get(robot.text("name"), "")
     facts = tables.facts_of(kind)
@@ -210,7 +210,7 @@ def _check_body(robot: Element, tables: Tables, report: Report) -> None:
 
 
 def _check_carried(world: Element, report: Report) -> None:
-    """Report robots whose carrier there is not, has no place left for them, or cannot reach where they belong."""
+    """Report robots whose carrier does not exist, has no place left, or cannot reach their place."""
     carriers = {target.text("name"): target for target in world.all("target") if target.text("shape") == CARRIER}
     aboard = dict.fromkeys(carriers, 0)
     for robot in world.all("robot"):
@@ -232,7 +232,7 @@ def _check_carried(world: Element, report: Report) -> None:
 
 
 def _distance_to_path_m(robot: Element, target: Element) -> float | None:
-    """Return how far a robot's place is from a target's path; None where a number is missing."""
+    """Return the distance of a robot's place from a target's path; None if a number is missing."""
     x_m, y_m = robot.number("x-m"), robot.number("y-m")
     points = [(point.number("x-m"), point.number("y-m")) for point in target.all("point")]
     if x_m is None or y_m is None or len(points) < 2:

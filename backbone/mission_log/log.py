@@ -103,7 +103,7 @@ class PeopleKnown(Message, frozen=True):
 
 
 Logged = StoryEvent | OperatorActed | Log | ComponentState | PeopleKnown
-"""Messages of which a log, and who is spoken of in it, is made."""
+"""Messages from which a log is made, and the names of the people in it."""
 
 
 class MissionLog:
@@ -120,7 +120,7 @@ class MissionLog:
         """People at consoles, whose names replace the consoles' names in answers."""
 
     def take(self, said: Logged, source: str = "", cause: str = "") -> None:
-        """Take in a message, said by this component because of another message."""
+        """Apply a message that a component sent; ``cause`` is the message that led to it."""
         match said:
             case StoryEvent():
                 self.add(said)
@@ -140,7 +140,7 @@ class MissionLog:
         self._events.append(event)
 
     def newest(self, count: int) -> list[StoryEvent]:
-        """Return the newest, oldest first, by the names of people."""
+        """Return the newest events, oldest first, with the names of people."""
         newest = list(islice(reversed(self._events), count))
         return [self.people.named_event(event) for event in reversed(newest)]
 
@@ -150,13 +150,13 @@ class MissionLog:
         return Log(found[-asked.most :], max(0, len(found) - asked.most), self._since_s)
 
     def copied(self) -> MissionLog:
-        """Return a log that goes on from here by itself; the events, which never change, are in both."""
+        """Return an independent copy; both share the events, which never change."""
         twin = MissionLog()
         twin._events, twin._since_s, twin.people = self._events.copy(), self._since_s, copy.deepcopy(self.people)
         return twin
 
     def _recall(self, events: Sequence[StoryEvent]) -> None:
-        """Keep earlier events, too; an event that is kept already is in it once."""
+        """Add earlier events; an event that is kept already is not added again."""
         known = {(event.at_s, event.where) for event in events}
         own = [event for event in self._events if (event.at_s, event.where) not in known]
         self._events = deque(sorted([*events, *own], key=lambda event: event.at_s), maxlen=self._events.maxlen)

@@ -1,4 +1,4 @@
-"""The context switches under way: one at a time for each ARC, each reported to the schedule manager when it is done."""
+"""The running context switches: at most one for each ARC, each reported to the schedule manager when it is done."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from backbone.waiting import end_tasks
 
 
 class SwitchService(Protocol):
-    """The RC manager, as its switches need it."""
+    """The interface of the RC manager for its switches."""
 
     clock: Clock
 
     def happened(self, event: Event) -> None:
-        """Pass the event to the schedule manager, and carry its instructions out."""
+        """Pass the event to the schedule manager, and carry out its instructions."""
 
     def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         """Run the coroutine until the component ends."""
 
 
 class ArcSwitches:
-    """Carries out what the schedule manager orders for ARCs.
+    """Carries out the schedule manager's instructions for ARCs.
 
     Args:
         service: The RC manager.
         context_switch: Connects and revokes.
-        rcs: Hears which RCs failed.
-        grace_s: Time of an ARC to stop cleanly.
+        rcs: Gets the names of RCs that failed.
+        grace_s: Time that an ARC has to stop cleanly.
     """
 
     def __init__(self, service: SwitchService, context_switch: ContextSwitch, rcs: RcWatch, grace_s: float) -> None:
@@ -42,12 +42,12 @@ class ArcSwitches:
         self._times = SwitchTimes()
 
     def __contains__(self, arc: str) -> bool:
-        """Return whether work is under way for this ARC."""
+        """Return whether a switch of this ARC is running."""
         return arc in self._under_way
 
     @property
     def tasks(self) -> list[asyncio.Task[None]]:
-        """The work that is under way."""
+        """The tasks of the running switches."""
         return [*self._under_way.values()]
 
     def statistics(self) -> dict[str, float]:
@@ -64,7 +64,7 @@ class ArcSwitches:
         self.begin(order.arc, lambda: self._revoke(order))
 
     def begin(self, arc: str, work: Callable[[], Coroutine[object, None, None]]) -> None:
-        """Run the work after the work that is still under way for this ARC was ended."""
+        """Run the work after ending the work that still runs for this ARC."""
         before = self._under_way.get(arc)
 
         async def in_turn() -> None:

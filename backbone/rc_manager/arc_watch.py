@@ -1,4 +1,4 @@
-"""Watch over the ARCs: which ones ask, what they may use, and whether they still beat."""
+"""Watch over the ARCs: their requests, their uses of RCs, and their heartbeats."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ from backbone.wire import Envelope
 
 log = logging.getLogger(__name__)
 
-ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; after this it hangs or is gone
+ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; without an answer it hangs or is gone
 
 
 class ArcService(Protocol):
-    """The RC manager, as the watch needs it."""
+    """The interface of the RC manager for this watch."""
 
     bus: Bus
     clock: Clock
     story: StoryBook
 
     def happened(self, event: Event) -> None:
-        """Pass the event to the schedule manager, and carry its instructions out."""
+        """Pass the event to the schedule manager, and carry out its instructions."""
 
     async def request(self, request: SchedulingRequest) -> Scheduled:
         """Choose RCs for the request, and admit it."""
 
     def admit_again(self, current: CurrentRequest) -> bool:
-        """Admit a request with the RCs that were chosen for it before, unless one of them is gone."""
+        """Admit a request with the RCs chosen for it earlier, unless an RC of them is gone."""
 
     def start_task(self, work: Coroutine[object, None, None], name: str) -> object:
         """Run the coroutine until the component ends."""
 
 
 class ArcWatch:
-    """The ARCs that ask for RCs.
+    """The ARCs that request RCs.
 
     Args:
         service: The RC manager.
-        switches: The context switches under way.
+        switches: The running context switches.
         recovery: Asks an ARC for its request.
     """
 
@@ -87,13 +87,13 @@ class ArcWatch:
         return self._beats.forget(arc)
 
     def end_silent(self) -> None:
-        """End the requests of ARCs that hang. When: every ``RENEW_EVERY_S``."""
+        """End the requests of ARCs that hang. Call it every ``RENEW_EVERY_S``."""
         for arc, silent_s in self._beats.look(self._service.clock.now_s()).items():
             log.warning("%s has not beaten for %.1f s", arc, silent_s)
             self._service.happened(Departed(arc, "silent"))
 
     def heard_beat(self, envelope: Envelope[Beat]) -> None:
-        """Take in a beat; one of an ARC that is not known leads to a question for its request."""
+        """Record a beat; ask an unknown ARC for its request."""
         arc = envelope.body.arc
         if arc in self._beats.heard_s:
             self._beats.heard(arc, self._service.clock.now_s())
@@ -101,17 +101,17 @@ class ArcWatch:
             self._switches.begin(arc, lambda: self._meet(arc))
 
     async def _meet(self, arc: str) -> None:
-        """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
+        """Readmit an ARC that beats but is unknown: it hung, or its request was lost with an earlier manager."""
         current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
         if current is None or arc in self._beats.heard_s or self._requesting[arc] or self._service.admit_again(current):
             return
         try:
-            await self._service.request(current.request)  # its own question was lost, or is still on its way
+            await self._service.request(current.request)  # its own request was lost, or is still on its way
         except (Refusal, LinkError) as error:
             self._service.story.note(arc, f"got no place in the schedule: {error}")
 
     def tell_paths(self, requests: Iterable[RequestAttributes]) -> None:
-        """Tell ARCs by which path they ask now: a later RC manager must hear of it."""
+        """Send ARCs their present paths, because a later RC manager must receive these from them."""
         for one in requests:
             self._service.start_task(self._tell_path(one.arc, one.path), f"path of {one.arc}")
 
@@ -119,4 +119,4 @@ class ArcWatch:
         try:
             await self._service.bus.ask(in_pool(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
-            self._service.story.note(arc, f"did not take its new path; the next RC manager would not know it: {error}")
+            self._service.story.note(arc, f"did not accept its new path; the next RC manager would not get it: {error}")

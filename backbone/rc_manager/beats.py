@@ -1,9 +1,9 @@
-"""Beats: which ARCs hang, by how long each has not beaten.
+"""Beats: finds ARCs that hang, by the time since each one's last beat.
 
 Rules of this file: pure; the caller owns the clock.
 
-* At most ``LOOK_MOST_S`` of the time between two looks counts as silence: a paused RC manager hears nothing, and what
-  the ARCs sent meanwhile reaches it only after it goes on.
+* At most ``LOOK_MOST_S`` of the time between two checks counts as silence. A paused RC manager receives nothing, and
+  beats sent meanwhile arrive only after it continues.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 from backbone.rc_manager.messages import BEAT_MISSED_S, RENEW_EVERY_S
 
-LOOK_MOST_S = 1.5 * RENEW_EVERY_S  # chosen: a look may come late by half its period
+LOOK_MOST_S = 1.5 * RENEW_EVERY_S  # chosen: a check may be late by half its period
 
 
 @dataclass
 class Beats:
-    """The last beat of each ARC that asks for RCs.
+    """The last beat of each ARC with a request.
 
     Attributes:
         rate: Seconds of the clock per second of the machine.
@@ -40,7 +40,7 @@ class Beats:
         """Return the ARCs that hang, with the seconds of the machine since their last beat, and forget them.
 
         Args:
-            now_s: Seconds of the clock; looks are ``RENEW_EVERY_S`` of the machine apart.
+            now_s: Seconds of the clock; checks are ``RENEW_EVERY_S`` of the machine apart.
         """
         paused_s = 0.0 if self._looked_s is None else max(0.0, now_s - self._looked_s - LOOK_MOST_S * self.rate)
         self._looked_s = now_s

@@ -3,10 +3,10 @@
 Rules of this file:
 
 * All or nothing: if one step of a connection fails, the switch undoes all of it before it reports the failure.
-* An RC without another holder that does not confirm its disconnection in time delays no other RC: the switch leaves it,
-  the caller counts it as down, and it is up again only after it confirmed. If an RC has other holders, the switch waits
-  until its lease is over. A holder may be late, there are never two. After a death the successor confirms (decision
-  0006).
+* If an RC without another holder does not confirm its disconnection in time, the switch does not wait for it. The
+  caller counts it as down until it has confirmed. If an RC has other holders, the switch waits until its lease is
+  over. The next holder of a unit RC may be late, but there are never two. After a death the successor confirms
+  (decision 0006).
 * An ARC that does not answer delays no other ARC: its epoch ends with the disconnection of its RCs.
 
 Source: RAM 2002, "The RC Scheduler", last paragraph.
@@ -50,11 +50,11 @@ Hold = tuple[str, str, int]
 
 
 class ContextSwitch:
-    """Connects, disconnects and opens for the schedule manager.
+    """Connects RCs, disconnects them and opens gates for the schedule manager.
 
     Args:
         note: Adds an event to the story of a subject.
-        may_leave: Returns whether a switch may leave an RC that an ARC loses: it is down, or has no other holder.
+        may_leave: Returns whether a switch may skip an RC that an ARC loses: it is down, or has no other holder.
     """
 
     def __init__(self, bus: Bus, clock: Clock, note: Note, may_leave: Callable[[str, str], bool]) -> None:
@@ -90,11 +90,11 @@ class ContextSwitch:
         return failed or ""
 
     async def revoke(self, order: RevokeArc, within_s: float) -> list[str]:
-        """Close the ARC's gate and disconnect its RCs; return once all RCs are free, but for RCs that were left.
+        """Close the ARC's gate and disconnect its RCs; return when all RCs are free, except skipped ones.
 
         Args:
             order: Instruction of the schedule manager.
-            within_s: Mission seconds after which RCs without another holder are left.
+            within_s: Mission seconds after which RCs without another holder are skipped.
 
         Returns:
             RCs that did not confirm: the caller counts them as down, and calls ``clear`` before they count as up.
@@ -111,10 +111,10 @@ class ContextSwitch:
         return disconnecting.result()
 
     async def clear(self, rc: str, found: Sequence[Hold]) -> bool:
-        """End the remaining holds of an RC that was down: those it reports, and those left while it was down.
+        """End the remaining holds of an RC that was down: those that it reports, and those skipped while it was down.
 
         Returns:
-            True if it confirmed the end of all holds.
+            True if the RC confirmed the end of all holds.
         """
         left = self._left[rc]
         while holds := [*dict.fromkeys([*found, *(one for one in left if left[one] > self._clock.now_s())])]:
@@ -126,7 +126,7 @@ class ContextSwitch:
         return True
 
     async def disconnect(self, holds: Sequence[Hold], reason: str) -> None:
-        """Disconnect all at once; wait until each confirms or its lease is over."""
+        """Disconnect all at once; wait until each RC confirms or its lease is over."""
         await self._disconnect(holds, reason, math.inf)
 
     async def _connect_rcs(self, order: ConnectArc) -> str | None:
@@ -167,17 +167,17 @@ class ContextSwitch:
             self._note(arc, f"did not close its gate: {error}")
 
     async def _disconnect(self, holds: Sequence[Hold], reason: str, free_by_s: float) -> list[str]:
-        """Disconnect all at once; after ``free_by_s`` leave the RCs that may be left to ``clear``.
+        """Disconnect all at once; after ``free_by_s`` skip the RCs that may be skipped, for ``clear``.
 
         Returns:
-            RCs that did not confirm: they were left, or their leases are over.
+            RCs that did not confirm: they were skipped, or their leases are over.
         """
         lease_until_s = self._clock.now_s() + LEASE_S * self._clock.rate
         confirmed = await asyncio.gather(*(self._end(hold, reason, lease_until_s, free_by_s) for hold in holds))
         return [rc for (rc, _, _), has_confirmed in zip(holds, confirmed, strict=True) if not has_confirmed]
 
     async def _end(self, hold: Hold, reason: str, lease_until_s: float, free_by_s: float) -> bool:
-        """Disconnect; return whether the RC confirmed that."""
+        """Disconnect one RC; return whether it confirmed."""
         rc, arc, epoch = hold
         complain = self._note
         while (left_s := self._real_s(lease_until_s)) > 0:
@@ -197,7 +197,7 @@ class ContextSwitch:
         return False
 
     def _real_s(self, until_s: float) -> float:
-        """Return the seconds until then by people's clocks."""
+        """Return the seconds until then on the machine's clock."""
         return (until_s - self._clock.now_s()) / self._clock.rate
 
 

@@ -1,7 +1,7 @@
-"""Decision log: tells what the schedule manager decides on, and what it decides.
+"""Decision log: publishes and writes the schedule manager's events and decisions.
 
-Each line goes to the trace file, into the shares of time, into the RC manager's story, and to listeners. For
-recorders each event is published before its decision: from a snapshot and the events after it a replay decides again.
+Each line goes to the trace file, the shares of time, the RC manager's story, and subscribers. For recorders, each event
+is published before its decision. From a snapshot and the events after it, a replay can decide again.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ class DecisionLog:
     """The decisions of one schedule manager.
 
     Args:
-        bus: Of the RC manager.
-        manager: Only written down, never changed.
-        note: Adds a subject and what happened to the RC manager's story.
-        trace_stopped: Called when the trace file could not be written any more.
+        bus: Bus of the RC manager.
+        manager: The schedule manager; only read, never changed.
+        note: Adds a subject and an event to the RC manager's story.
+        trace_stopped: Called when the trace file can no longer be written.
 
     Attributes:
         shares: The shares of time of all RCs by the decisions so far.
@@ -47,19 +47,19 @@ class DecisionLog:
         self.shares = Shares()
 
     def begin(self, trace: str) -> None:
-        """Open the trace file at this path, if any, and tell the state before the first decision."""
+        """Open the trace file at this path, if any, and publish the state before the first decision."""
         self._trace = TraceFile(trace)
         if self._trace.stopped_by:
             self._trace_stopped()
         try:
             self._publish(self.snapshot())
         except NoSnapshot:
-            self._note("", "its planner cannot be written down: recordings have no state of the schedule")
+            self._note("", "its planner cannot be saved, so recordings have no state of the schedule")
         for record in self._manager.opening_lines():
             self.record(record)
 
     def decides_on(self, event: Event, at_s: float) -> None:
-        """Tell that the schedule manager is about to decide on this event."""
+        """Publish that the schedule manager is about to decide on this event."""
         self._number += 1
         self._publish(Decided(self._number, at_s, event))
 
@@ -72,7 +72,7 @@ class DecisionLog:
         return ScheduleSnapshot(self._number, self._clock.now_s(), written(self._manager))
 
     def record(self, record: Record) -> None:
-        """Tell one line of a decision."""
+        """Write and publish one line of a decision."""
         line = dict(record.line)
         self.shares.take(line)
         if not self._trace.write(line):

@@ -1,7 +1,7 @@
-"""Hardware: the RCs that the schedule may use are those that the dependency database has.
+"""Hardware: keeps the RCs in the schedule equal to those in the dependency database.
 
-It is compared when the database publishes a change, starts or comes back, when a request names an unknown RC, and now
-and then; so a lost message changes nothing for long. A removed RC is down at once. It stays known while a request
+They are compared when the database publishes a change, starts or comes back, when a request names an unknown RC, and
+periodically. So a lost message has no lasting effect. A removed RC is down at once. It stays known while a request
 names it.
 """
 
@@ -21,7 +21,7 @@ from backbone.scheduling.events import RcRemoved, RcWentDown
 from backbone.scheduling.requests import SchedulingRequest, UnknownRc
 from backbone.wire import Envelope
 
-COMPARE_EVERY_S = 20.0  # chosen: every known change is compared at once; this is for lost news
+COMPARE_EVERY_S = 20.0  # chosen: published changes are compared at once; this covers lost messages
 
 
 class Hardware:
@@ -47,7 +47,7 @@ class Hardware:
         self._alone = asyncio.Lock()
 
     async def learn(self) -> None:
-        """Learn the hardware at the start."""
+        """Read the hardware at the start."""
         self.resources.update(await self._present())
 
     def follow(self) -> None:
@@ -83,11 +83,11 @@ class Hardware:
                 self._add(present[rc])
 
     async def choose(self, request: SchedulingRequest) -> tuple[str, ...]:
-        """Return the set of RCs this request should wait for; an RC that was added a moment ago counts.
+        """Return the set of RCs that this request should wait for, including RCs added a moment ago.
 
         Raises:
-            UnknownRc: An RC was removed, or did never exist.
-            SchedulingRefusal: As of ``ScheduleManager.choose``.
+            UnknownRc: An RC was removed, or never existed.
+            SchedulingRefusal: See ``ScheduleManager.choose``.
         """
         try:
             rcs = self._service.manager.choose(request)
@@ -99,7 +99,7 @@ class Hardware:
         return rcs
 
     def let_go(self) -> None:
-        """Forget the removed RCs that no request names; another one of that name is added soon."""
+        """Forget the removed RCs that no request names, and compare again, because a new RC may have such a name."""
         gone: list[str] = []
         for rc in sorted(self._removed) if not self._service.is_choosing() else ():
             self._service.happened(RcRemoved(rc))
@@ -142,7 +142,7 @@ class Hardware:
 
 
 def _is_same(known: Resource, present: Resource) -> bool:
-    """Return whether the schedule need not know of the difference: of host, parameters and links."""
+    """Return whether the resources differ at most in ways that do not concern the schedule: host, parameters, links."""
     return (known.type, known.sharable, known.connect_s, known.disconnect_s) == (
         present.type,
         present.sharable,

@@ -36,18 +36,18 @@ from backbone.scheduling.requests import Holder, Lease, MeasuredPackets, PathNod
 from backbone.wire import Message
 
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
-EPOCHS_PER_S = 1000  # chosen: a restarted RC begins above all its earlier epochs, as no RC changes hands so often
+EPOCHS_PER_S = 1000  # chosen: no RC changes its holder so often, so a restarted RC begins above its earlier epochs
 EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s
-BEAT_WITHIN_S = 0.7  # chosen: an ARC beats after each renewal; one that gets no renewal beats so long after its last
-BEAT_MISSED_S = 1.2  # chosen: one of the two beats that are due may be lost; named at the third renewal, after 1.5 s
-LONGEST_PACKET_S = 10.0  # chosen: a radio gives a packet up after a second; a longer time is a fault of its driver
+BEAT_WITHIN_S = 0.7  # chosen: an ARC beats after each renewal, or, without renewals, so long after its last beat
+BEAT_MISSED_S = 1.2  # chosen: one of two expected beats may be lost; a hung ARC is found at the third renewal, at 1.5 s
+LONGEST_PACKET_S = 10.0  # chosen: a radio abandons a packet after a second; a longer time is a fault of its driver
 
 
 # ---------------------------------------------------------------------- requests of ARCs
 
 
 class Withdraw(Message, frozen=True):
-    """This ARC needs no time any more and is about to end."""
+    """This ARC needs no more time and is about to end."""
 
     arc: Mention
     reason: Text = ""
@@ -83,14 +83,14 @@ class SetPriority(Message, frozen=True):
 
 
 class MoveNode(Message, frozen=True):
-    """Move a node of the behavior tree, with all below it, below another parent; its priority stays."""
+    """Move a node of the behavior tree, with its descendants, below another parent; its priority stays."""
 
     node: Mention
     parent: Mention
 
 
 class Done(Message, frozen=True):
-    """Answer to a request without another answer: it was carried out."""
+    """Answer to a request that has no other answer: it was carried out."""
 
 
 class Beat(Message, frozen=True):
@@ -101,11 +101,11 @@ class Beat(Message, frozen=True):
 
 # ---------------------------------------------------------------------- to ARCs
 class OpenGate(Message, frozen=True):
-    """Your RCs are connected: prepare them, wait until they have settled, then let commands through.
+    """The ARC's RCs are connected: prepare them, wait until they have settled, then let commands pass.
 
     Attributes:
         epochs: RC name → epoch of this connection.
-        settled_s: Mission time at which the RCs have settled; they began when they were ordered to connect.
+        settled_s: Mission time at which the RCs have settled, counted from the order to connect.
         until_s: Earliest end of the slice, mission time, if it began now.
     """
 
@@ -122,9 +122,9 @@ class CloseGate(Message, frozen=True):
     """Close the gate.
 
     Attributes:
-        reason: Why: ``slice``, ``higher``, ``rc``, ``self`` …
+        reason: Reason: ``slice``, ``higher``, ``rc``, ``self`` …
         by: ARC or RC that caused it.
-        deadline_s: Seconds the decision process has to stop cleanly; 0: none, a higher one overrides.
+        deadline_s: Seconds that the decision process has to stop cleanly; 0: none, because a higher one preempts it.
         expected_s: Mission time of the next expected slot; negative: unknown.
     """
 
@@ -152,8 +152,8 @@ class CurrentRequest(Message, frozen=True):
     """Answer to ``AskRequest``.
 
     Attributes:
-        request: As last sent.
-        rcs: The set chosen for it; empty if none yet.
+        request: The request as last sent.
+        rcs: The set chosen for it; empty if none was chosen yet.
         epochs: RC → epoch of each hold; empty if the gate is closed.
         granted_s: Mission time of the grant; negative if the gate is closed.
     """
@@ -223,8 +223,8 @@ class RcState(Message, frozen=True):
         applied: Commands applied since its start.
         refused_stale: Commands of an older epoch or another ARC it refused.
         feedback: One line for people.
-        measured: What it measured of its present holders' packets, where that is longer than they declared; each kind
-            of packets of an ARC once.
+        measured: Packets of present holders that take longer than declared; each kind of packets of an ARC at most
+            once.
     """
 
     name: Mention
@@ -240,12 +240,12 @@ class RcState(Message, frozen=True):
 
 
 class Leases(Message, frozen=True):
-    """Published by the RC manager every ``RENEW_EVERY_S``: these holds last another ``lease_s`` from the stamp.
+    """Published by the RC manager every ``RENEW_EVERY_S``: these holds are renewed for ``lease_s`` from the stamp on.
 
     An RC that lost a hold renewed here, or that is listed as missing, publishes its ``RcState``.
 
     Attributes:
-        lease_s: For how long, seconds of mission time.
+        lease_s: Duration of the leases, seconds of mission time.
         missing: RCs that do not answer the RC manager.
     """
 
@@ -269,14 +269,14 @@ class AskUtilization(Message, frozen=True):
     """Ask for the utilization of each RC.
 
     Attributes:
-        periods: True: also for the ARCs' shares between the last re-plannings.
+        periods: True: the answer includes the ARCs' shares between the last re-plannings.
     """
 
     periods: bool = False
 
 
 class AskAttributes(Message, frozen=True):
-    """Ask for the requests of this ARC, of this decision process, or of all at and below this node."""
+    """Ask for the requests of this ARC, of this decision process, or of this node and its descendants."""
 
     name: Mention
 
@@ -285,7 +285,7 @@ class TraceLine(Message, frozen=True, tag="TraceLine/2"):
     """Published as an event: one decision, in the trace format of the schedule.
 
     Attributes:
-        cause: One line for people, of the rule that decided.
+        cause: One line for people, about the rule that decided.
     """
 
     line: Values
@@ -293,7 +293,7 @@ class TraceLine(Message, frozen=True, tag="TraceLine/2"):
 
 
 class Decided(Message, frozen=True):
-    """The schedule manager decided on an event. From the same events in the same order it decides the same.
+    """The schedule manager decided on an event. The same events in the same order lead to the same decisions.
 
     Attributes:
         number: Grows by one with each; 1 is the first of an RC manager.

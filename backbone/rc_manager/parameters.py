@@ -6,12 +6,12 @@ from backbone.scheduling.rules import SchedulingRules
 
 
 class RcManagerParameters(SchedulingRules, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """For whom and with which rules the RC manager decides.
+    """The mission, and the rules, by which the RC manager decides.
 
     Attributes:
         mission: Name of the mission's own node, root of the behavior tree.
         mission_priority: Its priority among the consoles.
-        trace: File the decisions are written to; empty: none.
+        trace: File of the decisions; empty: none.
     """
 
     mission: str
@@ -19,5 +19,5 @@ class RcManagerParameters(SchedulingRules, frozen=True, forbid_unknown_fields=Tr
     trace: str = ""
 
     def rules(self) -> SchedulingRules:
-        """Return the rules alone."""
+        """Return only the scheduling rules."""
         return SchedulingRules(**{rule: getattr(self, rule) for rule in SchedulingRules.__struct_fields__})

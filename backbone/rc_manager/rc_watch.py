@@ -1,7 +1,7 @@
-"""Watch over the RCs: the schedule may use those that run, are credible, and have no holds from before.
+"""Watch over the RCs: the schedule may use an RC if it runs, is credible, and has no earlier holds.
 
-An RC that is missing, does not answer or contradicts itself is down for the schedule manager, alone; the watch asks it
-again until its answer is credible and it has confirmed the end of all holds.
+If an RC is missing, does not answer or contradicts itself, only this RC is down for the schedule manager. The watch
+asks it again until its answer is credible and it has confirmed the end of all holds.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from backbone.wire import Envelope, MalformedMessage
 log = logging.getLogger(__name__)
 
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
-MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease: mostly an old hold keeps an RC from connecting
+MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease, because mostly an old hold keeps an RC from connecting
 
 
 class Service(Protocol):
-    """The RC manager, as the watch needs it."""
+    """The interface of the RC manager for this watch."""
 
     bus: Bus
     clock: Clock
@@ -43,10 +43,10 @@ class Service(Protocol):
     shares: Shares
 
     def happened(self, event: Event) -> None:
-        """Pass the event to the schedule manager, and carry its instructions out."""
+        """Pass the event to the schedule manager, and carry out its instructions."""
 
     def heard_rc(self, envelope: Envelope[RcState]) -> None:
-        """Take in the published state of an RC."""
+        """Apply the published state of an RC."""
 
     def is_choosing(self) -> bool:
         """Return whether RCs were chosen for a request that the schedule manager does not have yet."""
@@ -59,7 +59,7 @@ class Service(Protocol):
 
 
 class RcWatch:
-    """Checks RCs that appear, and repeatedly those that failed.
+    """Checks RCs that appear, and repeats the check of those that failed.
 
     Attributes:
         resources: RC → its resource; set before any other use.
@@ -72,7 +72,7 @@ class RcWatch:
         Args:
             service: The RC manager.
             context_switch: Ends an RC's remaining holds.
-            recovery: Knows the present components.
+            recovery: Finds the present components.
         """
         self._service = service
         self._context_switch = context_switch
@@ -86,7 +86,7 @@ class RcWatch:
 
     @property
     def starts(self) -> list[asyncio.Task[None]]:
-        """Starts through the placer that are under way."""
+        """The running starts through the placer."""
         return [*self._starts.values()]
 
     def missing(self) -> list[str]:
@@ -97,7 +97,7 @@ class RcWatch:
         """Start stopped RCs through the placer; return when all answer, or the placer works on them.
 
         Raises:
-            Refusal: One of them cannot be started.
+            Refusal: An RC cannot be started.
         """
         missing = [rc for rc in rcs if rc not in self.up and rc not in self._faults]
         for rc in missing:
@@ -108,7 +108,7 @@ class RcWatch:
     async def meet(self, rc: str) -> bool:
         """Ask the RC for its state and pass that to the schedule manager; return whether it is up.
 
-        The RC counted as down, so its remaining holds are from earlier grants: they are ended first.
+        The RC counted as down, so its remaining holds are from earlier grants. They are ended first.
         """
         if rc in self.up:
             return True
@@ -122,7 +122,7 @@ class RcWatch:
             return False
         if rc not in self.up:
             if self._faults.pop(rc, ""):
-                self._service.story.note(rc, "makes sense again")
+                self._service.story.note(rc, "is credible again")
             self.up.add(rc)
             self._service.happened(RcCameBack(rc, state.last_epoch))
             if state.capacity != self.resources[rc].capacity:
@@ -130,7 +130,7 @@ class RcWatch:
         return True
 
     def meet_again(self, rc: str) -> None:
-        """Check an RC that appeared or published; if it is not up then, check it again later."""
+        """Check an RC that appeared or published; if it is not up afterwards, check it again later."""
 
         async def again() -> None:
             if not await self.meet(rc):
@@ -139,17 +139,17 @@ class RcWatch:
         self._service.start_task(again(), f"meet {rc}")
 
     def meet_in_a_while(self, rc: str) -> None:
-        """Check a failed RC until it is up; not at once, or RC and schedule would retry each other for ever."""
+        """Check a failed RC until it is up; not at once, because RC and schedule could retry each other for ever."""
         if rc not in self._failing:
             self._failing.add(rc)
             self._service.start_task(self._meet_later(rc), f"meet {rc}")
 
     def failed(self, rc: str) -> None:
-        """Count the RC as down; the schedule manager has been informed."""
+        """Count the RC as down; the caller has informed the schedule manager."""
         self.up.discard(rc)
 
     def forget(self, rc: str) -> bool:
-        """Count an RC that left as down; return whether it was up or put aside."""
+        """Count an RC whose component is gone as down; return whether it was up or put aside."""
         was_known = rc in self.up or bool(self._faults.pop(rc, ""))
         self.up.discard(rc)
         return was_known
@@ -226,7 +226,7 @@ class RcWatch:
         return state
 
     async def _ask_doubted(self, rc: str) -> None:
-        """Ask an RC itself after a publication that is not credible: any component may publish in its name."""
+        """Ask the RC itself after a publication that is not credible: any component may publish in its name."""
         self._doubted.add(rc)
         try:
             await self._ask(rc, self._service.manager.epoch_of(rc))
@@ -234,7 +234,7 @@ class RcWatch:
             self._doubted.discard(rc)
 
     def _put_aside(self, rc: str, fault: str) -> None:
-        """Plan nothing on this RC until it is credible, and go on with the others."""
+        """Plan nothing on this RC until it is credible, and continue with the others."""
         self.up.discard(rc)
         if self._faults.get(rc) != fault:
             self._faults[rc] = fault

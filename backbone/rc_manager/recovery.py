@@ -2,7 +2,7 @@
 
 Rule of this file: it asks and collects; it decides nothing.
 
-Source: RAM 2002, "The RC Scheduler"; the RCs have the truth.
+Source: RAM 2002, "The RC Scheduler"; the RCs' answers are authoritative.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from backbone.wire import Message
 
 log = logging.getLogger(__name__)
 
-SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; after this the question was lost
+SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; without an answer by then, the question was lost
 RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
 
 
@@ -115,13 +115,13 @@ class Recovery:
         return {component_of(component.address) for component in await self._listing()}
 
     async def ask_all(self, addresses: Sequence[str], question: Message, reply: type[Reply]) -> dict[str, Reply]:
-        """Ask all at once; return the answers, by name."""
+        """Ask all addresses at once; return the answers, by name."""
 
         async def one(of: str) -> Reply | None:
             try:
                 return await self._bus.ask(of, question, reply, within_s=RC_REPLY_S)
             except (Refusal, LinkError):
-                return None  # a component of another kind, or one that is just dying
+                return None  # a component of another kind, or one that is ending
 
         answers = await asyncio.gather(*(one(of) for of in addresses))
         return {component_of(of): got for of, got in zip(addresses, answers, strict=True) if got is not None}

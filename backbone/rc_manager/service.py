@@ -2,8 +2,8 @@
 
 Rules of this file:
 
-* No decision about who runs: that is ``schedule_manager``'s. Here is only how.
-* Nothing that matters lives only here. After a restart the RCs say who holds them, the ARCs what they ask for.
+* ``schedule_manager`` decides which ARCs run. This file only carries its decisions out.
+* No essential state exists only here. After a restart, the RCs report their holders, and the ARCs their requests.
 
 Source: RAM 2002, "The RC Scheduler".
 """
@@ -88,12 +88,12 @@ from backbone.scheduling.views import Utilization
 from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope, Message
 
-CALM_EACH_S = 0.002  # chosen: of 100 ARCs five schedules a second, and people cannot read more
+CALM_EACH_S = 0.002  # chosen: with 100 ARCs five schedules a second, as fast as people can read
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
 
 
 class RcManager(Component[RcManagerParameters]):
-    """Grants whole sets of RCs by priority and in turns, and says why."""
+    """Grants whole sets of RCs by priority and in turns, and explains its decisions."""
 
     parameters_type = RcManagerParameters
     accepts = RcManagerQuestion
@@ -126,14 +126,14 @@ class RcManager(Component[RcManagerParameters]):
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
-        """Learn the hardware and, after a restart, who holds it; then watch the nameserver for changes."""
+        """Read the hardware and, after a restart, its holders; then watch the nameserver for changes."""
         self._log.begin(self.parameters.trace)
         await self._hardware.learn()
         self._found = self._rcs.believed(await self._recovery.find(self._resources))
         await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
 
     async def serve(self) -> None:
-        """Take over what was found; then wake when a decision is due, renew leases, publish changes."""
+        """Take over the findings; then wake when a decision is due, renew leases, publish changes."""
         self._take_over(self._found)
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_from_nameserver)
         self.bus.subscribe(f"{Subsystem.RESOURCE_POOL}/*", Conversation.BEAT, Beat, self._arcs.heard_beat)
@@ -145,7 +145,7 @@ class RcManager(Component[RcManagerParameters]):
             loops.create_task(self._hardware.keep_comparing())
 
     def parameters_changed(self) -> None:
-        """Refuse: a waiting ARC has a place by the rules as they are.
+        """Refuse, because the places of waiting ARCs depend on the present rules.
 
         Raises:
             FixedRules: Always.
@@ -153,7 +153,7 @@ class RcManager(Component[RcManagerParameters]):
         raise FixedRules(f"{self.name} keeps the rules it began with")
 
     async def drain(self) -> None:
-        """End all switches; what is held ends by lease, or is taken over by the next RC manager."""
+        """End all switches; the remaining holds end by lease, or the next RC manager takes them over."""
         await end_tasks(*self._switches.tasks, *self._rcs.starts)
         self._log.end()
 
@@ -202,7 +202,7 @@ class RcManager(Component[RcManagerParameters]):
         """Choose RCs for the request, and admit it.
 
         Raises:
-            Refusal: It has no place in the schedule.
+            Refusal: The request cannot be scheduled.
         """
         with self._arcs.choosing(request.arc):
             rcs = await self._hardware.choose(request)
@@ -215,8 +215,8 @@ class RcManager(Component[RcManagerParameters]):
         return self._arcs.is_choosing()
 
     def _tell_paths(self, node: str) -> None:
-        """Tell the ARCs at and below the node by which path they ask now."""
-        with contextlib.suppress(UnknownRequest):  # it has no request yet
+        """Send the ARCs of the node and its descendants their present paths."""
+        with contextlib.suppress(UnknownRequest):  # the node has no request yet
             self._arcs.tell_paths(self.answers.attributes(node).requests)
 
     def admit_again(self, current: CurrentRequest) -> bool:
@@ -232,9 +232,9 @@ class RcManager(Component[RcManagerParameters]):
         self._arcs.remember(request.arc)
         self.happened(Requested(request, rcs))
 
-    # ------------------------------------------------------------------ decide, then do
+    # ------------------------------------------------------------------ decisions and their execution
     def happened(self, event: Event, at_s: float | None = None) -> None:
-        """Let the schedule manager decide on what happened, now unless told, and begin to carry out what it says."""
+        """Let the schedule manager decide on the event, at ``at_s`` or now, and begin to carry out its instructions."""
         at_s = self.clock.now_s() if at_s is None else at_s
         self._log.decides_on(event, at_s)
         instructions = self.manager.handle(event, at_s)
@@ -260,17 +260,17 @@ class RcManager(Component[RcManagerParameters]):
                 assert_never(instruction)
 
     def _trace_stopped(self) -> None:
-        """Let people know; the mission goes on without a trace."""
+        """Inform people; the mission continues without a trace."""
         self.publish_event(self.name, self._log.why_no_trace, LogLevel.WARNING)
         self.changed()
 
     def _may_leave(self, rc: str, arc: str) -> bool:
-        """Say whether nobody but this ARC would lose anything if the RC were down."""
+        """Return whether only this ARC would lose the RC if the RC counted as down."""
         return rc not in self._rcs.up or all(lease.rc != rc or lease.arc == arc for lease in self.manager.leases())
 
-    # ------------------------------------------------------------------ who is there
+    # ------------------------------------------------------------------ presence
     def _take_over(self, found: Found) -> None:
-        """Tell the schedule manager of all hardware, of the ARCs that hold it and of those that wait."""
+        """Pass the hardware, the ARCs that hold it and those that wait to the schedule manager."""
         adopted = found.adopted(self._resources, self.clock.now_s())
         began_s = min((at_s for at_s, _ in adopted), default=self.clock.now_s())
         self._rcs.up.update(found.rcs)
@@ -300,7 +300,7 @@ class RcManager(Component[RcManagerParameters]):
             self._hardware.compare_soon()
 
     def heard_rc(self, envelope: Envelope[RcState]) -> None:
-        """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
+        """Correct the state of an RC by its own report, because an earlier report, or a renewal, may have been lost."""
         state = envelope.body
         rc = state.name
         if not self._rcs.believes(state):
@@ -313,16 +313,16 @@ class RcManager(Component[RcManagerParameters]):
             for lease in self._leases()
             if lease.arc not in self._switches
         ):
-            self.story.note(rc, "does not have all holds any more that it was given")
+            self.story.note(rc, "has lost holds that it was given")
             self.happened(RcCameBack(rc, state.last_epoch))
 
     def _heard_of_packets(self, state: RcState) -> None:
-        """Pass on which packets take longer than declared."""
+        """Pass packets that take longer than declared to the schedule manager."""
         if state.measured:
             self.happened(PacketsMeasured(state.name, state.measured))
 
     def _leases(self) -> list[Lease]:
-        """Return what is to be renewed: all that is held, but for what is just being given back."""
+        """Return the leases to renew: all holds, except of ARCs whose failed connections are being undone."""
         return [lease for lease in self.manager.leases() if not self._context_switch.gives_back(lease.arc)]
 
     def _disappeared(self, name: str) -> None:
@@ -336,7 +336,7 @@ class RcManager(Component[RcManagerParameters]):
             self.start_task(self._compare_with_nameserver(), "compare")
 
     async def _compare_with_nameserver(self) -> None:
-        """Catch up with what happened while this process had no link."""
+        """Apply the changes that happened while this process had no link."""
         await self._hardware.compare()
         names = await self._recovery.present()
         for name in [*sorted(self._rcs.up), *self._arcs.known]:
@@ -356,7 +356,7 @@ class RcManager(Component[RcManagerParameters]):
                 self.happened(Woken())
 
     async def _renew(self) -> None:
-        """Renew the leases of ARCs whose beat is fresh; end the hold of those that hang."""
+        """Renew the leases of ARCs with fresh beats; end the holds of ARCs that hang."""
         rate = self.clock.rate
         while True:
             self._arcs.end_silent()
@@ -370,11 +370,11 @@ class RcManager(Component[RcManagerParameters]):
         self.bus.publish(self.address, Conversation.LEASES, leases)
 
     def calm_s(self) -> float:
-        """Wait longer the more ARCs there are: no switch waits for a schedule that is made for people."""
+        """Return the pause between published schedules: it grows with the number of ARCs; no switch waits for it."""
         return max(CALM_S, CALM_EACH_S * self._lines_published)
 
     def publish_news(self) -> None:
-        """Publish the schedule, and how many run if that is news."""
+        """Publish the schedule, and, if it has changed, the number of ARCs that run."""
         schedule = self.answers.schedule(self.clock.now_s())
         self._lines_published = len(schedule.requests)
         running = sum(1 for request in schedule.requests if request.state == "running")

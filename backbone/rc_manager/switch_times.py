@@ -1,4 +1,4 @@
-"""SwitchTimes: how long hand-overs between ARCs take, from the revocation to the grant, settling not counted. Pure."""
+"""SwitchTimes: durations of hand-overs between ARCs, from revocation to grant, without settling. Pure."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ class SwitchTimes:
     """The newest switches."""
 
     def __init__(self) -> None:
-        """Begin with none."""
-        self._revoked: dict[str, tuple[float, str]] = {}  # RC → when, and from which ARC
+        """Begin without switches."""
+        self._revoked: dict[str, tuple[float, str]] = {}  # RC → time and ARC of the revocation
         self._times_s: deque[float] = deque(maxlen=KEPT)
 
     def revoked(self, rcs: Iterable[str], arc: str, now_s: float) -> None:

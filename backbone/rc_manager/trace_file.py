@@ -1,7 +1,7 @@
 """The file of the schedule trace: whole lines, in the order of the decisions, without a gap.
 
-A mission outlives its trace: at the first line that cannot be written the trace stops, with whole lines only, and the
-mission's log has the reason. It does not go on later, because a judge would blame the scheduler for the missing lines.
+If a line cannot be written, the mission continues: the trace stops, with whole lines only, and the mission's log has
+the reason. It is not continued later, because a judge would blame the scheduler for the missing lines.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class TraceFile:
     def __init__(self, path: str) -> None:
         self._descriptor: int | None = None
         self.stopped_by = ""
-        """The error that ended the trace early; empty: none did."""
+        """The error that ended the trace early; empty: no error."""
         if not path:
             return
         try:
@@ -33,7 +33,7 @@ class TraceFile:
             self.stopped_by = f"{path}: {error.strerror}"
 
     def write(self, line: Line) -> bool:
-        """Append the line; return False if this very line ended the trace, see ``stopped_by``."""
+        """Append the line; return False if this line ended the trace, see ``stopped_by``."""
         if self._descriptor is None:
             return True
         end = os.fstat(self._descriptor).st_size

@@ -1,4 +1,4 @@
-"""Checkpoints: a recorded mission at some instants, so that a look at a late one need not begin at the begin. Pure."""
+"""Checkpoints: a recorded mission at some instants, so that late instants are reached without reading all. Pure."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from backbone.recording.reader import Recording
 from backbone.recording.recorded_mission import HISTORY, STATES, RecordedMission
 from backbone.wire import Message
 
-EACH_S = 30.0  # chosen: what is said in half a minute is read within a second
+EACH_S = 30.0  # chosen: the messages of half a minute are read within a second
 MOST = 240  # chosen: two hours with one each half minute; a copy takes some hundred kilobytes
 _KNOWN = tuple(f"*/{said}" for said in (*STATES, *HISTORY))
 
 
 class Checkpoints:
-    """Keeps them as the recording is read; to be used by one thread at a time.
+    """Creates checkpoints while the recording is read; for one thread at a time.
 
     Args:
         classes: Known message classes, by schema.
@@ -28,7 +28,7 @@ class Checkpoints:
         self._missions = [RecordedMission(classes)]
 
     def mission_at(self, recording: Recording, at_s: float) -> RecordedMission:
-        """Return the mission after all messages before this time.
+        """Return the state of the mission after all messages before this time.
 
         Raises:
             NoRecording: The recording is damaged.
@@ -48,7 +48,7 @@ class Checkpoints:
         return mission
 
     def _keep(self, at_s: float, mission: RecordedMission) -> None:
-        """Keep the mission after all messages before this time."""
+        """Keep the state of the mission after all messages before this time."""
         if at_s > self._times_s[-1]:
             self._times_s.append(at_s)
             self._missions.append(mission.copied())

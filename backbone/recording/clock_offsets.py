@@ -1,4 +1,4 @@
-"""How far the clocks of a mission's hosts are apart, from the causes of recorded messages. Pure.
+"""Offsets between the clocks of a mission's hosts, computed from the causes of recorded messages. Pure.
 
 No message is sent before the message that led to it. If a message of host B has a cause of host A, then the clock of B
 is ahead of that of A by at most the difference of the two stamps. A cause in the other direction bounds the offset from
@@ -21,7 +21,7 @@ from backbone.addresses import NAMESERVER
 from backbone.naming import Subsystem
 from backbone.recording.reader import Recorded
 
-MOST_REMEMBERED = 100_000  # chosen: what a busy mission says in a minute; more than a cause needs to have its effect
+MOST_REMEMBERED = 100_000  # chosen: the messages of a busy mission in a minute; effects follow their causes sooner
 EXACT_S = 1e-6  # chosen: no two messages are so close, and stamps of a year are exact to 4 ns
 MOST_OFFSET_S = 60.0  # as ``writer.MOST_AHEAD_S``: beyond it an id is that of another life of its sender
 
@@ -35,9 +35,10 @@ class Offset:
     Attributes:
         at_least_s: Lower bound; minus infinity: no cause bounds it.
         at_most_s: Upper bound; infinity: no cause bounds it.
-        taken_s: Offset that agrees with all causes: 0 if possible, else in the middle of what the other hosts leave.
-        moved_s: By how much it changed at least, because no one offset agrees with all causes; the bounds are widened
-            by it, half on each side. 0: one offset agrees.
+        taken_s: Offset that agrees with all causes: 0 if possible, else the middle of the range that the other hosts
+            leave.
+        moved_s: Smallest change of the offset that explains all causes; the bounds are widened by it, half on each
+            side. 0: one constant offset explains them.
     """
 
     at_least_s: float
@@ -52,8 +53,8 @@ class ClockOffsets:
 
     Attributes:
         reference: Host of the nameserver, whose clock is the mission's time.
-        hosts: Sender → its host; a sender whose host is not known, or not one host, is its own.
-        offsets: Host → offset, in the order in which they were taken; not of the reference.
+        hosts: Sender → its host; a sender with an unknown or changing host counts as a host of its own.
+        offsets: Host → offset, in the order in which they were computed; without the reference.
     """
 
     reference: str = NAMESERVER
@@ -61,20 +62,20 @@ class ClockOffsets:
     offsets: Mapping[str, Offset] = field(default_factory=dict)
 
     def of(self, source: str) -> float:
-        """Return by how much the stamps of this sender are ahead of the reference's clock, seconds."""
+        """Return how far the stamps of this sender are ahead of the reference's clock, seconds."""
         found = self.offsets.get(self.hosts.get(source, source))
         return found.taken_s if found is not None else 0.0
 
     @property
     def wrong(self) -> dict[str, Offset]:
-        """Offsets of the clocks that cannot have been right all the time."""
+        """Offsets of the clocks that were certainly wrong at some time."""
         return {host: offset for host, offset in self.offsets.items() if offset.taken_s or offset.moved_s}
 
 
 class ClockObserver:
-    """Learns from messages, in the order of sending, how far clocks are apart.
+    """Computes the offsets of clocks from messages, given in the order of sending.
 
-    Only senders that did not begin anew count as causes: an id is unique only while its sender lives.
+    Messages of senders that restarted do not count as causes, because an id is unique only while its sender lives.
     """
 
     def __init__(self) -> None:
@@ -86,13 +87,13 @@ class ClockObserver:
         self._gaps: dict[tuple[str, str], float] = {}
 
     def watched(self, messages: Iterable[Recorded]) -> Iterator[Recorded]:
-        """Yield the messages as they are, and learn from each."""
+        """Yield the messages unchanged, and use each for the offsets."""
         for message in messages:
             self.take(message)
             yield message
 
     def take(self, message: Recorded) -> None:
-        """Learn from a message; one without a credible sender or stamp is left out."""
+        """Use a message for the offsets; ignore it if its sender or stamp is not credible."""
         source, at_s = message.source, message.at_s
         if not message.schema or not source or abs(message.stamp_s - at_s) > MOST_OFFSET_S:
             return
@@ -115,7 +116,7 @@ class ClockObserver:
             _remember(self._awaited, message.cause, earliest)
 
     def offsets(self) -> ClockOffsets:
-        """Return what is known by now."""
+        """Return the offsets as known so far."""
         hosts = {source: next(iter(named)) for source, named in self._named.items() if len(named) == 1}
         reference = hosts.get(NAMESERVER, NAMESERVER)
         gaps: dict[tuple[str, str], float] = {}
@@ -130,7 +131,7 @@ class ClockObserver:
         return ClockOffsets(reference, hosts, solved(gaps, [reference, *order]))
 
     def _note_host(self, source: str, schema: str, body: Any) -> None:
-        """Note where a component says it is; a console reads the mission's time by itself, so its clock is its own."""
+        """Record a component's host; a console keeps its own mission time, so it counts as a host of its own."""
         if schema.startswith("ComponentState/") and isinstance(body, dict) and body.get("address") == source:
             own = source.startswith(f"{Subsystem.UI_CONSOLE}/")
             self._named.setdefault(source, set()).add(source if own else str(body.get("host") or source))
@@ -144,8 +145,8 @@ def solved(gaps: Mapping[tuple[str, str], float], hosts: list[str]) -> dict[str,
     """Return the offset of each host but the first, which is the reference.
 
     Args:
-        gaps: (Host, other host) → by how many seconds the other's clock is ahead of it at most.
-        hosts: The reference and all others; a host that contradicts those before it moved.
+        gaps: (Host, other host) → upper bound of how far the other's clock is ahead of the host's, seconds.
+        hosts: The reference first; if a host contradicts the hosts before it, its clock has moved.
     """
     most = {(hosts[0], hosts[0]): 0.0}
     moved: dict[str, float] = {}
@@ -164,7 +165,7 @@ def solved(gaps: Mapping[tuple[str, str], float], hosts: list[str]) -> dict[str,
 
 
 def _taken(most: Mapping[tuple[str, str], float], moved: Mapping[str, float], hosts: list[str]) -> dict[str, Offset]:
-    """Return an offset for each host but the first; in a minimal network each choice leaves one for the next."""
+    """Return an offset for each host but the first; in a minimal network each choice allows one for the next host."""
     taken = {hosts[0]: 0.0}
     offsets = {}
     for host in hosts[1:]:

@@ -1,7 +1,7 @@
-"""Comparison of two recordings, key by key: the first difference, and how far numbers are apart. Pure.
+"""Comparison of two recordings, key by key: the first difference, and the errors of numbers. Pure.
 
-The n-th message of a key, sender and schema in one recording is compared with the n-th in the other. Of a message its
-fields count, not when it was sent.
+The n-th message of a key, sender and schema in one recording is compared with the n-th in the other. The fields of a
+message count, its time of sending does not.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ Named = tuple[str, str, str]
 
 @dataclass(slots=True)
 class NumberError:
-    """How far a number is apart in the two recordings.
+    """The distances between the values of one number in the two recordings.
 
     Attributes:
         largest: Largest distance.
         squares: Sum of the squares of all distances.
-        count: Of compared numbers.
+        count: Number of compared pairs.
     """
 
     largest: float = 0.0
@@ -47,15 +47,15 @@ class NumberError:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """The first pair of messages that differs by more than the tolerance.
+    """The first pair of messages that differ by more than the tolerance.
 
     Attributes:
-        number: Of the message, from 0 on.
+        number: Number of the message, from 0.
         first_s: Its mission time in the first recording.
-        second_s: In the second.
+        second_s: Its mission time in the second.
         field: Path of the first field that differs, as ``rcs.0.rc``.
-        first: Its value in the first recording; None: there is none.
-        second: In the second.
+        first: Value of the field in the first recording; None: the field is absent.
+        second: Value of the field in the second.
     """
 
     number: int
@@ -71,11 +71,11 @@ class KeyComparison:
     """The messages of one key, sender and schema.
 
     Attributes:
-        first: Their number in the first recording.
-        second: In the second.
+        first: Number of messages in the first recording.
+        second: Number of messages in the second.
         differing: Pairs that differ by more than the tolerance.
         difference: The first of these; None: there is none.
-        errors: Path of a number → how far it is apart; positions in lists are ``*``. Only numbers that differ.
+        errors: Path of a number → its distances; positions in lists are ``*``. Contains only numbers that differ.
     """
 
     first: int = 0
@@ -86,7 +86,7 @@ class KeyComparison:
 
     @property
     def is_same(self) -> bool:
-        """Whether both have as many messages, and no pair differs by more than the tolerance."""
+        """Whether both have the same number of messages, and no pair differs by more than the tolerance."""
         return self.first == self.second and not self.differing
 
 
@@ -97,8 +97,8 @@ def compared(
 
     Args:
         first: Messages of one recording, in their order.
-        second: Of the other.
-        tolerances: Name of a field, or its path, → largest distance of its numbers that is no difference.
+        second: Messages of the other, in their order.
+        tolerances: Name or path of a field → largest distance of its numbers that counts as equal.
     """
     allowed = tolerances or {}
     found: dict[Named, KeyComparison] = defaultdict(KeyComparison)

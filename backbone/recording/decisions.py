@@ -1,8 +1,8 @@
-"""The schedule of a recording: at any instant, and decided anew.
+"""The schedule in a recording: its state at any instant, and its decisions made again.
 
-The RC manager tells recorders each event that it decides on. From a snapshot and the events after it a schedule manager
-decides again: so the schedule of each instant is known with all its reasons, and the recorded decisions can be compared
-with those of today's release, or of other rules.
+The RC manager sends recorders each event that it decides on. A schedule manager starts from a snapshot, and decides
+again on the events after it. Therefore the schedule of each instant is known with all its reasons. The recorded
+decisions can also be compared with those of today's release, or of other rules.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ class NotRecorded(Refusal):
 
 
 class NoSuchRule(Refusal):
-    """A rule of the scheduler is not known, or has no such value."""
+    """The scheduler has no such rule, or the rule has no such value."""
 
     code = "usage.rule"
     remedy = "Name a rule and its value as the mission file does, such as policy=strict."
 
 
 class RecordedSchedule:
-    """The schedule by what the RC manager told recorders.
+    """The schedule, followed through the decisions in a recording.
 
     Attributes:
-        manager: In the state that the recorded one had; None: not known.
-        lacks: Why it is not known.
+        manager: A schedule manager in the recorded state; None: not known.
+        lacks: Reason why the state is not known.
     """
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class RecordedSchedule:
         self._number = 0
 
     def take(self, told: Decided | ScheduleSnapshot) -> None:
-        """Go on to the next event, or to the state of a snapshot.
+        """Apply the next event, or take over the state of a snapshot.
 
         Raises:
             NoSnapshot: The snapshot is of another release.
@@ -78,7 +78,7 @@ def schedule_at(recording: Recording, at_s: float) -> ScheduleManager:
     """Return a schedule manager in the state that the recorded one had at this mission time.
 
     Raises:
-        NotRecorded: The recording has no snapshot before, or a decision is missing since.
+        NotRecorded: The recording has no earlier snapshot, or a decision after the snapshot is missing.
         NoSnapshot, OtherForm: The recording is of another release.
     """
     schedule = RecordedSchedule()
@@ -93,12 +93,12 @@ def schedule_at(recording: Recording, at_s: float) -> ScheduleManager:
 
 @dataclass(frozen=True, slots=True)
 class OtherDecision:
-    """The first decision that is not as recorded.
+    """The first decision that differs from the recording.
 
     Attributes:
-        number: Of the decision.
+        number: Number of the decision.
         at_s: Its mission time.
-        event: On which it was made; ``Woken`` if other rules decide of themselves where the recorded ones did not.
+        event: The event that led to it; ``Woken`` if only the other rules decide at this time.
         recorded: Its lines and their causes, as recorded.
         decided: The same, as decided now.
     """
@@ -112,13 +112,13 @@ class OtherDecision:
 
 @dataclass(slots=True)
 class DecisionComparison:
-    """Decisions that were made anew, beside the recorded ones.
+    """The result of making recorded decisions again.
 
     Attributes:
-        decisions: That were compared.
-        grants: Among their lines.
-        missing: Decisions of which the recording lacks the event or lines; nothing is said of these.
-        difference: The first one; None: all are the same.
+        decisions: Number of compared decisions.
+        grants: Number of grants among their lines.
+        missing: Number of decisions that could not be compared, because the recording lacks the event or lines.
+        difference: The first difference; None: all decisions are equal.
     """
 
     decisions: int = 0
@@ -129,11 +129,11 @@ class DecisionComparison:
 
 @dataclass(slots=True)
 class _RecordedDecision:
-    """One recorded decision.
+    """A recorded decision.
 
     Attributes:
         last: Number of the RC manager's message with its last line.
-        heard: Numbers of all its messages from the event on, with the first of the next decision.
+        heard: Numbers of all its messages, from the event to the first message of the next decision.
     """
 
     decided: Decided
@@ -151,13 +151,13 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
     """Let today's schedule manager decide on the recorded events, up to the first difference.
 
     Args:
-        since_s: From the first snapshot after this mission time on.
-        rules: Other rules, by name, see ``SchedulingRules``; only for a recording from an RC manager's begin on.
+        since_s: Begin with the first snapshot after this mission time.
+        rules: Other rules, by name, see ``SchedulingRules``; only for a recording that has the RC manager's begin.
 
     Raises:
-        NotRecorded: The recording has no snapshot since, or rules were given and it has no begin.
-        NoSuchRule: There is none of this name, or it has no such value.
-        WrongPlanner: The planner among the rules is none.
+        NotRecorded: The recording has no snapshot after ``since_s``, or rules were given and the begin is missing.
+        NoSuchRule: The scheduler has no rule of this name, or the rule has no such value.
+        WrongPlanner: The planner among the rules is not a planner.
         NoSnapshot, OtherForm: The recording is of another release.
     """
     found = DecisionComparison()
@@ -172,7 +172,7 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
             continue
         found.missing += step.decided.number - number - 1
         if step.decided.number != number + 1:
-            anew = None  # until the next snapshot
+            anew = None  # skip decisions until the next snapshot
             continue
         number = step.decided.number
         found.difference = anew.of_itself(number, step.decided.at_s)
@@ -197,20 +197,20 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
 
 
 class _Anew:
-    """A schedule manager that decides anew. Beside one with other rules goes one as recorded."""
+    """A schedule manager that decides again. If its rules differ, a second one follows the recording unchanged."""
 
     def __init__(self, begin: ScheduleSnapshot, rules: dict[str, Any]) -> None:
         self._manager = _first(begin, rules)
         self._as_recorded = snapshot.read(begin.state) if rules else None
 
     def decide(self, event: Event, at_s: float) -> tuple[Record, ...]:
-        """Decide on a recorded event; return the lines that count."""
+        """Decide on a recorded event; return the lines to compare."""
         if self._as_recorded is not None:
             self._as_recorded.handle(event, at_s)
         return self.lines(self._manager.handle(event, at_s))
 
     def of_itself(self, number: int, before_s: float) -> OtherDecision | None:
-        """Decide whenever the manager wakes before this time and the recorded one did not; return what it decides."""
+        """Wake the manager, until this time, when only it wants to wake; return the first resulting decision."""
         while (wake_s := self._own_wake_s()) is not None and wake_s < before_s:
             decided = self.lines(self._manager.handle(Woken(), wake_s))
             if decided:
@@ -224,13 +224,13 @@ class _Anew:
         return self._manager.wake_s if recorded_s is None or self._manager.wake_s < recorded_s else None
 
     def lines(self, told: Iterable[Instruction]) -> tuple[Record, ...]:
-        """Return the lines that count: of other rules not those that begin a section, which name the rules."""
+        """Return the lines to compare; with other rules, without the lines that begin a section and name the rules."""
         lines = (one for one in told if isinstance(one, Record))
         return tuple(one for one in lines if self._as_recorded is None or one.line["ev"] != "meta")
 
 
 def _first(begin: ScheduleSnapshot, rules: dict[str, Any]) -> ScheduleManager:
-    """Return the manager with which to decide anew."""
+    """Return the manager that decides again."""
     manager = snapshot.read(begin.state)
     if not rules:
         return manager
@@ -266,7 +266,7 @@ def _steps(recording: Recording, since_s: float) -> Iterator[ScheduleSnapshot | 
 
 
 def _in_order(messages: Iterable[Recorded]) -> Iterator[Recorded]:
-    """Yield the messages of one sender in its order, also those of one instant."""
+    """Yield the messages of one sender in the order of their numbers, also if they have the same time."""
     for _at_s, together in groupby(messages, lambda message: message.at_s):
         yield from sorted(together, key=lambda message: message.sequence)
 

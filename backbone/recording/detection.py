@@ -1,7 +1,7 @@
-"""Detection: what watchers saw in a recording, against marks of what there was to see. Pure.
+"""Detection: compares the sightings of watchers in a recording with marks of what could be seen. Pure.
 
-A mark says that something could be seen from one mission time to another, by any robot or by one. A sighting within a
-mark detects it; a sighting within none is a false alarm.
+A mark states that something was visible from one mission time to another, to any robot or to one. A sighting within a
+mark detects it; a sighting within no mark is a false alarm.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from backbone.ranges import Mention
 from backbone.recording.reader import Recorded
 
 SIGHTING = "MotionSeen"
-"""Schema of what a watcher publishes when it sees something; ``mission_control.messages`` has it."""
-SHORTEST_S = 1e-3  # chosen: a recording of one message has no length, but a rate all the same
+"""Schema of a watcher's sighting; its class is in ``mission_control.messages``."""
+SHORTEST_S = 1e-3  # chosen: a recording of one message has no length, but needs a rate
 
-MissionTime = Annotated[float, msgspec.Meta(ge=0, le=1e12)]  # as ``ranges.Instant``, but nothing is seen before 0
+MissionTime = Annotated[float, msgspec.Meta(ge=0, le=1e12)]  # as ``ranges.Instant``, but no sighting is before 0
 
 
 class NoMarks(Refusal):
-    """A file of marks is none."""
+    """The file has no marks, or a line is not a mark."""
 
     code = "usage.marks"
     remedy = 'Write a mark in each line, as {"from_s": 12, "to_s": 20, "what": "intruder", "robot": "scout1"}.'
 
 
 class Mark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Something that could be seen.
+    """Something that was visible for a time.
 
     Attributes:
-        from_s: Mission time from which on.
-        to_s: Until when, not before ``from_s``.
-        what: What it was, for people.
-        robot: The robot through which it could be seen; empty: any.
+        from_s: Mission time of its begin.
+        to_s: Mission time of its end, not before ``from_s``.
+        what: Its description, for people.
+        robot: The robot that could see it; empty: any.
     """
 
     from_s: MissionTime
@@ -47,17 +47,17 @@ class Mark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     robot: Mention = ""
 
     def has(self, sighting: WatcherReport) -> bool:
-        """Return whether the sighting is one of this."""
+        """Return whether the sighting is within this mark."""
         return self.from_s <= sighting.at_s <= self.to_s and self.robot in ("", sighting.robot)
 
 
 @dataclass(frozen=True, slots=True)
 class WatcherReport:
-    """A watcher saw something.
+    """A sighting of a watcher.
 
     Attributes:
         at_s: Mission time of the picture.
-        robot: The robot whose picture it is.
+        robot: The robot that took the picture.
     """
 
     at_s: float
@@ -66,11 +66,11 @@ class WatcherReport:
 
 @dataclass(frozen=True, slots=True)
 class DetectionRates:
-    """What was seen of some marks.
+    """The detection rates of some marks.
 
     Attributes:
-        delays_s: Mark by mark the seconds from its begin to its first sighting; None: it was missed.
-        false_alarms: Sightings within no mark.
+        delays_s: For each mark, the seconds from its begin to its first sighting; None: the mark was missed.
+        false_alarms: Number of sightings within no mark.
         lasted_s: Length of the recording, seconds, above 0.
     """
 
@@ -95,20 +95,20 @@ class DetectionRates:
 
     @property
     def median_delay_s(self) -> float | None:
-        """Median delay of the detected marks; None: there is none."""
+        """Median delay of the detected marks; None: no mark was detected."""
         return statistics.median(self.seen_after_s) if self.seen_after_s else None
 
     @property
     def largest_delay_s(self) -> float | None:
-        """Largest delay of the detected marks; None: there is none."""
+        """Largest delay of the detected marks; None: no mark was detected."""
         return max(self.seen_after_s, default=None)
 
 
 def read_marks(text: str) -> list[Mark]:
-    """Return the marks of a file, one JSON object in each line; empty lines are none.
+    """Return the marks of a file with one JSON object in each line; empty lines are skipped.
 
     Raises:
-        NoMarks: A line is no mark, or there is none.
+        NoMarks: A line is not a mark, or the file has no mark.
     """
     marks: list[Mark] = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -122,18 +122,18 @@ def read_marks(text: str) -> list[Mark]:
             raise NoMarks(f"line {number}: it ends at {mark.to_s:g} s, before {mark.from_s:g} s", line=number)
         marks.append(mark)
     if not marks:
-        raise NoMarks("it has no mark")
+        raise NoMarks("the file has no mark")
     return marks
 
 
 def sightings(messages: Iterable[Recorded]) -> list[WatcherReport]:
-    """Return the sightings among these messages; one that lacks its time or robot is none."""
+    """Return the sightings among these messages; skip a sighting without time or robot."""
     seen = (one.body for one in messages if one.schema.partition("/")[0] == SIGHTING and isinstance(one.body, dict))
     return [WatcherReport(body["at_s"], body["robot"]) for body in seen if {"at_s", "robot"} <= body.keys()]
 
 
 def detected(marks: Sequence[Mark], seen: Iterable[WatcherReport], lasted_s: float) -> DetectionRates:
-    """Return what was seen of the marks in a recording of this length."""
+    """Return the detection rates of the marks in a recording of this length."""
     ordered = sorted(seen, key=lambda sighting: sighting.at_s)
     firsts = [next((one.at_s - mark.from_s for one in ordered if mark.has(one)), None) for mark in marks]
     false_alarms = sum(not any(mark.has(one) for mark in marks) for one in ordered)
@@ -141,10 +141,10 @@ def detected(marks: Sequence[Mark], seen: Iterable[WatcherReport], lasted_s: flo
 
 
 def worse(first: DetectionRates, second: DetectionRates, later_s: float = 0.0) -> list[str]:
-    """Return for people in what the second is worse than the first, of the same marks; empty: in nothing.
+    """Return, for people, in which respects the second is worse than the first; empty: in none.
 
     Args:
-        later_s: A mark that is detected so much later, in seconds, is not worse.
+        later_s: A mark that is detected later by at most so many seconds does not count as worse.
     """
     found: list[str] = []
     for number, (before_s, after_s) in enumerate(zip(first.delays_s, second.delays_s, strict=True), start=1):

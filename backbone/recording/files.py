@@ -1,4 +1,4 @@
-"""The files of one recording: the first, and a further one whenever one is long or large."""
+"""The files of one recording: a further file begins whenever one becomes too long or too large."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from collections import deque
 from pathlib import Path
 from typing import IO
 
-SPLIT_S = 3_600.0  # chosen: an hour is found again by its name, and a recorder's index of it stays small
-SPLIT_BYTES = 1_000_000_000  # chosen: copied in seconds
+SPLIT_S = 3_600.0  # chosen: people find an hour by its file name, and the recorder's index of it stays small
+SPLIT_BYTES = 1_000_000_000  # chosen: copying it takes seconds
 
 
 class RecordingFiles:
     """Opens the files, one after the other: ``night.mcap``, ``night-2.mcap``, ``night-3.mcap``.
 
     Args:
-        first: Path of the first.
-        keep: Number of files to keep; the oldest is deleted for a further one. 0: all.
+        first: Path of the first file.
+        keep: Number of files to keep; before a further file, the oldest is deleted. 0: all are kept.
 
     Raises:
-        FileExistsError: The first exists.
-        OSError: It cannot be written.
+        FileExistsError: The first file exists.
+        OSError: The file cannot be written.
     """
 
     def __init__(self, first: Path, keep: int = 0) -> None:
@@ -28,20 +28,20 @@ class RecordingFiles:
         self._kept: deque[Path] = deque()
         self._number = 0
         self.path = first
-        """Of the file that is open."""
+        """Path of the open file."""
         self.file: IO[bytes] = self._open()
 
     def open_next(self) -> None:
-        """Close the file and open the next one; names that exist are left out.
+        """Close the file and open the next one; names of existing files are skipped.
 
         Raises:
-            OSError: It cannot be written; the file before stays closed.
+            OSError: The next file cannot be written; the file before stays closed.
         """
         self.close()
         self.file = self._open()
 
     def close(self) -> None:
-        """Close the file, once all of it is on the disc."""
+        """Close the file, after its content is on the disc."""
         if not self.file.closed:
             self.file.flush()
             os.fsync(self.file.fileno())

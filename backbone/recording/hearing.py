@@ -1,4 +1,4 @@
-"""From what is overheard on the bus to the messages that are meant. Pure."""
+"""Selects messages from the bytes that are overheard on the bus. Pure."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ _DIRECT = tuple(one for one in Conversation if one not in {*_OVERHEARD_AS_COPIES
 
 
 class Hearing:
-    """Which messages are meant, and what they say.
+    """Selects and translates overheard messages.
 
     Args:
         classes: Known message classes, by schema.
-        keys: Patterns of the keys that are meant, see ``is_meant``; none: all.
+        keys: Patterns of the selected keys, see ``is_meant``; none: all.
     """
 
     def __init__(self, classes: Mapping[str, type[Message]], keys: Sequence[str] = ()) -> None:
         self._translator, self._keys = Translator(classes), tuple(keys)
 
     def heard(self, key: str, raw: bytes, at_s: float) -> list[tuple[str, Translated]]:
-        """Return key and message; of ``Told`` the copied ones, with the key that they had.
+        """Return the selected messages with their keys; ``Told`` is unpacked into copies with their original keys.
 
         Args:
-            key: At which the bytes were overheard.
+            key: Key at which the bytes were overheard.
             raw: The bytes.
-            at_s: Mission time when they came.
+            at_s: Mission time of their arrival.
         """
         translate, keys = self._translator.translate, self._keys
         return [
@@ -43,7 +43,7 @@ class Hearing:
 
 
 def unfolded(key: str, raw: bytes) -> list[tuple[str, bytes]]:
-    """Return key and envelope of what was overheard; of ``Told`` each copied message, with the key that it had."""
+    """Return key and envelope of overheard bytes; ``Told`` is unpacked into copies with their original keys."""
     told = copies_in(raw) if key.endswith(_TOLD) else None
     if told is None:
         return [(key, raw)]
@@ -54,7 +54,7 @@ def unfolded(key: str, raw: bytes) -> list[tuple[str, bytes]]:
 
 
 def is_meant(key: str, patterns: Sequence[str]) -> bool:
-    """Return whether a key matches one of these patterns, with or without ``scout/<mission>/`` before it.
+    """Return whether a key matches one of these patterns, with or without the prefix ``scout/<mission>/``.
 
     Example:
         >>> is_meant("scout/iros2001/resource_pool/scout1/telemetry", ("*/scout1/*",))
@@ -67,8 +67,8 @@ def is_meant(key: str, patterns: Sequence[str]) -> bool:
 def to_overhear(patterns: Sequence[str]) -> list[Conversation]:
     """Return the conversations to overhear for keys that match a pattern, copies first.
 
-    Who publishes something else that is heard knows by then that copies are, too: what is declared in this order is
-    known everywhere in this order.
+    Declarations arrive everywhere in this order. Therefore, a publisher that knows of a later subscription also knows
+    that copies are wanted.
 
     Example:
         >>> [one.value for one in to_overhear(("resource_pool/*/readings",))]

@@ -1,4 +1,4 @@
-"""Where the recorder of a host hears what the processes of its host send, see ``bus.host_copies``."""
+"""The recorder's end of the copies that processes of its host send, see ``bus.host_copies``."""
 
 from __future__ import annotations
 
@@ -17,30 +17,29 @@ from backbone.bus.interface import Overhearer
 from backbone.errors import Refusal
 
 READ_BYTES = 256 * 1024  # chosen: as much as a unix socket holds by default on Linux
-AT_ONCE = 4  # chosen: after a megabyte of one process the others have their turn
-LOOK_EACH_S = 0.1  # chosen: to wake up for each copy costs more than to read it; a file is flushed less often
-AGAIN_S = 0.001  # chosen: a sender fills its socket again meanwhile
+AT_ONCE = 4  # chosen: after a megabyte of one process, the other processes are read
+LOOK_EACH_S = 0.1  # chosen: waking up for each copy costs more than reading it; a file is flushed less often
+AGAIN_S = 0.001  # chosen: meanwhile a sender fills its socket again
 _TOO_MANY_FILES = (errno.EMFILE, errno.ENFILE)
 
 log = logging.getLogger(__name__)
 
 
 class EarTaken(Refusal):
-    """Another recorder hears the processes of this host."""
+    """Another recorder receives the copies of this host's processes."""
 
     code = "recording.taken"
     remedy = "End the other recorder of this mission on this host."
 
 
 class HostEar:
-    """Listens in the mission's folder of this host.
+    """Receives copies at a socket in the mission's folder of this host.
 
-    It looks ten times a second and takes all that waits, however many copies were sent. Where a large copy is under way
-    it looks again at once.
+    Ten times a second it reads all copies that wait. If a large copy has arrived only in part, it reads again at once.
 
     Args:
         directory: The folder.
-        is_of_mission: True: processes that send to it send their copies nowhere else.
+        is_of_mission: True: processes that send copies here send them nowhere else.
     """
 
     def __init__(self, directory: Path, *, is_of_mission: bool) -> None:
@@ -51,11 +50,11 @@ class HostEar:
         self._next: asyncio.TimerHandle | None = None
         self._lacks_files = False
         self.on_lack: Callable[[str], None] = log.warning
-        """Called with one line for people when a process cannot be heard, once for as long as that lasts; settable."""
+        """Called with a line for people when a process's copies cannot be received, once while that lasts; settable."""
 
     @property
     def dropped(self) -> int:
-        """Messages that processes dropped because the recorder had no time for them."""
+        """Number of messages that processes dropped because the recorder was too slow."""
         return self._gone + sum(sender.dropped for sender in self._senders.values())
 
     async def open(self, listener: Overhearer, on_bug: Callable[[BaseException], None]) -> None:
@@ -67,14 +66,14 @@ class HostEar:
         """
         with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as other:
             other.setblocking(False)
-            with suppress(FileNotFoundError, ConnectionRefusedError):  # nobody, or a recorder that was killed
+            with suppress(FileNotFoundError, ConnectionRefusedError):  # no recorder, or a recorder that was killed
                 other.connect(os.fspath(self._path))
                 raise EarTaken(f"another recorder listens at {self._path}")
         remove_socket(self._path)
         self._server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._server.setblocking(False)
         self._server.bind(os.fspath(self._path))
-        self._server.listen(socket.SOMAXCONN)  # a process that finds it full would look again a second later
+        self._server.listen(socket.SOMAXCONN)  # if the queue is full, a process retries only a second later
         self._ready = selectors.DefaultSelector()
         self._ready.register(self._server, selectors.EVENT_READ)
         self._listener, self._on_bug = listener, on_bug
@@ -92,7 +91,7 @@ class HostEar:
             self._server = None
 
     def hear(self) -> bool:
-        """Take all that waits now; return whether more may wait already. When: it is open."""
+        """Read all copies that wait; return whether more may wait already. Call it only while open."""
         is_more = False
         for number in [key.fd for key, _events in self._ready.select(0)]:
             sender = self._senders.get(number)
@@ -102,7 +101,7 @@ class HostEar:
             try:
                 is_more |= sender.hear(self._listener)
             except (ConnectionError, UnicodeDecodeError):
-                self._leave(sender)  # the process has ended, or is none of the mission's
+                self._leave(sender)  # the process has ended, or is not a process of the mission
             except Exception as bug:
                 self._on_bug(bug)
                 self._leave(sender)
@@ -113,7 +112,7 @@ class HostEar:
         self._next = asyncio.get_running_loop().call_later(after_s, self._look)
 
     def _accept(self) -> bool:
-        """Take in all processes that wait; return whether there were any, who may have sent something already."""
+        """Accept all processes that wait; return whether there were any, because they may have sent copies already."""
         assert self._server is not None  # noqa: S101  it is open
         was_there = False
         try:
@@ -127,7 +126,7 @@ class HostEar:
             return was_there
         except OSError as error:
             if error.errno not in _TOO_MANY_FILES:
-                return was_there  # it was gone again
+                return was_there  # the process has closed the connection again
             if not self._lacks_files:
                 self._lacks_files = True
                 self.on_lack(
@@ -151,11 +150,11 @@ class _CopySender:
         self._came = bytearray()
 
     def hear(self, listener: Overhearer) -> bool:
-        """Take what waits; return whether more may wait already.
+        """Read the copies that wait; return whether more may wait already.
 
         Raises:
-            ConnectionError: The process is gone, or sends nonsense.
-            UnicodeDecodeError: It sends nonsense.
+            ConnectionError: The process is gone, or sends illegal bytes.
+            UnicodeDecodeError: The process sends illegal bytes.
         """
         for attempt in range(AT_ONCE):
             try:

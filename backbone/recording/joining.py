@@ -2,9 +2,9 @@
 
 Rules of this file:
 
-* Each message stands once, although several recorders heard it: sender, number and stamp are the same in all copies.
-* Messages stand in the order of mission time. Where causes show that the clock of a host was off, ``log_time`` is
-  corrected by that offset, so that no message stands before its cause; ``publish_time`` and ``stamp_s`` stay as sent.
+* Each message occurs once, although several recorders received it: sender, number and stamp are equal in all copies.
+* Messages are in the order of mission time. If causes show that the clock of a host was off, ``log_time`` is
+  corrected by that offset, so that no message precedes its cause; ``publish_time`` and ``stamp_s`` stay as sent.
 * Files are read twice, chunk by chunk: once for the clocks, once to be written.
 """
 
@@ -51,12 +51,12 @@ class TooManyKeys(Refusal):
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """What a join made.
+    """The result of a join.
 
     Attributes:
         messages: Number of messages in the new recording.
-        left_out: Number of copies that were in another of the files too.
-        clocks: Clocks that causes bound; ``log_time`` is corrected by them.
+        left_out: Number of omitted copies, which other files contain too.
+        clocks: The clocks that causes bound; ``log_time`` is corrected by them.
     """
 
     messages: int
@@ -65,15 +65,15 @@ class Joined:
 
 
 def join(recordings: Mapping[str, Recording], to: IO[bytes]) -> Joined:
-    """Write all messages of these recordings, at least one, to a new one.
+    """Write all messages of these recordings (at least one recording) to a new one.
 
     Args:
-        recordings: By name; refusals name the recording.
+        recordings: The recordings by name; refusals contain the name.
 
     Raises:
-        OtherMission: They are not of one start of one mission.
-        NoRecording: One of them is damaged; what was written is no recording.
-        TooManyKeys: One file cannot hold them.
+        OtherMission: The recordings are not of one start of one mission.
+        NoRecording: A recording is damaged; the new file is not a recording.
+        TooManyKeys: One file cannot hold all keys.
     """
     facts = _common_facts([recording.contents().about for recording in recordings.values()])
     clocks = _clocks(recordings)
@@ -106,10 +106,10 @@ def _named(name: str, messages: Iterable[Read]) -> Iterator[Read]:
 
 
 def _common_facts(facts: Sequence[dict[str, str]]) -> dict[str, str]:
-    """Return the facts about the mission; of those that differ from recorder to recorder all values.
+    """Return the facts about the mission; if a fact differs between recorders, all its values.
 
     Raises:
-        OtherMission: They are not of one start of one mission.
+        OtherMission: The recordings are not of one start of one mission.
     """
     missions = sorted({one.get("mission", "") for one in facts})
     if len(missions) > 1:
@@ -139,9 +139,9 @@ def _of_clock(recording: Recording, clocks: ClockOffsets, offset_s: float) -> It
 
 
 def _each_once(messages: Iterable[Placed]) -> Iterator[Placed | None]:
-    """Yield each message, and None for each further copy; copies stand at the same time.
+    """Yield each message, and None for each further copy; all copies have the same time.
 
-    Presence is no message: each recorder writes what it sees. Only changes of it are yielded.
+    Presence is not a message: each recorder writes its own observation. Only changes of presence are yielded.
     """
     alive: dict[str, bool] = {}
     for _at, together in itertools.groupby(messages, itemgetter(0)):
@@ -192,7 +192,7 @@ class _JoinedWriter:
         known = self._channels.get(same)
         if known is None:
             if len(self._channels) >= MOST_CHANNELS:
-                raise TooManyKeys(f"they have more than {MOST_CHANNELS} keys, senders and schemas")
+                raise TooManyKeys(f"the recordings have more than {MOST_CHANNELS} keys, senders and schemas")
             made = self._writer.register_channel(channel.topic, channel.message_encoding, schema, channel.metadata)
             known = self._channels[same] = made
         return known

@@ -1,7 +1,7 @@
 """JSON Schemas of messages as a recording holds them: objects with the names of their fields.
 
-On the wire a message is an array; in a recording it is an object, so that a file can be read without this code. The
-docstring of a class, which has the meanings and units of its fields, is the description of its schema.
+On the wire a message is an array. In a recording it is an object, so that a file can be read without this code. The
+docstring of a message class, with the meanings and units of its fields, is the description of its schema.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _LISTS = (inspect.ListType, inspect.VarTupleType, inspect.SetType, inspect.Froze
 
 @functools.cache
 def schema_json(kind: type[Message]) -> bytes:
-    """Return the JSON Schema of a recorded message of this class: its ``body`` beside what its envelope said."""
+    """Return the JSON Schema of a recorded message of this class: its ``body`` beside the fields of its envelope."""
     definitions: dict[str, dict[str, Any]] = {}
     envelope = {
         "sequence": {"type": "integer", "description": "Grows by one with each message of the sender."},
@@ -60,7 +60,7 @@ def fields_of(kind: type[msgspec.Struct]) -> tuple[inspect.Field, ...]:
 def _struct(kind: type[msgspec.Struct], definitions: dict[str, dict[str, Any]]) -> dict[str, Any]:
     name = kind.__name__
     if name not in definitions:
-        definitions[name] = {}  # stands while its fields are described: a struct may hold itself
+        definitions[name] = {}  # a placeholder while its fields are described, because a struct may contain itself
         fields = fields_of(kind)
         definitions[name] = {
             "type": "object",

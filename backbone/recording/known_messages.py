@@ -1,8 +1,8 @@
-"""The message classes that a recording names the fields of, by schema.
+"""The message classes whose field names a recording contains, by schema.
 
-A package names its modules with messages as entry points of the group ``scout_backbone.messages``; a kind of RC may
-have its commands beside it in the module of its class. A message of any other class is recorded without names of its
-fields.
+A package lists its modules with messages as entry points of the group ``scout_backbone.messages``; a kind of RC may
+define its commands in the module of its class. Messages of all other classes are recorded without the names of
+their fields.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ log = logging.getLogger(__name__)
 def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
     """Return the message classes of the installed packages and of these modules, by schema, ``<Name>/<version>``.
 
-    What these modules import is known too.
+    Message classes that these modules import are included.
 
     Args:
-        modules: Further modules, such as those of the mission's component types; one that is not installed here is
-            left out.
+        modules: Further modules, such as those of the mission's component types; a module that is not installed here is
+            skipped.
     """
     for entry in entry_points(group=GROUP):
         entry.load()

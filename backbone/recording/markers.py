@@ -15,12 +15,12 @@ from backbone.recording.reader import Recorded, Recording
 from backbone.recording.revival import revived
 from backbone.wire import schema_of
 
-PARTS = 500  # chosen: a line across a page shows no more instants than this
+PARTS = 500  # chosen: a line across a page cannot show more instants
 _SAID = tuple(f"*/{said}" for said in (Conversation.EVENTS, Conversation.LOG, Conversation.OPERATORS))
 
 
 class MarkerKind(StrEnum):
-    """Why a person wants to look at an instant."""
+    """Why a person wants to see an instant."""
 
     ALARM = "alarm"
     OPERATOR = "operator"
@@ -33,7 +33,7 @@ class Marker(msgspec.Struct, frozen=True):
 
     Attributes:
         at_s: Mission time.
-        name: Whom it is about: an ARC, a robot, a component.
+        name: The ARC, robot or component concerned.
         line: The event, for people.
     """
 
@@ -48,14 +48,14 @@ def markers_in(recording: Recording) -> list[Marker]:
 
     Raises:
         NoRecording: The recording is damaged.
-        OtherForm: It is of another release.
+        OtherForm: The recording is of another release.
     """
     found = recording.contents()
     return spread(_markers(recording.messages(_SAID)), found.begin_s, found.end_s)
 
 
 def spread(markers: Iterable[Marker], begin_s: float, end_s: float) -> list[Marker]:
-    """Return of each kind the first marker in each of ``PARTS`` equal parts of the time."""
+    """Return, for each kind, the first marker in each of ``PARTS`` equal parts of the time."""
     part_s = max(end_s - begin_s, 1e-9) / PARTS
     first: dict[tuple[MarkerKind, int], Marker] = {}
     for marker in markers:
@@ -79,7 +79,7 @@ def _markers(messages: Iterable[Recorded]) -> Iterator[Marker]:
 
 
 def _switch(at_s: float, told: TraceLine, reasons: dict[str, str]) -> Iterator[Marker]:
-    """Yield what a decision did to an ARC; why it is granted was said when its RCs began to connect."""
+    """Yield the effect of a decision on an ARC; the reason of a grant comes from the line that began its connection."""
     arc = str(told.line.get("arc", ""))
     match told.line.get("ev"):
         case "connect":

@@ -28,7 +28,7 @@ class ParquetTables:
         self._writers: dict[str, parquet.ParquetWriter] = {}
 
     def learn(self, table: str, rows: Sequence[Mapping[str, object]]) -> None:
-        """Find the types of the columns; all rows come here before the first is written."""
+        """Find the types of the columns; all rows must pass here before the first is written."""
         kinds = self._kinds.setdefault(table, {})
         for column in dict.fromkeys(column for row in rows for column in row):
             kinds[column] = _common_kind(kinds.get(column, pa.null()), [row.get(column) for row in rows])
@@ -43,13 +43,13 @@ class ParquetTables:
         self._writers[table].write_table(batch)
 
     def close(self) -> None:
-        """Write the ends of the files, without which none is readable."""
+        """Write the ends of the files; without them no file is readable."""
         for writer in self._writers.values():
             writer.close()
 
 
 def _common_kind(known: pa.DataType | None, values: list[object]) -> pa.DataType | None:
-    """Return the type that these values and those before have in common; None: there is none."""
+    """Return the common type of these values and the earlier ones; None: they have none."""
     if known is None:
         return None
     try:
@@ -62,7 +62,7 @@ def _common_kind(known: pa.DataType | None, values: list[object]) -> pa.DataType
 
 
 def _has_empty_struct(kind: pa.DataType) -> bool:
-    """Return whether Parquet cannot hold it."""
+    """Return whether the type contains an empty struct, which Parquet cannot hold."""
     if pa.types.is_list(kind):
         return _has_empty_struct(kind.value_type)
     if not pa.types.is_struct(kind):
@@ -75,5 +75,5 @@ def _array(values: list[object], kind: pa.DataType | None) -> pa.Array:
         return pa.array([None if value is None else json.dumps(value) for value in values], pa.string())
     try:
         return pa.array(values, kind)
-    except pa.ArrowInvalid:  # an integer among floats that is too large for one of 64 bits is rounded
+    except pa.ArrowInvalid:  # among floats, an integer too large for 64 bits is rounded
         return pa.array(values).cast(kind, safe=False)

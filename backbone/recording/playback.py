@@ -1,4 +1,4 @@
-"""Playback: the time of a recording, which a person stops, lets go on, and moves to any instant."""
+"""Playback: the time of a recording, which a person can stop, continue and move to any instant."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from backbone.bus.interface import Clock
 from backbone.errors import Refusal
 from backbone.waiting import set_within
 
-SLOWEST, FASTEST = 0.1, 100.0  # chosen: a tenth shows each packet; at a hundred an hour is over within a minute
+SLOWEST, FASTEST = 0.1, 100.0  # chosen: at a tenth each packet is visible; at a hundred an hour takes a minute
 
-LEAST_WAIT_S = 1e-6  # chosen: the rest that rounding leaves would never pass
+LEAST_WAIT_S = 1e-6  # chosen: rounding can leave a rest that is too small ever to pass
 
 
 class NoSuchTime(Refusal):
-    """A recording cannot be played so."""
+    """A recording cannot be played at this time or speed."""
 
     code = "recording.time"
     remedy = f"Name a time in seconds, and a speed from {SLOWEST:g} to {FASTEST:g}."
@@ -24,11 +24,11 @@ class NoSuchTime(Refusal):
 class Playback:
     """A clock of mission time that stands still until ``play``.
 
-    Durations pass as on the machine, at the speed of playing, also while mission time stands still: a console goes on
+    Durations pass as on the machine, at the speed of playing, even while mission time stands still. So a console keeps
     drawing. Only ``sleep_until_s`` waits for mission time.
 
     Args:
-        machine: Its seconds are those of the machine.
+        machine: Clock whose seconds are those of the machine.
         begin_s: First mission time.
         end_s: Last mission time; it stops there.
     """
@@ -53,7 +53,7 @@ class Playback:
 
     # ------------------------------------------------------------------ verbs of a person
     def play(self, speed: float) -> None:
-        """Let mission time pass from now on, so many seconds in one of the machine.
+        """Let mission time pass from now on, ``speed`` seconds per second of the machine.
 
         Raises:
             NoSuchTime: The speed is out of range.
@@ -65,15 +65,15 @@ class Playback:
         self._changed.set()
 
     def pause(self) -> None:
-        """Let mission time stand still."""
+        """Stop mission time."""
         self._stand(self.now_s())
         self._changed.set()
 
     def go_to(self, at_s: float) -> None:
-        """Go to a mission time, the nearest that there is, and play on if it played.
+        """Move to a mission time, limited to the recording; continue playing if it was playing.
 
         Raises:
-            NoSuchTime: It is no number.
+            NoSuchTime: The time is not a number.
         """
         if not math.isfinite(at_s):
             raise NoSuchTime(f"{at_s} is no time")
@@ -84,11 +84,11 @@ class Playback:
 
     # ------------------------------------------------------------------ waits
     async def sleep_s(self, duration_s: float) -> None:
-        """Return after as long as so many mission seconds last while it plays; at least yields once."""
+        """Sleep as long as so many mission seconds last while playing; yield at least once."""
         await self._machine.sleep_s(duration_s / self._speed * self._machine.rate)
 
     async def sleep_until_s(self, at_s: float) -> None:
-        """Return at this mission time, at once if it has passed; at least yields once."""
+        """Sleep until this mission time; yield at least once, even if it has passed."""
         await self._machine.sleep_s(0.0)
         while self.now_s() < at_s:
             self._changed.clear()

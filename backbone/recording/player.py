@@ -1,7 +1,7 @@
-"""Player: a recording on a bus, as if its mission were up.
+"""Player: plays a recording on a bus, as if its mission were up.
 
-Each publication comes as it was sent, at its own mission time; questions get the answers that the recorded mission
-gave; tokens of liveliness rise and fall. Nothing can be commanded.
+Each publication is published as it was sent, at its own mission time. Questions get the answers that the recorded
+mission gave; liveliness tokens appear and fall as recorded. Nothing can be commanded.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from backbone.recording.recorded_mission import RecordedMission
 from backbone.recording.revival import message_as_sent
 from backbone.wire import WIRE_VERSION, Envelope, Message
 
-ANNOUNCED_S = 0.05  # measured: what has rested for seconds is slow for its first 30 ms; seconds of the machine
+ANNOUNCED_S = 0.05  # measured: links that were idle for seconds are slow for the first 30 ms; seconds of the machine
 TAKE_GAP_S = 0.005  # measured: the first message of a class takes so long, others a tenth; seconds of the machine
 _PUBLISHED = frozenset(Conversation) - {Conversation.ASK, Conversation.ALIVE, *COPIED}
 
@@ -33,14 +33,14 @@ class Player:
     """Plays one recording from a mission time on.
 
     Args:
-        bus: Of a hub of its own.
-        clock: Shows ``since_s`` when ``run`` begins.
+        bus: Bus with a hub of its own.
+        clock: Must show ``since_s`` when ``run`` begins.
         recording: Read while it runs.
         classes: Known message classes, by schema.
-        since_s: Mission time at which it begins; what was said before is known.
+        since_s: Mission time at which it begins; earlier messages are known.
         keys: Patterns of the keys whose publications are played; none: all.
         next_step: Awaited before each publication, with the message; None: play in the recorded time.
-        checkpoints: Of the same recording; None: it is read from its begin.
+        checkpoints: Checkpoints of the same recording; None: the recording is read from its begin.
     """
 
     def __init__(
@@ -65,21 +65,21 @@ class Player:
         self._served: dict[str, Subscription] = {}
         self._prepared: set[str] = set()
         self._to_prepare: dict[str, None] = {}  # keys of messages ahead
-        self._untaken: deque[Ready] = deque()  # played, and taken by the mission in a gap, or before it answers
+        self._untaken: deque[Ready] = deque()  # played; the mission's state takes them in a gap, or before an answer
         self.ends: Callable[[], None] = lambda: None
         """Called when a person orders the mission to end."""
         self.announces: Callable[[], None] = lambda: None
-        """Called ``ANNOUNCED_S`` before the first message, but for the steps of a person; settable.
+        """Called ``ANNOUNCED_S`` before the first message, but not in stepped playing; settable.
 
-        What it publishes goes the way of the first message ahead of it: through memory and links that have rested.
+        Its publication warms up memory and links, which were idle, for the first message.
         """
         self.rests: Callable[[float], None] = lambda _gap_s: None
-        """Called before each message with the seconds of the machine until it is due; settable."""
+        """Called before each message with the seconds of the machine until its time; settable."""
         self.played = 0
-        """Publications so far."""
+        """Number of publications so far."""
 
     def catch_up(self) -> None:
-        """Take in what was said before, and decode what is said next. It uses no bus, so it may run in a thread.
+        """Apply all earlier messages, and decode the next ones. Uses no bus, so it may run in a thread.
 
         Raises:
             NoRecording: The recording is damaged.
@@ -89,10 +89,10 @@ class Player:
         self._ahead.fill()
 
     def begin(self) -> None:
-        """Answer questions, and say what a newcomer must know. When: after ``catch_up``.
+        """Answer questions, and publish the present states. Call it after ``catch_up``.
 
-        The keys of messages that are read ahead are prepared here, and later ones in gaps: to serve an address and to
-        declare a publisher takes milliseconds, and the next message may be due.
+        The keys of messages that are read ahead are prepared here, later ones in gaps, because serving an address and
+        declaring a publisher takes milliseconds, which the next message may not leave.
         """
         for address in self._mission.there:
             self._serve(address)
@@ -104,7 +104,7 @@ class Player:
         self.say_again()
 
     def say_again(self) -> None:
-        """Publish the newest message of each key that tells a state."""
+        """Publish the newest message of each key that carries a state."""
         self._take_all()
         for message in self._mission.newest():
             said = message_as_sent(self._classes, message)
@@ -112,7 +112,7 @@ class Player:
                 self._publish(message, said)
 
     async def run(self) -> None:
-        """Play to the end of the recording; then what was last said goes on being answered.
+        """Play to the end of the recording; afterwards questions are still answered from its last state.
 
         Raises:
             NoRecording: The recording is damaged from here on.

@@ -1,4 +1,4 @@
-"""Presence: when components were there, as a recording has it."""
+"""Presence: when components were present, as a recorder observed it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Read-ahead: the next messages of a recording, decoded before they are due. Pure.
 
-To decode a chunk of the file takes milliseconds, and so does the first message of a class. A player does that in the
-gaps between messages. A message that is due is then only published.
+Decoding a chunk of the file takes milliseconds, and so does the first message of a class. A player does this in the
+gaps between messages. When a message is due, it only has to be published.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from backbone.recording.reader import NoRecording, Recorded, Recording
 from backbone.recording.revival import message_as_sent
 from backbone.wire import Message
 
-MOST_AHEAD_BYTES = 1 << 22  # chosen: forty pictures, or many seconds of readings; a busy machine gets behind seldom
+MOST_AHEAD_BYTES = 1 << 22  # chosen: forty pictures, or many seconds of readings; a busy machine seldom runs out
 GAP_S = 0.01  # chosen: a chunk of readings is decoded within half of it (measured: 4 ms)
-SPARE = 2.0  # chosen: the next chunk takes at most so many times as long as the longest of the last ones
-FORGOTTEN = 0.98  # chosen: after some dozens of messages a machine that was busy for a moment counts as quick again
+SPARE = 2.0  # chosen: the next chunk takes at most so many times as long as the longest recent one
+FORGOTTEN = 0.98  # chosen: a machine that was busy for a moment counts as fast again after some dozens of messages
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +26,9 @@ class Ready:
     """A message that can be published at once.
 
     Attributes:
-        message: As recorded.
-        said: As it was sent; None: see ``message_as_sent``.
-        size: Of its data in the file, bytes.
+        message: The message as recorded.
+        said: The message as it was sent; None: see ``message_as_sent``.
+        size: Size of its data in the file, bytes.
     """
 
     message: Recorded
@@ -37,7 +37,7 @@ class Ready:
 
 
 class ReadAhead:
-    """The messages of a recording in their order, some of them decoded already.
+    """The messages of a recording in their order, decoded ahead of time.
 
     Args:
         recording: Read while this is used.
@@ -60,9 +60,9 @@ class ReadAhead:
         self._longest_s = 0.0
 
     def has_time(self, gap_s: float) -> bool:
-        """Return whether to decode one more in a gap of so many seconds of the machine.
+        """Return whether a gap of so many seconds of the machine suffices to decode one more message.
 
-        The less is decoded, the shorter a gap suffices: a mission without long gaps is read ahead, too.
+        The fewer messages are decoded, the shorter a gap suffices. So even a mission without long gaps is read ahead.
         """
         needed_s = max(GAP_S, SPARE * self._longest_s)
         return (
@@ -70,11 +70,11 @@ class ReadAhead:
         )
 
     def took(self, seconds: float) -> None:
-        """Record how long the last message took, seconds of the machine: a slow machine needs longer gaps."""
+        """Record how long the last message took, in seconds of the machine; a slow machine needs longer gaps."""
         self._longest_s = max(seconds, FORGOTTEN * self._longest_s)
 
     def decode_one(self) -> None:
-        """Decode one message more, if there is one."""
+        """Decode one more message, if there is one."""
         try:
             found = next(self._records, None)
         except NoRecording as damage:  # the messages before it are still played
@@ -88,7 +88,7 @@ class ReadAhead:
         self._on_key(message.key)
 
     def fill(self) -> None:
-        """Decode as much as may wait."""
+        """Decode messages until the limit is reached."""
         while self.has_time(math.inf):
             self.decode_one()
 

@@ -1,4 +1,4 @@
-"""Reader of recordings; it needs neither the mission nor its robots, nor the classes of the messages."""
+"""Reader of recordings; it needs neither the mission, nor its robots, nor the classes of the messages."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _END = struct.Struct("<BQQQI8x")  # MCAP specification, op 0x02 and the magic: t
 
 
 class NoRecording(Refusal):
-    """The file is no recording, or its end is missing."""
+    """The file is not a recording, or its end is missing."""
 
     code = "recording.unreadable"
     remedy = "If its recorder was killed: scout-backbone record recover FILE TO."
 
 
 class NotOfMessages(NoRecording):
-    """The file is whole, but no recording of a bus, such as a copy for other tools."""
+    """The file is complete, but not a recording of a bus; for example, it is a copy for other tools."""
 
     code = "recording.other"
     remedy = "Name the recording itself, which 'scout-backbone record' or 'up --record' wrote."
@@ -45,18 +45,18 @@ class NotOfMessages(NoRecording):
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One message of a recording.
+    """A message in a recording.
 
     Attributes:
         key: Key expression on the bus; empty: not known.
         source: Address of the sender.
         schema: ``<Name>/<version>``; empty: the bytes were no message.
-        at_s: Mission time when it was sent, as the recording orders it; if that is not credible, when it was heard.
-        stamp_s: Mission time when it was sent, as it says.
+        at_s: Mission time of sending, by which the recording is ordered; if that is not credible, of arrival.
+        stamp_s: Mission time of sending, as stated by the sender.
         heard_s: Mission time when the recorder got it.
-        sequence: Its number among those of the sender.
+        sequence: Its number among the sender's messages.
         cause: Id of the message that led to it.
-        body: Its fields by name; a list without names if no installed package had its class; else the bytes.
+        body: Its fields by name. If no installed package had its class: a list without names, or else the bytes.
     """
 
     key: str
@@ -77,7 +77,7 @@ class Recorded:
 
 @dataclass(slots=True)
 class KeyCount:
-    """What a recording holds of one key, sender and schema."""
+    """Number of messages of one key, sender and schema in a recording."""
 
     key: str
     source: str
@@ -87,14 +87,14 @@ class KeyCount:
 
 @dataclass(slots=True)
 class Contents:
-    """What a recording holds.
+    """Summary of a recording.
 
     Attributes:
         about: Facts about the mission.
         begin_s: Mission time of its first message.
-        end_s: Of its last.
-        messages: Their number.
-        counts: By key, sender and schema, in the order of keys.
+        end_s: Mission time of its last message.
+        messages: Number of its messages.
+        counts: Numbers by key, sender and schema, in the order of keys.
     """
 
     about: dict[str, str] = field(default_factory=dict)
@@ -108,10 +108,10 @@ class Recording:
     """A recording in a file.
 
     Args:
-        file: Read until the recording is not used any more; not closed.
+        file: Must stay open while the recording is used; not closed here.
 
     Raises:
-        NoRecording: The file is none, or its recorder was killed; ``NotOfMessages``: it holds something else.
+        NoRecording: The file is not a recording, or its recorder was killed; ``NotOfMessages``: it has other content.
     """
 
     def __init__(self, file: IO[bytes]) -> None:
@@ -128,7 +128,7 @@ class Recording:
         self._summary: Summary = summary
 
     def contents(self) -> Contents:
-        """Return what it holds, from its index alone."""
+        """Return the summary, from the index alone."""
         statistics = self._summary.statistics
         assert statistics is not None  # noqa: S101  checked when it was opened
         counted = statistics.channel_message_counts
@@ -145,7 +145,7 @@ class Recording:
         )
 
     def mission_xml(self) -> str:
-        """Return the mission file; empty: it was not known."""
+        """Return the mission file; empty: the recorder did not have it."""
         files = (one for one in self._reader.iter_attachments() if one.name == "mission.xml")
         found = next(files, None)
         return found.data.decode() if found is not None else ""
@@ -162,11 +162,11 @@ class Recording:
         """Yield the messages in the order of sending.
 
         Args:
-            patterns: Only of keys that match one of these; none: all. ``scout/<mission>/`` may be left out.
-            since_s: Not before this mission time.
-            until_s: Not after it; None: to the end.
-            source: Only of this sender; empty: of all.
-            newest_first: In the opposite order.
+            patterns: Only keys that match one of these; none: all. ``scout/<mission>/`` may be left out.
+            since_s: Earliest mission time.
+            until_s: Latest mission time; None: to the end.
+            source: Only messages of this sender; empty: all senders.
+            newest_first: True: the opposite order.
         """
         records = self.records(patterns, since_s, until_s, source, newest_first=newest_first)
         for _schema, _channel, _message, recorded in records:
@@ -203,9 +203,9 @@ class Recording:
 
 
 def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
-    """Return sender → how many of its messages are missing between its first and its last, for those that lack any.
+    """Return sender → number of messages missing between its first and its last, only for senders that miss any.
 
-    Each sender numbers its messages. One is missing if it was lost, if it is of a key that was not recorded, or if it
+    Each sender numbers its messages. A number is missing if its message was lost, if its key was not recorded, or if it
     is a question without an answer.
     """
     numbers: dict[str, set[int]] = {}
@@ -217,10 +217,10 @@ def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
 
 
 def recover(damaged: IO[bytes], to: IO[bytes]) -> int:
-    """Write a whole recording with all messages before the damage; return their number.
+    """Write a complete recording with all messages before the damage; return their number.
 
     Raises:
-        NoRecording: Not even the begin is there; ``NotOfMessages``: it is a copy for other tools.
+        NoRecording: Even the begin is missing; ``NotOfMessages``: the file is a copy for other tools.
     """
     writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
     writer.start(profile=PROFILE, library=PROFILE)
@@ -263,22 +263,22 @@ def recover(damaged: IO[bytes], to: IO[bytes]) -> int:
 
 
 def recover_file(path: Path, to: Path) -> int:
-    """Write what is readable of a recording to a new file; return the number of its messages.
+    """Write all readable messages of a recording to a new file; return their number.
 
     Raises:
-        NoRecording: It is none.
+        NoRecording: The file is not a recording.
         FileExistsError: The new file exists.
-        OSError: One of them cannot be opened.
+        OSError: A file cannot be opened.
     """
     with path.open("rb") as damaged, to.open("xb") as made:
         return recover(damaged, made)
 
 
 def _check_index(file: IO[bytes]) -> None:
-    """Return if the index is as it was written; the library checks only the messages.
+    """Return if the index is undamaged, else raise; the library checks only the messages.
 
     Raises:
-        ValueError: It is not, or the file has no end.
+        ValueError: The index is damaged, or the file has no end.
     """
     end = file.seek(0, os.SEEK_END) - _END.size
     file.seek(max(0, end))
@@ -298,7 +298,7 @@ def _named(channel: Channel) -> tuple[str, str, str]:
 
 
 def heard_now(key: str, message: Translated, at_s: float) -> Recorded:
-    """Return a message that was just heard as if it had been recorded."""
+    """Return a live message in the form of a recorded one."""
     if not message.schema:
         return Recorded(key, message.source, "", at_s, at_s, at_s, message.sequence, "", message.data)
     return Recorded(key, message.source, message.schema, at_s, **msgspec.json.decode(message.data))

@@ -1,4 +1,4 @@
-"""Why something was as it was, at any instant of a recording: the answers that the live mission gave."""
+"""The reasons for a state at any instant of a recording: the answers that the live mission gave."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
     """Return the reasons for the state of an ARC, owner, resource or component at a mission time.
 
     Raises:
-        UnknownName: The recording has nothing about it before that time.
-        NotRecorded: It is in the schedule only, of which the recording has no state before.
+        UnknownName: The recording contains nothing about this name before that time.
+        NotRecorded: Only the schedule has this name, and the recording has no earlier state of the schedule.
         NoSnapshot, OtherForm: The recording is of another release.
     """
     name = AskedName.of(text).name
@@ -39,7 +39,8 @@ def reasons_at(recording: Recording, text: str, at_s: float) -> Reasons:
             raise
         why = None
     if why is None and component is None and absence is None:
-        raise UnknownName(f"nothing about {name!r} was said before {at_s:.3f} s{did_you_mean(name, states)}", name=name)
+        hint = did_you_mean(name, states)
+        raise UnknownName(f"the recording has nothing about {name!r} before {at_s:.3f} s{hint}", name=name)
     return printable_all(Reasons(name, why, None, component, absence))
 
 
@@ -52,7 +53,7 @@ def _why(recording: Recording, name: str, at_s: float) -> Why | None:
 
 
 def _last_said(recording: Recording, at_s: float) -> tuple[dict[str, ComponentState], list[Absence]]:
-    """Return the state of each component by name, and what was absent, as last said."""
+    """Return the last published state of each component by name, and the last published absences."""
     states: dict[str, ComponentState] = {}
     absent: list[Absence] = []
     for message in recording.messages(_SAID, 0.0, at_s):

@@ -1,4 +1,4 @@
-"""A mission as a recording has it at one instant: who is there, and what its components answer. Pure."""
+"""A recorded mission at one instant: its present components, and their answers. Pure."""
 
 from __future__ import annotations
 
@@ -38,40 +38,40 @@ READS = ("Ask", "List", "Resolve")
 STATES = frozenset(
     {Conversation.STATUS, Conversation.SCHEDULE, Conversation.HEALTH, Conversation.POSES, Conversation.FRAMES}
 )
-"""Conversations whose newest message is what a newcomer must know."""
+"""Conversations whose newest message a new listener must get."""
 HISTORY = frozenset(
     {Conversation.ALIVE, Conversation.ASK, Conversation.LOG, Conversation.OPERATORS, Conversation.DECISIONS}
 )
-"""Conversations of which all messages until then decide what is answered."""
+"""Conversations of which all earlier messages determine the answers."""
 _TABLES = ("present", "there", "_states", "_guests", "_newest", "_open", "_answers")
-MOST_OPEN = 1000  # chosen: questions under way at one time; the others were never answered
+MOST_OPEN = 1000  # chosen: questions under way at one time; older ones were never answered
 
 
 class TakesNoCommands(Refusal):
-    """What happened cannot be commanded."""
+    """A recording cannot be commanded."""
 
     code = "recording.only"
     remedy = "Bring the mission up to command it: scout-backbone recording mission FILE > mission.xml, then 'up'."
 
 
 class NotAnswered(Refusal):
-    """The component did not answer this question until then."""
+    """The component did not answer this question before the present time of the recording."""
 
     code = "recording.not_answered"
     remedy = "Go to a later time of the recording."
 
 
 class RecordedMission:
-    """Takes the messages of a recording in their order.
+    """The state of the mission, built from the messages of a recording in their order.
 
     Args:
         classes: Known message classes, by schema.
 
     Attributes:
         now_s: Mission time.
-        rate: Mission seconds per second of the machine, as its clock is to be told.
+        rate: Mission seconds per second of the machine, for answers about the clock.
         present: Addresses of the components that are ready.
-        there: Addresses that answer: those of messages and questions, unless their component is gone.
+        there: Addresses that answer: all that occurred in messages and questions, except of components that are gone.
     """
 
     def __init__(self, classes: Mapping[str, type[Message]]) -> None:
@@ -80,7 +80,7 @@ class RecordedMission:
         self.there = dict.fromkeys((NAMESERVER, LAUNCHER))
         self._classes = classes
         self._states: dict[str, ComponentState] = {}
-        self._guests: dict[str, ComponentState] = {}  # who came to look
+        self._guests: dict[str, ComponentState] = {}  # live clients that inspect the recording
         self._newest: dict[tuple[str, str], Recorded] = {}
         self._open: OrderedDict[str, tuple[str, str, bytes]] = OrderedDict()
         self._answers: dict[tuple[str, str, bytes], Message] = {}
@@ -88,11 +88,11 @@ class RecordedMission:
         self._schedule = RecordedSchedule()
 
     def take(self, message: Recorded) -> None:
-        """Let it have been said."""
+        """Apply the message."""
         self.take_said(message, message_as_sent(self._classes, message))
 
     def take_said(self, message: Recorded, said: Message | None) -> None:
-        """Let it have been said.
+        """Apply the message.
 
         Args:
             said: The message as it was sent, see ``message_as_sent``.
@@ -117,27 +117,27 @@ class RecordedMission:
             self._asked_or_answered(address, message, said)
 
     def copied(self) -> RecordedMission:
-        """Return a mission that goes on from here by itself; the messages, which never change, are in both."""
+        """Return an independent copy; both share the messages, which never change."""
         twin = copy.copy(self)
         vars(twin).update({name: copy.copy(getattr(self, name)) for name in _TABLES})
         vars(twin).update(_log=self._log.copied(), _schedule=copy.deepcopy(self._schedule))
         return twin
 
     def newest(self) -> Iterator[Recorded]:
-        """Yield the newest message of each key that tells a state."""
+        """Yield the newest message of each key that carries a state."""
         yield from self._newest.values()
 
     def answer(self, address: str, question: Message) -> Message:
-        """Return what the component answers.
+        """Return the component's answer.
 
         Raises:
             TakesNoCommands: The question would change something.
-            NotAnswered: It is not there, or did not answer this until now.
+            NotAnswered: The component is absent, or did not answer this question until now.
             UnknownName: No component has this name.
-            UnknownRequest: The schedule has nothing of this name.
+            UnknownRequest: The schedule has no entry of this name.
         """
         if address not in self.there:
-            raise NotAnswered(f"{address} is not there at {self.now_s:.3f} s")
+            raise NotAnswered(f"{address} is absent at {self.now_s:.3f} s")
         match question:
             case AskTime():
                 return MissionTime(self.now_s, self.rate)
@@ -171,7 +171,7 @@ class RecordedMission:
         return known
 
     def gone(self, guest: str) -> None:
-        """Forget who came to look, by address."""
+        """Forget the client with this address."""
         self._guests.pop(guest, None)
 
     def _presence_changed(self, address: str, alive: bool) -> None:
@@ -184,7 +184,7 @@ class RecordedMission:
 
     def _asked_or_answered(self, address: str, message: Recorded, said: Message) -> None:
         asked = self._open.get(message.cause)
-        if asked is not None and asked[0] == address == message.source:  # else a question that this one led to
+        if asked is not None and asked[0] == address == message.source:  # else a question caused by this one
             self._answers[self._open.pop(message.cause)] = said
             return
         self._open[message.id] = asked_of(address, said)
@@ -193,5 +193,5 @@ class RecordedMission:
 
 
 def asked_of(address: str, question: Message) -> tuple[str, str, bytes]:
-    """Return what makes a question to a component the same question."""
+    """Return what identifies a question to a component: equal questions have equal values."""
     return address, schema_of(type(question)), msgspec.json.encode(named(question))

@@ -1,7 +1,7 @@
 """Recorder: writes everything it overhears into a recording.
 
-It is no component: it answers no questions, and what it overhears is dropped rather than waited for. So it delays no
-component, even if its process hangs. It ends in good order when its file can grow no more.
+It is not a component: it answers no questions, and if it is too slow, messages are dropped instead of delayed.
+Therefore it delays no component, even if its process hangs. If its file cannot grow, it ends in good order.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ from backbone.spoken import counted
 from backbone.waiting import set_within
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
-FLUSH_EACH_S = 0.25  # chosen: a killed recorder may lose half a second, also on a busy machine; seconds of the machine
+FLUSH_EACH_S = 0.25  # chosen: a killed recorder may lose half a second, on a busy machine too; seconds of the machine
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
-OVERHEARD_WITHIN_S = 0.2  # a copy gathers 10 ms at its sender and up to 100 ms here; seconds of the machine
+OVERHEARD_WITHIN_S = 0.2  # a copy waits 10 ms at its sender and up to 100 ms here; seconds of the machine
 MOST_ATTEMPTS = 5  # chosen: together ten times as long
-SNAPSHOT_EACH_S = 10.0  # chosen: a replay from the middle decides on few events that are not shown
-SNAPSHOT_S_PER_BYTE = 1.5e-4  # measured: a kilobyte is written in 0.15 ms; so it takes a thousandth of the time
+SNAPSHOT_EACH_S = 10.0  # chosen: a replay from the middle must first decide on few earlier events
+SNAPSHOT_S_PER_BYTE = 1.5e-4  # measured: a kilobyte is written in 0.15 ms; snapshots take a thousandth of the time
 GONE_AFTER_S = 5.0  # chosen: a restarted hub is back within two; seconds of the machine
 LEAST_FREE_BYTES = 100 * 1000 * 1000  # B-Human's logger: it stops below 100 MB
 MOST_WAITING_BYTES = 64 * 1024 * 1024  # chosen: a second of four cameras in color
 
 _ANSWERS = (Conversation.TOLD, Conversation.ASK)
-"""Where copies of an answer come: over the bus, and from processes."""
+"""Conversations in which copies of an answer arrive: over the bus, and from processes."""
 
 log = logging.getLogger(__name__)
 
@@ -60,20 +60,20 @@ class Recorder:
     """Writes a recording until it ends, or the mission has ended.
 
     Args:
-        bus: Not closed.
-        files: Of the recording; closed at the end.
+        bus: Bus of the mission; not closed.
+        files: Files of the recording; closed at the end.
         split_s: A file gets no longer than so many seconds of the machine.
-        split_bytes: A file gets hardly larger.
+        split_bytes: Approximate largest size of a file.
         classes: Known message classes, by schema.
         about: Facts about the mission.
         keys: Patterns of the keys to record, without ``scout/<mission>/``; empty: all.
-        mission_xml: The mission's file; empty: not known.
-        user: The person who records; empty: nobody.
-        ear: Receives the copies that processes of this host send. None, or another recorder has taken it: the recorder
-            overhears the bus alone.
-        is_lossless: True: all that is overheard is kept by its senders until it came, however much comes at once.
-        host_only: True: the recorder writes these copies alone, and asks no component. False: it also overhears those
-            that other processes send by network, which have no pictures.
+        mission_xml: The mission file; empty: not known.
+        user: The person who records; empty: no person.
+        ear: Receives the copies that processes of this host send. None, or taken by another recorder: the recorder
+            overhears only the bus.
+        is_lossless: True: senders keep every overheard message until it has arrived, even in bursts.
+        host_only: True: the recorder writes only these copies, and asks no component. False: it also overhears the
+            copies that other processes send by network, which have no pictures.
     """
 
     def __init__(
@@ -111,16 +111,16 @@ class Recorder:
         self.on_flushed: Callable[[], None] = lambda: None
         """Called after each flush; settable."""
         self.full = ""
-        """Why the file can grow no more; empty: it can."""
+        """Reason why the file cannot grow; empty: it can."""
 
     @property
     def written(self) -> int:
-        """Messages so far."""
+        """Number of recorded messages so far."""
         return self._before + self._writer.written
 
     @property
     def dropped(self) -> int:
-        """Messages that it had no time for."""
+        """Number of messages that were lost because the recorder was too slow."""
         return sum(each.dropped for each in self._subscribed) + (self._ear.dropped if self._ear is not None else 0)
 
     def end(self) -> None:
@@ -128,13 +128,13 @@ class Recorder:
         self._ended.set()
 
     async def run(self, on_begun: Callable[[], None] = lambda: None) -> None:
-        """Record until the end; then the file is whole, unless the disc is full.
+        """Record until the end; afterwards the file is complete, unless the disc is full.
 
         Args:
-            on_begun: Called when it listens.
+            on_begun: Called when the recorder has subscribed.
 
         Raises:
-            BaseException: A bug ended it.
+            BaseException: A bug that ended the recorder.
         """
         self._bus.on_bug = self._fail
         if self._ear is not None:
@@ -221,7 +221,7 @@ class Recorder:
         return RecordingWriter(self._files.file, *self._facts)
 
     async def _hear_the_last(self) -> None:
-        """Return when the copies of what was sent until now have arrived; the file ends with that."""
+        """Return when the copies of all messages sent until now have arrived; they are the end of the file."""
         self._writer.end_at(self._clock.now_s())
         if self._has_link:
             await self._clock.sleep_s(OVERHEARD_WITHIN_S * self._clock.rate)
@@ -266,7 +266,7 @@ class Recorder:
         try:
             while (copy := copy_at(raw, end)) is not None:
                 end = copy.end
-                if copy.key.startswith(own):  # anybody may publish there
+                if copy.key.startswith(own):  # any process may publish at this key
                     self._heard(copy.key, copy.raw)
         except (ConnectionError, UnicodeDecodeError) as error:
             log.warning("no copies at %s: %s", at, error)
@@ -281,14 +281,14 @@ class Recorder:
         except OSError as error:
             self._fill(str(error))
 
-    # ------------------------------------------------------------------ what was said before
+    # ------------------------------------------------------------------ messages before the begin
     async def _ask(self) -> None:
-        """Ask for what was said before the recorder overheard it; the answers come as all others do."""
+        """Ask for states from before the begin; the answers are overheard like all others."""
         if not self._host_only and Conversation.TOLD in to_overhear(self._keys):
             await asyncio.gather(self._ask_for_snapshots(), self._ask_who_appears())
 
     async def _ask_for_snapshots(self) -> None:
-        """Ask for the state of the schedule again and again, and at the begin of each file."""
+        """Ask for the state of the schedule repeatedly, and at the begin of each file."""
         while True:
             self._needs_snapshot.clear()
             answer = await self._asked(RC_MANAGER, AskSnapshot(), ScheduleSnapshot)
@@ -308,7 +308,7 @@ class Recorder:
                 await self._asked(address, AskStory(), Story)
 
     async def _asked(self, address: str, question: Message, reply: type[Reply]) -> Reply | None:
-        """Return the answer once it was overheard too; None: there is none."""
+        """Return the answer after it was overheard too; None: no answer came."""
         async with self._one_at_a_time:
             self._awaited = frozenset(key_of(self._bus.mission, address, one) for one in _ANSWERS)
             for _attempt in range(MOST_ATTEMPTS):

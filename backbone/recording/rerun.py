@@ -1,8 +1,8 @@
-"""Rerun: one component for real, on virtual time; everything around it is the recording.
+"""Rerun: runs one component for real, on virtual time; the recording supplies everything around it.
 
-The component gets the recorded publications, tokens and questions at their recorded times. What it asks is answered as
-the recorded component was answered, not before the recorded answer came. All that it says is kept, to be compared with
-what the recorded one said.
+The component gets the recorded publications, tokens and questions at their recorded times. Its questions get the
+recorded answers, not earlier than recorded. All its messages are kept, to be compared with those of the recorded
+component.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ class NoSuchComponent(Refusal):
 
 @dataclass(frozen=True, slots=True)
 class Rerun:
-    """What a component said anew.
+    """The messages of a component that ran again.
 
     Attributes:
         class_path: Its class.
-        said: In the order in which it said it.
-        fell: The exception that ended it early; None: it lived to the end.
+        said: The messages in the order of sending.
+        fell: The exception that ended the component early; None: it ran to the end.
     """
 
     class_path: str
@@ -63,7 +63,7 @@ def launch_of(recording: Recording, classes: Known, name: str) -> Launch:
     """Return the launch of the first component of this name, without an endpoint.
 
     Raises:
-        NoSuchComponent: The recording has no state or parameters of it, or not the mission's types.
+        NoSuchComponent: The recording lacks its state, its parameters or the mission's types.
     """
     state: ComponentState | None = None
     parameters: Parameters | None = None
@@ -102,19 +102,19 @@ def launch_of(recording: Recording, classes: Known, name: str) -> Launch:
 
 
 def _incarnation(recording: Recording, name: str) -> str:
-    """Return the id of the component's life, as the component that stopped it named it; empty: none did."""
+    """Return the incarnation named in the order that stopped the component; empty: no such order was recorded."""
     stops = (one for one in recording.messages((f"*/{name}/{Conversation.ASK}",)) if one.schema == schema_of(Stop))
     found = next(stops, None)
     return str(found.body["incarnation"]) if found is not None else ""
 
 
 def run_again(recording: Recording, classes: Known, launch: Launch, component: ComponentType) -> Rerun:
-    """Run the component on the recording, from its first to its last message on; return what it said.
+    """Run the component on the recording, from its first to its last message; return its messages.
 
     Args:
-        recording: Not used elsewhere meanwhile.
+        recording: Must not be used elsewhere meanwhile.
         classes: Known message classes, by schema.
-        launch: Of the component.
+        launch: Launch of the component.
         component: Its class.
     """
     return run_virtual(_run(recording, classes, launch, component))
@@ -145,7 +145,7 @@ async def _run(recording: Recording, classes: Known, launch: Launch, make: Compo
 
 
 class _RecordedNetwork(LocalNetwork):
-    """A mission around one component, of which the rest is recorded."""
+    """A mission around one component; all other components are recorded."""
 
     def __init__(self, recording: Recording, classes: Known, launch: Launch) -> None:
         super().__init__(launch.mission)
@@ -159,7 +159,7 @@ class _RecordedNetwork(LocalNetwork):
         self._learn()
 
     def _learn(self) -> None:
-        """Learn when the component lived, and what it was answered."""
+        """Find out when the component lived, and which answers it got."""
         asked: dict[str, tuple[str, Message]] = {}
         for message in self._recording.messages():
             address, is_asked = address_of(message.key), message.key.endswith(f"/{Conversation.ASK}")
@@ -178,7 +178,7 @@ class _RecordedNetwork(LocalNetwork):
                     self._answers[asked_of(*asked.pop(message.cause))].append((_sent_s(message), answer))
 
     async def play(self, bus: Bus, clock: Clock) -> None:
-        """Say what others said, at the recorded times; return when the recorded component had said its last."""
+        """Publish the others' messages at their recorded times; return after the component's last recorded message."""
         for message in self._recording.messages(until_s=self.end_s):
             await clock.sleep_until_s(_sent_s(message))
             if message.source != self._own:
@@ -201,7 +201,7 @@ class _RecordedNetwork(LocalNetwork):
             bus.pass_on(address, Conversation(conversation), _sent(message, said))
 
     def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
-        """Answer what the component asks as it was answered."""
+        """Give the component's question its recorded answer."""
         self._keep(key_of(self.mission, address, Conversation.ASK), write(asked), asked.stamp_s)
         known = self._answers[asked_of(address, asked.body)]
         loop = asyncio.get_running_loop()
@@ -216,7 +216,7 @@ class _RecordedNetwork(LocalNetwork):
         loop.call_at(max(at_s, loop.time()), answered, envelope)
 
     def heard(self, clock: Clock, key: str, raw: bytes) -> None:
-        """Keep what the component published, or answered."""
+        """Keep a message that the component published or answered."""
         self._keep(key, raw, clock.now_s())
 
     def _keep(self, key: str, raw: bytes, at_s: float) -> None:
@@ -226,7 +226,7 @@ class _RecordedNetwork(LocalNetwork):
 
 
 def _sent_s(message: Recorded) -> float:
-    """Return when it was sent, to the last digit, as far as that is credible."""
+    """Return the time of sending, to the last digit, if it is credible."""
     return message.stamp_s if abs(message.stamp_s - message.at_s) < NANOSECOND_S else message.at_s
 
 

@@ -1,4 +1,4 @@
-"""From a recorded body back to the message that was sent. Pure."""
+"""Restores the message that was sent from a recorded body. Pure."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class OtherForm(Refusal):
 
 
 def revived(kind: type[Kind], body: dict[str, Any] | list[Any]) -> Kind:
-    """Return the message of this class that a recorded body holds; fields that are newer have their defaults.
+    """Return the message of this class that a recorded body holds; fields that are newer get their defaults.
 
     Args:
-        body: With the names of its fields, or as a list where the recorder did not know the class.
+        body: Fields by name, or a list if the recorder did not know the class.
 
     Raises:
-        OtherForm: The body is of another form.
+        OtherForm: The body does not fit the class.
     """
     try:
         listed = body if isinstance(body, list) else _listed_struct(kind, body)
@@ -57,10 +57,10 @@ def message_from(classes: Mapping[str, type[Message]], said: object) -> Message:
 
     Args:
         classes: Known message classes, by schema.
-        said: The object. ``schema`` may leave the version out.
+        said: The object; the version in ``schema`` is optional.
 
     Raises:
-        OtherForm: There is no such schema or field, a field is missing, or a value is outside its range.
+        OtherForm: No such schema or field exists, a field is missing, or a value is outside its range.
     """
     if not isinstance(said, dict) or not isinstance(said.get(TAG), str):
         raise OtherForm(f"it is no object with a {TAG!r}", remedy=WRITE_ONE)
@@ -78,7 +78,7 @@ def message_from(classes: Mapping[str, type[Message]], said: object) -> Message:
 
 
 def _listed(kind: inspect.Type, value: Any) -> Any:
-    """Return the value in the form of the wire: structs whose class says so are lists."""
+    """Return the value in the form of the wire, in which structs declared ``array_like`` are lists."""
     match kind:
         case inspect.StructType(cls=struct):
             return _listed_struct(struct, value)
@@ -97,7 +97,7 @@ def _listed(kind: inspect.Type, value: Any) -> Any:
 
 
 def _may_hold(kind: inspect.Type, value: Any) -> bool:
-    """Return whether a value of a union, which is no plain one, is of this kind."""
+    """Return whether this member of a union may hold the value, which is not a plain one."""
     match kind:
         case inspect.StructType(cls=struct):
             if isinstance(value, dict) and TAG in value and issubclass(struct, Message):

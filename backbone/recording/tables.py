@@ -8,13 +8,13 @@ from typing import Any
 from backbone.recording.reader import Recorded
 
 FIRST_COLUMNS = ("at_s", "source", "sequence", "cause", "commanded_by")
-LONGEST_LIST = 64  # chosen: a scan of a laser has more, and is no table
+LONGEST_LIST = 64  # chosen: a laser scan has more, and is not a table
 BYTES_OF = "pixels"
-"""Field of a picture that is no column."""
+"""Field of a picture that gets no column."""
 
 
 def table_of(message: Recorded) -> str:
-    """Return the name of the table that the message is a row of: its key and schema.
+    """Return the name of the table to which the message belongs: its key and schema.
 
     Example:
         >>> table_of(Recorded("scout/night/resource_pool/scout1/readings", "", "Readings/1", 0, 0, 0, 0, "", {}))
@@ -27,7 +27,7 @@ def row_of(message: Recorded, commanded_by: str = "", *, splits_lists: bool = Tr
     """Return column → value. Fields inside others have their names joined by dots, as ``rcs.0.rc``.
 
     Args:
-        commanded_by: Who commanded the robot then; see ``Commanders``.
+        commanded_by: The robot's commander at that time; see ``Commanders``.
         splits_lists: True: each item of a list has a column of its own, and long lists have none. False: a list is one
             value.
     """
@@ -64,10 +64,10 @@ def _flat(value: Any, path: str, *, splits_lists: bool) -> Iterator[tuple[str, A
 
 
 class Commanders:
-    """Who commanded a robot at an instant: a person, a behavior, or nobody.
+    """The commander of each robot at an instant: a person, a behavior, or no one.
 
-    It takes the messages of a recording in their order. Only the ARC that holds a robot moves it, under its epoch; so
-    its owner commanded what the robot did, and what its camera saw.
+    It takes the messages of a recording in their order. Only the ARC that holds a robot moves it, under its epoch.
+    Therefore the owner of that ARC commanded the robot's actions, and the view of its camera.
     """
 
     def __init__(self) -> None:
@@ -76,7 +76,7 @@ class Commanders:
         self._arcs: dict[tuple[str, int], str] = {}
 
     def take(self, message: Recorded) -> None:
-        """Note whose each ARC is, which ARC each epoch of an RC is of, and who sits at each console."""
+        """Record the owner of each ARC, the ARC of each epoch of an RC, and the person at each console."""
         body = message.body
         if not isinstance(body, dict):
             return
@@ -88,12 +88,12 @@ class Commanders:
             self._users[body["address"]] = body["user"]
 
     def of(self, message: Recorded) -> str:
-        """Return who commanded the robot of this message; empty: nobody, or it is of no ARC."""
+        """Return the commander of the robot of this message; empty: none, or the message is of no ARC."""
         body = message.body if isinstance(message.body, dict) else {}
         arc = body.get("arc") or self._arcs.get((body.get("rc", ""), body.get("epoch", 0)), "")
         return self.owner_of(arc)
 
     def owner_of(self, arc: str) -> str:
-        """Return whose an ARC is: the name of a person or behavior; empty: it is not known."""
+        """Return the owner of an ARC, by the name of the person or behavior; empty: not known."""
         owner = self._owners.get(arc, "")
         return self._users.get(owner, owner.rpartition("/")[2])

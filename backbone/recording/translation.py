@@ -1,4 +1,4 @@
-"""From the bytes of a message on the bus to what a recording holds of it. Pure."""
+"""Translates the bytes of a message on the bus to the form in a recording. Pure."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ _UNSPEAKABLE = (TypeError, ValueError, OverflowError, RecursionError)  # what Me
 
 
 class Translated(NamedTuple):
-    """A message as a recording holds it.
+    """A message in the form of a recording.
 
     Attributes:
-        schema: ``<Name>/<version>``; empty: the bytes are no message, or one that JSON cannot say.
+        schema: ``<Name>/<version>``; empty: the bytes are not a message, or JSON cannot represent it.
         source: Address of the sender; empty: the bytes are no message.
-        sequence: Its number among those of the sender.
+        sequence: Its number among the sender's messages.
         stamp_s: Mission time of sending.
         kind: Its class; None: no installed package has it.
-        data: JSON; with an empty schema the bytes as they were.
+        data: JSON; with an empty schema, the unchanged bytes.
         size_bytes: Length on the bus.
     """
 
@@ -53,7 +53,7 @@ class Translated(NamedTuple):
 
 
 class Translator:
-    """Translates messages of known classes with the names of their fields, others as they are.
+    """Translates messages of known classes to objects with field names; other messages stay without names.
 
     Args:
         classes: Known message classes, by schema.
@@ -65,7 +65,7 @@ class Translator:
         self._any: Any = msgspec.msgpack.Decoder(Envelope[Any])
 
     def translate(self, raw: bytes, heard_s: float) -> Translated:
-        """Return the message, which was heard at a mission time; whatever the bytes are, they are kept."""
+        """Return the translation of a message that arrived at a mission time; unreadable bytes are kept unchanged."""
         try:
             envelope = self._known.decode(raw)
         except _UNREADABLE:
@@ -93,7 +93,7 @@ class _Tagged(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Heading(msgspec.Struct, frozen=True, array_like=True):
-    """The begin of a message: who says what; the rest is not read, so it costs little however long that is."""
+    """The begin of a message: sender, number, schema. The rest is not decoded, so a long message costs little."""
 
     wire: int
     source: str
@@ -115,7 +115,7 @@ _told = msgspec.msgpack.Decoder(Envelope[Told])
 
 
 def heading_of(raw: bytes) -> Heading:
-    """Return the begin of a message; ``NO_HEADING``: the bytes are none."""
+    """Return the begin of a message; ``NO_HEADING``: the bytes are not a message."""
     try:
         return _headings.decode(raw)
     except _UNREADABLE:
@@ -147,7 +147,7 @@ def named(body: msgspec.Struct) -> dict[str, Any]:
 
 @cache
 def _fields(kind: type[msgspec.Struct]) -> list[tuple[str, bool]]:
-    """Return the names of the fields, and whether each is written as it is: no message can be inside it."""
+    """Return the names of the fields, each with True if it cannot contain a message and is written unchanged."""
     fields = cast("inspect.StructType", inspect.type_info(kind)).fields
     return [(field.name, _is_plain(field.type)) for field in fields]
 

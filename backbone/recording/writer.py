@@ -1,8 +1,8 @@
-"""Writer: messages of the bus into one MCAP file, a channel for each key, sender and schema.
+"""Writer: writes messages of the bus into one MCAP file, with a channel for each key, sender and schema.
 
-Times are mission time, nanoseconds: when the sender sent the message. So readers, which go by ``log_time``, yield the
-messages of each sender in its order, although the bus delivers urgent ones first; ``heard_s`` beside the body is when
-the recorder got it. What was flushed outlives the recorder's death, see ``reader.recover``.
+Times are mission time of sending, nanoseconds. Readers order by ``log_time``. Therefore they yield the messages of each
+sender in its order, although the bus delivers urgent ones first. ``heard_s`` beside the body is the time of arrival at
+the recorder. Flushed messages survive the recorder's death, see ``reader.recover``.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ABOUT = "mission"
 """Name of the metadata about the mission."""
 NS = 1_000_000_000
 CHUNK_BYTES = 256 * 1024  # chosen: a chunk is written well before the next flush, and still compresses
-MOST_AHEAD_S = 60.0  # chosen: beyond any difference of clocks that a mission survives
+MOST_AHEAD_S = 60.0  # chosen: larger than any difference of clocks with which a mission works
 MOST_CHANNELS = 60_000  # MCAP specification, op 0x04: id is a uint16; the rest is for channels of any sender
 MOST_SEQUENCE = 2**32  # MCAP specification, op 0x05: sequence is a uint32
 MIME_XML = "application/xml"
@@ -34,11 +34,11 @@ class RecordingWriter:
     """Writes one recording.
 
     Args:
-        file: Written from its beginning; not closed.
+        file: Written from its begin; not closed.
         classes: Known message classes, by schema.
         about: Facts about the mission, for people and programs.
         keys: Patterns of the keys to write, see ``is_meant``; empty: all.
-        mission_xml: Its file; empty: not known.
+        mission_xml: The mission file; empty: not known.
     """
 
     def __init__(
@@ -55,19 +55,19 @@ class RecordingWriter:
         self._channels: dict[tuple[str, str, str], int] = {}
         self._end_s = math.inf
         self.written = 0
-        """Messages so far."""
+        """Number of messages so far."""
         self._writer.start(profile=PROFILE, library=PROFILE)
         self._writer.add_metadata(ABOUT, dict(about))
         if mission_xml:
             self._writer.add_attachment(0, 0, "mission.xml", MIME_XML, mission_xml.encode())
 
     def write(self, key: str, raw: bytes, at_s: float) -> None:
-        """Add what came over the bus at a mission time, as far as it is meant and was sent before the end."""
+        """Add bytes that arrived at a mission time, if their key is selected and they were sent before the end."""
         for said_at, message in self._hearing.heard(key, raw, at_s):
             self._write(said_at, message, at_s)
 
     def end_at(self, at_s: float) -> None:
-        """Leave out from now on what was sent after this mission time; what was sent before may still arrive."""
+        """From now on skip messages sent after this mission time; earlier ones may still arrive."""
         self._end_s = at_s
 
     def _write(self, key: str, message: Translated, at_s: float) -> None:
@@ -88,15 +88,15 @@ class RecordingWriter:
         self.written += 1
 
     def flush(self) -> None:
-        """Hand everything so far to the operating system."""
+        """Hand all messages so far to the operating system."""
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     def finish(self) -> None:
-        """Write the index, which lets readers begin anywhere; nothing can be written afterwards."""
+        """Write the index, which lets readers begin anywhere; afterwards nothing more can be written."""
         self._writer.finish()  # type: ignore[no-untyped-call]
 
     def _channel_and_data(self, key: str, message: Translated) -> tuple[int, bytes]:
-        """Return the number of the message's channel, and its data, with key and sender where channels are scarce."""
+        """Return the number of the message's channel, and its data; if channels are scarce, with key and sender."""
         named = (key, message.source, message.schema)
         known = self._channels.get(named)
         if known is not None:

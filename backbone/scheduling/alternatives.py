@@ -1,6 +1,6 @@
 """Alternatives: chooses the set of RCs that an ARC waits for, or refuses a request that can never run.
 
-Rule of this file: it chooses once, when an ARC sends its request; time does not count. The chosen set stays.
+Rule of this file: it chooses once, when an ARC sends its request; time does not matter. The chosen set stays.
 
 Source: RAM 2002, resource controllers: a robot "not in use by another process" is selected.
 """
@@ -31,11 +31,11 @@ SHORTEST_RUNTIME_S = 0.001  # chosen: less than any context switch takes; shorte
 
 
 def choose(state: ScheduleState, request: SchedulingRequest) -> tuple[str, ...]:
-    """Return the set of RCs this request should wait for.
+    """Return the set of RCs that this request should wait for.
 
-    A set that it already waits for or holds stays. Otherwise RCs that did not fail come first, then RCs
-    without another ARC's exclusive request (two claims of any robot get two robots), then running RCs,
-    then the request's own order.
+    A set that it already waits for or holds stays. Otherwise the preferences are, in this order: RCs that did not fail;
+    RCs without another ARC's exclusive request, so that two claims of any robot get two robots; running RCs; the
+    request's own order.
 
     Raises:
         MissingRuntime: The request has no valid minimum run time.
@@ -47,7 +47,7 @@ def choose(state: ScheduleState, request: SchedulingRequest) -> tuple[str, ...]:
     known = [wish for wish in request.alternatives if wish.keys() <= state.rcs.keys()]
     if not known:
         missing = sorted({rc for wish in request.alternatives for rc in wish} - state.rcs.keys())
-        raise UnknownRc(f"{request.arc} asks for {', '.join(missing)}, which this mission has not", rc=missing[0])
+        raise UnknownRc(f"{request.arc} asks for {', '.join(missing)}, which this mission does not have", rc=missing[0])
     overloads = [_overloaded_alone(state, wish) for wish in known]
     possible = [wish for wish, overloaded in zip(known, overloads, strict=True) if overloaded is None]
     if possible:
@@ -57,7 +57,7 @@ def choose(state: ScheduleState, request: SchedulingRequest) -> tuple[str, ...]:
 
 
 def _reluctance(state: ScheduleState, arc: str, wish: Wish) -> tuple[bool, int, int, int]:
-    """Return the key of a choice: smaller is better; equal ones are taken in the request's order."""
+    """Return the sort key of a choice: smaller is better; of equal ones the first in the request is chosen."""
     present = state.arcs.get(arc)
     rcs = [state.rcs[rc] for rc in wish]
     return (
@@ -73,7 +73,7 @@ def _reluctance(state: ScheduleState, arc: str, wish: Wish) -> tuple[bool, int, 
 
 
 def _overloaded_alone(state: ScheduleState, wish: Wish) -> str | None:
-    """Return an RC that could not serve the wish alone; None: all could."""
+    """Return an RC that could not serve the wish alone; None: all RCs could."""
     for name, use in wish.items():
         rc, admission = state.rcs[name], state.compatibility.admission
         streams = sorted((stream(usage) for usage in use.streams), key=lambda one: one.period_us)

@@ -4,11 +4,11 @@ The plan decides the rest of an ARC's life (``schedule_manager``).
 
 Rules of this file (numbers as in docs and ``why``):
 
-* 1  Packets count as long as they are measured. An ARC that declared less asks anew with the measured time: as soon as
-  it holds nothing, or when what is connected, or is about to be, could not be served otherwise.
+* 1  The measured times of packets count. If an ARC declared less, it requests again with the measured time: as soon as
+  it holds nothing, or when its RCs could not otherwise serve all connected and connecting ARCs in time.
 * 6  revoke → free → connect → grant.
 * 11 An ARC that lost its owner is revoked; the rest of the schedule goes on.
-* 14 A running ARC may go on up to its maximum run time; an idle one keeps its request.
+* 14 A running ARC may continue up to its maximum run time; an idle one keeps its request.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.transitions import Transitions, because
 
 _NO_USE = RcUse()
-RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
+RETRY_S = 1.0  # chosen: retries of an ARC that cannot open its gate, at a pace that leaves time for its rivals
 
 
 class ArcEvents:
     """Applies events of ARCs.
 
     Attributes:
-        retrying: ARCs that want time again at a later time, by name.
-        understating: ARCs whose packets take longer than their requests say, by name.
+        retrying: ARCs that will want time again at a later time, by name.
+        understating: ARCs whose packets take longer than their requests state, by name.
     """
 
     def __init__(
@@ -68,10 +68,10 @@ class ArcEvents:
     # Requests of ARCs.
 
     def requested(self, event: Requested) -> None:
-        """Take in a request or a new version of it; a request for other RCs counts once the present ones are free."""
+        """Apply a request or a new version of it; a request for other RCs counts after the present ones are free."""
         request = event.request
         if any(rc not in self._state.rcs for rc in event.rcs):
-            return  # removed since it was chosen
+            return  # an RC was removed after it was chosen
         known = self._state.arcs.get(request.arc)
         if known is None:
             self._add(event)
@@ -96,7 +96,7 @@ class ArcEvents:
     def adopted(self, event: Adopted) -> None:
         """Adopt an ARC that an earlier RC manager granted its RCs.
 
-        The caller dates the event to the connection of its RCs, so the trace shows its slice as it was.
+        The caller sets the time of the event to the connection of its RCs, so the trace shows the true slice.
         """
         request, rcs = event.request, tuple(event.epochs)
         if request.arc in self._state.arcs or any(rc not in self._state.rcs for rc in rcs):
@@ -119,7 +119,7 @@ class ArcEvents:
             self._want(arc)
 
     def _want(self, arc: ArcEntry) -> None:
-        """Queue an idle ARC, later if its owner asked and left too often."""
+        """Queue an idle ARC, later if its owner requested and withdrew too often."""
         wait_s = self._damping.wait_s(arc.request.owner, self._decision.now_s)
         if wait_s:
             self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
@@ -209,7 +209,7 @@ class ArcEvents:
     # Packets that take longer than declared.
 
     def packets_measured(self, rc: str, packets: Sequence[MeasuredPackets]) -> None:
-        """Count packets as long as an RC measured them; an ARC that waits asks anew."""
+        """Count the measured times of packets; an ARC that waits requests again."""
         for measured in packets:
             name, kind = measured.arc, measured.kind
             arc = self._state.arcs.get(name)
@@ -225,21 +225,21 @@ class ArcEvents:
                     self._ask_anew(arc)
 
     def ask_anew_where_late(self) -> None:
-        """Let connected ARCs ask anew where an RC cannot serve all of them by the measured times."""
+        """Let connected ARCs request again if an RC cannot serve all of them by the measured times."""
         held = dict.fromkeys(rc for arc in self.understating.values() if arc.state in CONNECTED for rc in arc.shares)
         for rc in held:
             for arc in understating(self._table, rc):
                 self._ask_anew(arc)
 
     def ask_anew_beside(self, arc: ArcEntry) -> bool:
-        """Let holders ask anew beside which the ARC would be late; return whether there are any."""
+        """Let holders request again if the ARC would be late beside them; return whether there are any."""
         asked = dict.fromkeys(holder for rc in arc.shares for holder in understating(self._table, rc, [arc]))
         for holder in asked:
             self._ask_anew(holder)
         return bool(asked)
 
     def _ask_anew(self, arc: ArcEntry) -> None:
-        """Remove the ARC, and take in the same request with the measured times once its RCs are free."""
+        """Remove the ARC, and apply the same request with the measured times when its RCs are free."""
         request = msgspec.structs.replace(
             arc.request, minimum_runtime_s=arc.minimum_s, maximum_runtime_s=arc.maximum_s, idle=False
         )
@@ -286,7 +286,7 @@ class ArcEvents:
     # ARCs that could not open their gates.
 
     def retry(self) -> None:
-        """Queue the ARCs whose time to retry has come."""
+        """Queue the ARCs whose retry is due."""
         for arc in [*self.retrying.values()]:
             if arc.retry_s is None:
                 del self.retrying[arc.name]
@@ -330,7 +330,7 @@ class ArcEvents:
         return place_in_tree
 
     def _longest_s(self, minimum_s: float) -> float:
-        """Return the longest slice of this minimum run time that is not extended on request."""
+        """Return the longest slice with this minimum run time, without extensions on request."""
         return minimum_s + self._grid_s
 
     def _forget(self, arc: ArcEntry) -> None:
@@ -342,7 +342,7 @@ class ArcEvents:
             self.requested(successor)
 
     def _successor_idles(self, name: str, *, idle: bool) -> None:
-        """Apply an event also to the request that waits for the end of the old one of this name."""
+        """Apply an event also to the request that waits for the end of the ARC's old request."""
         if name in self._successors:
             self._change_successor(name, idle=idle)
 

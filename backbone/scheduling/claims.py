@@ -1,6 +1,6 @@
-"""From a claim to the scheduling request that an ARC sends to the RC manager for its owner.
+"""Converts a claim to the scheduling request that an ARC sends to the RC manager for its owner.
 
-Rule of this file: pure, so that a mission can be rehearsed with the very requests its ARCs will send.
+Rule of this file: pure, so that a rehearsal can use exactly the requests that the mission's ARCs will send.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def scheduling_request(
     """Return the request of an ARC.
 
     Args:
-        sets: The sets of RCs that would do, best first: role → name.
+        sets: The acceptable sets of RCs, best first: role → name.
         path: Names and priorities from the mission's root, or of the console alone.
         streams: The ARC's streams on each sharable RC.
         minimum_runtime_s: Shortest useful time, seconds.
@@ -36,7 +36,7 @@ def scheduling_request(
         sharable: Names of the RCs that it uses by streams; all others exclusively.
         console: True if the owner is a console.
         idle: True: no time is wanted yet.
-        stops_at_once: True: nothing must be brought to rest at the end of a slice.
+        stops_at_once: True: the owner needs no time to stop at the end of a slice.
     """
 
     def use(rc: str) -> RcUse:

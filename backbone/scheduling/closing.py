@@ -23,7 +23,7 @@ class Closing:
     """Closes decisions.
 
     Attributes:
-        wake_s: Mission time at which the caller was asked to wake the manager; None: it was not.
+        wake_s: Mission time at which the caller must wake the manager; None: no time.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Closing:
         """Add the last instructions of a decision.
 
         Args:
-            rang: True if the last alarm rang just now: it is set again also for the same time.
+            rang: True if the last alarm has just rung; it is then set again, even for the same time.
         """
         self._renew_slices()
         self._expect()

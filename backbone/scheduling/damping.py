@@ -1,16 +1,16 @@
 """Damping: an owner that repeatedly requests and withdraws cannot keep others from running.
 
-A higher request preempts others at once (rule 4). A request that cut a slice short and is withdrawn before its grant
-has cost the others their turn and gained nothing. After a few of these in a row the owner's next request counts only
-after a wait, which doubles with each.
+A higher request preempts others at once (rule 4). If such a request is withdrawn before its grant, it has cost the
+others their turn and gained nothing. After a few of these in a row, the owner's next request counts only after a wait,
+which doubles with each further one.
 
 Rule of this file: pure; time is an argument.
 """
 
 from __future__ import annotations
 
-FREE = 4  # chosen: so often may an operator have second thoughts
-MOST = 9  # chosen: from here on the wait is the longest
+FREE = 4  # chosen: an operator may change their mind so often
+MOST = 9  # chosen: from this number on the wait does not grow
 FORGIVEN_S = 2.0  # chosen: one withdrawal is forgotten after this time
 LONGEST_S = 30.0  # chosen: some slices of the preempted ARCs
 
@@ -26,7 +26,7 @@ class Damping:
         self._left[owner] = min(MOST, self._count(owner, now_s) + 1), now_s
 
     def wait_s(self, owner: str, now_s: float) -> float:
-        """Return how long the next request of this owner must wait before it counts, seconds; mostly 0.
+        """Return how long the next request of this owner must wait before it counts, seconds; 0 as a rule.
 
         Example:
             >>> damping = Damping()

@@ -24,11 +24,11 @@ CONNECTED = frozenset({RequestState.CONNECTING, RequestState.RUNNING})
 
 @dataclass(slots=True)
 class OpenDecision:
-    """The decision that is being made.
+    """The present decision.
 
     Attributes:
-        now_s: Its time; it never goes back from one to the next.
-        instructions: What the loop is to carry out, so far, in this order.
+        now_s: Its time; it never decreases from one decision to the next.
+        instructions: The instructions for the loop so far, in their order.
         ended: ARCs whose slices it ended for an equal, each with a sharable RC that both use.
     """
 
@@ -43,16 +43,16 @@ class RcEntry:
 
     Attributes:
         kind: Its type, for people.
-        capacity: Part of its time it can give, 0 to 1.
+        capacity: Part of its time that it can give, 0 to 1.
         connect_s: Settling time.
         disconnect_s: Release time.
         up: True if it answers.
         epoch: Largest epoch given so far, at the beginning of settling.
         granted_epoch: Largest epoch of a grant so far.
-        failed: True if it went down; False if it only was not started yet.
-        fault: Why it is put aside although it answers; empty: it is not.
+        failed: True if it went down; False if it was only not started yet.
+        fault: Why it is put aside although it answers; empty: it is not put aside.
         is_robot: True if it is a robot, for people.
-        holders: ARCs that hold it, settling or not yet free of it, in the order in which they got it.
+        holders: ARCs that hold it, settle for it, or are not yet free of it, in the order of their connections.
     """
 
     name: str
@@ -84,44 +84,44 @@ class ArcEntry:
     """One ARC in the master schedule.
 
     Attributes:
-        name: Of the ARC.
-        request: As last sent.
+        name: Name of the ARC.
+        request: Its request as last sent.
         uses: RC → its use; the chosen alternative.
         place_in_tree: Names from the root to its owner.
-        path: The same with the present numbers.
-        level: Its parent's path and its own number, the same object in all siblings of that number: they are equals.
+        path: The same names, each with its present number.
+        level: Its parent's path and its own number, one object for all siblings with that number, which are equals.
         minimum_s: Run time it needs to be served, counted from the grant.
         length_s: Time from the beginning of settling to the end of its minimum run time.
         maximum_s: End of all extensions, counted from the grant.
         settle_s: Longest settling time of its RCs.
         release_s: Longest release time of its RCs.
         touches: The RCs it uses, as a set of bits.
-        excludes: Those of them it uses exclusively.
+        excludes: The RCs that it uses exclusively, as a set of bits.
         shares: Names of those it uses by streams.
-        streams: Sharable RC → its streams there, as its present request has them in the trace.
-        measured: The same with the packet times that RCs measured, where those are longer.
-        stamp: When it became active or was last served, and which of several at that time it was.
+        streams: Sharable RC → its streams there, by its present request, as in the trace.
+        measured: Sharable RC → its streams with the measured packet times, if those are longer.
+        stamp: Time at which it became active or was last served, and its number among the stamps of that time.
         reservation: Set while RCs are being freed for it by force, or where equals reserve nothing from each other: it
             comes before all equals; smaller is earlier.
         state: State of its request.
         active: True: it wants time, or still holds RCs.
         holds: True: RCs are connected to it, settling for it, or not yet free of it.
         queued: True: it has a place in the order: it waits, or will wait as soon as its RCs are free.
-        since_s: When it entered that state.
-        began_s: When its RCs began to settle, while it holds them.
+        since_s: Time at which it entered its state.
+        began_s: Time at which its RCs began to settle, while it holds them.
         end_s: End of its slice, while it runs.
-        granted_s: When it was granted, while it runs.
-        slice_s: When its present slice began, while it runs: at the grant, or later where it stayed connected.
+        granted_s: Time of its grant, while it runs.
+        slice_s: Begin of its present slice, while it runs: the grant, or later if it stayed connected.
         epochs: RC → epoch, while it holds them.
         awaited: True: a check of it is scheduled, because an ARC waits for the end of its slice.
-        look_s: Time of that check: the end of its slice, or later where the discipline lets it run on.
-        afterwards: Its state once its RCs are free, while it is being revoked.
+        look_s: Time of that check: the end of its slice, or later if the discipline lets it run on.
+        afterwards: Its state when its RCs are free, while it is being revoked.
         has_forced: True: a holder was preempted in the middle of a slice for it, since it was queued or granted.
-        retry_s: When it is queued again, after its gate stayed shut or it left too often; None: when it wants time.
-        retry_why: Why not sooner.
+        retry_s: Time at which it is queued again, after its gate stayed shut or it left too often; None: when it wants.
+        retry_why: Reason for that wait.
         had_s: Run time so far, as the discipline ``time`` counts it; without the present run.
         raised: Levels by which it rose because it waited long (aging).
-        swapped_out: Why it lost its RCs last; empty: never.
+        swapped_out: Reason of its last loss of its RCs; empty: it never lost them.
         swapped_out_by: ARC or RC that caused this.
     """
 

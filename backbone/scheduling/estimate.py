@@ -17,7 +17,7 @@ from backbone.scheduling.table import Table
 
 
 def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot]:
-    """Return the places of these ARCs, given in order, if each RC serves one after the other.
+    """Return the places of these ARCs, given in order, if each RC serves one ARC after the other.
 
     Sharers of an RC are counted by their share of its time, not stream by stream.
     """
@@ -59,7 +59,7 @@ def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot
 
 
 def _standing(table: Table, arc: ArcEntry, now_s: float) -> list[Hold]:
-    """Return the holders that the ARC cannot run beside."""
+    """Return the holders beside which the ARC cannot run."""
     return [
         (holder, -math.inf, table.stands_until_s(holder, arc, now_s))
         for holder in table.holders(arc)

@@ -1,8 +1,8 @@
 """Events and instructions: the input and the output of the schedule manager.
 
 Rules of this file: plain frozen data; no bus, no clock. Times are mission seconds.
-An event reports a fact of the past; instructions are carried out in the order given, and their outcomes
-come back as events. Events are messages, because a recording has them: from the same events come the same decisions.
+An event reports a fact of the past. Instructions are carried out in the given order, and their outcomes are reported as
+events. Events are messages, because recordings contain them: the same events lead to the same decisions.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class RcKnown(Message, frozen=True):
 
 
 class RcWentDown(Message, frozen=True):
-    """The RC does not answer any more, or cannot be believed.
+    """The RC does not answer any more, or is not credible.
 
     Attributes:
         fault: Its contradiction; empty: it does not answer.
@@ -92,7 +92,7 @@ class Requested(Message, frozen=True):
 
 
 class Adopted(Message, frozen=True):
-    """A restarted RC manager found an ARC that holds its RCs under a standing lease, since it was connected to them."""
+    """A restarted RC manager found an ARC that still holds its RCs by leases. Event time: their connection."""
 
     request: SchedulingRequest
     epochs: Annotated[dict[Mention, Epoch], FEW]
@@ -106,7 +106,7 @@ class Wanted(Message, frozen=True):
 
 
 class Idled(Message, frozen=True):
-    """An ARC wants no time now but stays."""
+    """An ARC wants no time now but keeps its request."""
 
     arc: Mention
 
@@ -115,7 +115,7 @@ class Departed(Message, frozen=True):
     """An ARC withdrew or died.
 
     Attributes:
-        why: For the record: ``self``, ``owner``, ``dead``.
+        why: Reason, for the trace: ``self``, ``owner``, ``dead``.
     """
 
     arc: Mention
@@ -131,7 +131,7 @@ class RuntimeChanged(Message, frozen=True):
 
 
 class Extended(Message, frozen=True):
-    """A running ARC asked to go on until this time."""
+    """A running ARC asked to continue until this time."""
 
     arc: Mention
     until_s: Instant
@@ -145,7 +145,7 @@ class PriorityChanged(Message, frozen=True):
 
 
 class NodeMoved(Message, frozen=True):
-    """A node of the tree stands below another parent, with all below it."""
+    """A node of the tree, with its descendants, is now below another parent."""
 
     node: Mention
     parent: Mention
@@ -209,7 +209,7 @@ class ConnectArc:
     Attributes:
         epochs: RC → epoch; larger than all before.
         settle_s: Longest settling time of the set.
-        until_s: End of the minimum run time if the grant came right after settling.
+        until_s: End of the minimum run time if the grant comes right after settling.
         ranks: Sharable RC → place of this ARC among its holders by user priority, 0 first.
         uses: RC → how the ARC uses it, as it declared; exclusively for missing ones.
     """
@@ -230,7 +230,7 @@ class RevokeArc:
         epochs: RC → epoch it held.
         why: ``slice``, ``higher``, ``rc``, ``self``, ``owner``, ``dead``, ``capacity``, ``failed``, ``packets``.
         by: ARC or RC that caused it; empty for ``self``.
-        deadline_s: Seconds its decision process has to stop cleanly; 0: none.
+        deadline_s: Seconds that its decision process has to stop cleanly; 0: none.
         expected_s: Predicted next grant; negative: none.
     """
 
@@ -244,7 +244,7 @@ class RevokeArc:
 
 @dataclass(frozen=True, slots=True)
 class WakeAt:
-    """Report ``Woken`` at this time; replaces the last one. ``None``: no more."""
+    """Report ``Woken`` at this time; replaces the last ``WakeAt``. ``None``: do not report."""
 
     at_s: float | None
 
@@ -254,8 +254,8 @@ class Record:
     """Write this line to the trace, in this order.
 
     Attributes:
-        line: As SCHEDULING.md, section 5, has it.
-        cause: One line for people, of the rule that decided.
+        line: The line, in the format of SCHEDULING.md, section 5.
+        cause: One line for people, about the rule that decided.
     """
 
     line: Line

@@ -2,9 +2,9 @@
 
 * ``turns``: the ARC that waits longest since it became active or was last served comes first. Each gets its own minimum
   run time in turn.
-* ``time``: the ARC with the least run time comes first. Each needs one more minimum run time by a virtual deadline; of
-  the ARCs that did not have more than the average of their rivals, the earliest deadline comes first. An ARC with short
-  slices is served more often, not longer.
+* ``time``: the ARC with the least run time comes first. Each ARC has a virtual deadline for its next minimum run time.
+  Of the ARCs that had no more than the average of their rivals, the one with the earliest deadline comes first. An ARC
+  with short slices is served more often, not longer.
 
 Rule of this file: pure; the rivals and the time are arguments.
 
@@ -40,7 +40,7 @@ class Fairness(Protocol):
 
 
 class Turns:
-    """Each its own minimum run time in turn; no ARC has two turns in a row while equals wait."""
+    """Each ARC gets its own minimum run time in turn; no ARC has two turns in a row while equals wait."""
 
     discipline: Discipline = "turns"
 
@@ -56,7 +56,7 @@ class EqualTime:
     discipline: Discipline = "time"
 
     def __init__(self, rivals: Callable[[ArcEntry], list[ArcEntry]], tolerance_s: float) -> None:
-        """Count nothing yet.
+        """Begin without run times.
 
         Args:
             rivals: ARC → its equals that cannot run beside it.
@@ -66,7 +66,7 @@ class EqualTime:
         self._tolerance_s = tolerance_s
 
     def seniority(self, arc: ArcEntry, now_s: float) -> Seniority:
-        """Return whether it had more than its rivals, its deadline, and its stamp."""
+        """Return three values: whether it had more than its rivals, its deadline, and its stamp."""
         reserved = _of_reservation(arc)
         if reserved:
             return reserved
@@ -77,15 +77,15 @@ class EqualTime:
         return (late, deadline_s(had_s, arc.minimum_s), *arc.stamp)
 
     def joined(self, arc: ArcEntry, now_s: float) -> None:
-        """Give no credit for the time it was away."""
+        """Set the run time of an ARC that joins, without credit for the time it was away."""
         arc.had_s = joining_s(arc.had_s, self._others_had_s(arc, now_s))
 
     def stopped(self, arc: ArcEntry, now_s: float) -> None:
-        """Count the time since its grant."""
+        """Add the time since its grant to its run time."""
         arc.had_s = _had_s(arc, now_s)
 
     def runs_on(self, arc: ArcEntry, waiting: Iterable[ArcEntry], now_s: float) -> bool:
-        """Let it run on while it comes before all rivals that wait."""
+        """Return whether it still precedes all rivals that wait, so that it may run on."""
         own, rivals = self.seniority(arc, now_s), {*self._rivals(arc)}
         keys = [self.seniority(other, now_s) for other in waiting if other in rivals]
         return bool(keys) and all(own < key for key in keys)
@@ -98,9 +98,9 @@ def eligible(had_s: float, rivals_s: Iterable[float], tolerance_s: float = 0.0) 
     """Return whether an ARC with this run time may get more before its rivals.
 
     Args:
-        had_s: Time it had.
-        rivals_s: Times its rivals had.
-        tolerance_s: Inaccuracy of timers: an ARC that is ahead of the average by no more is not ahead.
+        had_s: Run time of the ARC.
+        rivals_s: Run times of its rivals.
+        tolerance_s: Inaccuracy of timers; an ARC is ahead only if it exceeds the average by more.
     """
     return had_s <= fmean([had_s, *rivals_s]) + max(ROUNDING_S, tolerance_s)
 

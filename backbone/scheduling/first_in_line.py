@@ -1,4 +1,4 @@
-"""First in line: which ARC each RC of a large group is reserved for, and from when on.
+"""First in line: the ARC for which each RC of a large group is reserved, and the begin of that reservation.
 
 Rule of this file: nothing changes. Source: decision 0011.
 """
@@ -21,7 +21,7 @@ class FirstInLine:
         """Begin with no known first ARC.
 
         Args:
-            slack_s: By how much two reservations may overlap.
+            slack_s: Longest overlap of two reservations.
         """
         self._table = table
         self._state = table.state
@@ -43,8 +43,8 @@ class FirstInLine:
 
         Args:
             arc: A waiting ARC.
-            holders: The others that hold an RC of it.
-            now_s: When it would start.
+            holders: The other ARCs that hold an RC of it.
+            now_s: Time of its start.
         """
         table, end_s = self._table, self._must_be_done_s(arc, now_s)
         self._reserved.clear()  # its reservations were computed for another candidate
@@ -63,15 +63,15 @@ class FirstInLine:
         )
 
     def _must_be_done_s(self, arc: ArcEntry, start_s: float) -> float:
-        """Return from when on others may need the RCs of an ARC that starts then: hand-overs may eat the slack."""
+        """Return when others may need the RCs of an ARC that starts then; hand-overs may use up the slack."""
         return start_s + arc.length_s - min(self._slack_s, arc.minimum_s / 2) - INSTANT_S
 
     def _reserved_s(self, arc: ArcEntry, now_s: float, behind: tuple[ArcEntry, ...]) -> float:
-        """Return from when its RCs are reserved for the ARC: when its holders end and other first ARCs have run.
+        """Return when the RCs are reserved for the ARC: after its holders' slices and the runs of other first ARCs.
 
         Args:
-            now_s: From when on.
-            behind: ARCs on the chain so far: they do not wait for themselves, though being equal is not transitive.
+            now_s: Earliest time.
+            behind: ARCs on the chain so far. They do not wait for themselves, although equality is not transitive.
         """
         known_s = self._reserved.get(arc)
         if known_s is not None:

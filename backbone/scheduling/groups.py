@@ -1,10 +1,10 @@
 """Groups: sets of ARCs that can affect each other.
 
-A group is a connected component of active ARCs that share any RC, sharable ones too: capacity
-couples them, and not pairwise (of three ARCs of 0.4 any two fit, three do not). Groups run in
-parallel and never change each other's times.
+A group is a connected component of active ARCs that share any RC. Sharable RCs count, too, because capacity couples
+their users, even if not in pairs: of three ARCs of 0.4 any two fit, but not all three. Groups run in parallel and never
+change each other's times.
 
-``groups`` computes them; ``Groups`` keeps them up to date while ARCs come and go.
+``groups`` computes them; ``Groups`` updates them while ARCs come and go.
 
 Source: RAM 2002, "ARCs that ask for independent sets of RCs are put into different groups".
 """
@@ -24,7 +24,7 @@ def groups(uses: Mapping[str, Collection[str]]) -> list[list[str]]:
     """Return the groups of these ARCs.
 
     Args:
-        uses: ARC → RCs it needs.
+        uses: ARC → RCs that it needs.
 
     Returns:
         Every ARC once; groups and their members in the order of ``uses``.
@@ -59,10 +59,10 @@ def groups(uses: Mapping[str, Collection[str]]) -> list[list[str]]:
 
 @dataclass(slots=True, eq=False)
 class Group(Generic[A]):
-    """ARCs that share RCs; a big group may have fallen apart for a while before ``Groups`` splits it.
+    """ARCs that share RCs; ``Groups`` splits a big group that has fallen apart only after a while.
 
     Attributes:
-        left: How many have left since the last check that the group is one.
+        left: Number of ARCs that left since the last check of its connectedness.
     """
 
     arcs: dict[A, None]
@@ -74,11 +74,11 @@ class Groups(Generic[A]):
 
     Attributes:
         of: Present ARC → its group.
-        users: RC → the ARCs that use it, in the order of their arrival; none where none ever did.
+        users: RC → the ARCs that use it, in the order of their arrival; empty if it was never used.
 
     Args:
-        exact_up_to: Groups of at most this size are always exactly one group; bigger ones may be
-            several taken together until an eighth of their ARCs have left.
+        exact_up_to: A group of at most this size is always connected. A bigger one may consist of several groups until
+            an eighth of its ARCs have left.
     """
 
     def __init__(self, exact_up_to: int) -> None:

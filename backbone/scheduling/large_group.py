@@ -1,6 +1,6 @@
 """Large group: in a group too large to be planned whole, each RC is reserved only for the first ARC in line.
 
-This is backfilling with a reservation for the first in line (see ``planner``), here at each RC: an ARC starts if its
+This is backfilling with a reservation for the first in line (see ``planner``), here at each RC. An ARC starts if its
 slice ends before the reserved starts, and may overtake ARCs further back. A decision examines the ARC's own RCs instead
 of the whole group.
 
@@ -22,7 +22,7 @@ from backbone.scheduling.table import Table
 
 
 class LargeGroupPlanner:
-    """Plans one ARC after the other, each beside the ARCs that want the same RCs."""
+    """Plans one ARC after the other, each beside the ARCs that use the same RCs."""
 
     is_exact = False
     reserves = False
@@ -31,7 +31,7 @@ class LargeGroupPlanner:
         """Begin with no candidates.
 
         Args:
-            slack_s: By how much two reservations may overlap.
+            slack_s: Longest overlap of two reservations.
         """
         self._table = table
         self._state = table.state
@@ -41,11 +41,11 @@ class LargeGroupPlanner:
         self._candidates: dict[ArcEntry, None] = {}
 
     def look_near(self, rc: str) -> None:
-        """Examine the ARCs that a change of this RC concerns in the next decision."""
+        """Examine, in the next decision, the ARCs that a change of this RC concerns."""
         self._near[rc] = None
 
     def due(self, now_s: float) -> Turn | None:
-        """Return a candidate whose time is now; the others are candidates no more."""
+        """Return a candidate whose time is now; after that the others are no longer candidates."""
         table = self._table
         self._examine()
         while self._candidates:
@@ -68,7 +68,7 @@ class LargeGroupPlanner:
         return None
 
     def _examine(self) -> None:
-        """Make the ARCs candidates again that changes since the last time concern.
+        """Make those ARCs candidates again that are concerned by changes since the last examination.
 
         These are the users of an RC, and ARCs that may wait for one of its users at another RC.
         """

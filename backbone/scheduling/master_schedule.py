@@ -24,8 +24,8 @@ class MasterSchedule:
     """The plans for one state.
 
     Attributes:
-        table: Questions about it.
-        whole: Plans groups whole; also hypothetical ones.
+        table: Questions about the state.
+        whole: The planner of whole groups, also of hypothetical ones.
         planned_whole_up_to: In groups of at most this size each queued ARC has a reserved start.
     """
 
@@ -42,9 +42,9 @@ class MasterSchedule:
 
         Args:
             strict: No ARC starts while a higher usable one of its group waits.
-            tolerance_s: By how much two reservations may overlap.
+            tolerance_s: Longest overlap of two reservations.
             exact_up_to: Groups of at most this size are planned whole.
-            planner: Plans all groups; None: the two planners of this package do.
+            planner: Plans all groups; None: the two planners of this package plan them.
         """
         self.state = state
         self.table = Table(state, strict=strict)
@@ -65,7 +65,7 @@ class MasterSchedule:
     def due(self, now_s: float) -> Turn | None:
         """Return an ARC whose time is now, and the holders to revoke for it; None if there is none.
 
-        Examines groups that changed since the last None; to be called again after the turn was carried out.
+        Examines groups that changed since the last None. Call it again after carrying out the turn.
         """
         self._look_where_it_changed()
         turn = self._small.due(now_s)

@@ -1,4 +1,4 @@
-"""A planner of one's own, named by its class path in the mission file."""
+"""Loads a planner that the mission file names by its class path."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ class PlannerType(Protocol):
     """The class of a planner."""
 
     def __call__(self, table: Table, *, slack_s: float) -> Planner:
-        """Return a planner that has planned nothing yet.
+        """Return a planner without plans.
 
         Args:
             table: Questions about the schedule.
-            slack_s: By how much two reservations may overlap.
+            slack_s: Longest overlap of two reservations.
         """
 
 
@@ -33,7 +33,7 @@ def load_planner(class_path: str) -> PlannerType | None:
     """Return the planner class at ``package.module:Class``; None for an empty path.
 
     Raises:
-        WrongPlanner: There is none, or it lacks a method of a planner.
+        WrongPlanner: The path does not lead to a class, or the class lacks a method of a planner.
     """
     if not class_path:
         return None

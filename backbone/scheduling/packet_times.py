@@ -1,10 +1,10 @@
-"""Packet times: the longest that RCs measured of each ARC's packets, where that is longer than the ARC declared.
+"""Packet times: the longest measured packet times of each ARC, if they are longer than declared.
 
 Rules of this file:
 
-* The longer one counts, of what was declared and what was measured. Nothing makes a measured time shorter again but
-  the end of the ARC.
-* A time that no packet can take, an ARC or a kind of packet that is not asked for: nothing changes.
+* The longer of the declared and the measured time counts. A measured time never decreases; it is forgotten when the
+  ARC ends.
+* A time that no packet can take, an unknown ARC, or a kind of packet that the ARC did not request changes nothing.
 
 Pure. Source: RAM 2002, assumption 3: the run time of a request may vary.
 """
@@ -23,11 +23,11 @@ class PacketTimes:
     """The measured times of all ARCs with a request."""
 
     def __init__(self) -> None:
-        """Begin with nothing measured."""
+        """Begin without measured times."""
         self._longest_s: dict[str, dict[tuple[str, str], float]] = {}
 
     def take(self, rc: str, arc: str, kind: str, packet_time_s: float) -> bool:
-        """Take in that a packet of this kind took so long; return whether none took longer until now.
+        """Record the duration of a packet of this kind; return whether it is the longest so far.
 
         A time that is not above 0, or longer than a day, changes nothing.
         """
@@ -38,7 +38,7 @@ class PacketTimes:
         return True
 
     def forget(self, arc: str) -> None:
-        """Forget what was measured of this ARC; one of the same name is another."""
+        """Forget the measured times of this ARC; a later ARC of the same name is another one."""
         self._longest_s.pop(arc, None)
 
     def counted(self, arc: str, declared: Mapping[str, RcUse]) -> dict[str, RcUse]:

@@ -1,8 +1,8 @@
 """Plan: the earliest start of each queued ARC of a group, one after the other in their order (rule 3).
 
-Each gets the earliest start at which its whole settling and minimum run time fit, given the holders of its RCs and the
-reservations of the ARCs before it. Places are found on demand: a question about the first in order does not pay for the
-last.
+Each ARC gets the earliest start at which its whole settling and minimum run time fit, given the holders of its RCs and
+the reservations of the ARCs before it. Places are computed on demand, so a question about the first ARC costs no plan
+of the last.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _Reservation = tuple[float, int, float, ArcEntry]
 
 
 class GroupPlans:
-    """The plans of a decision about one group, each made when it is first needed.
+    """The plans of one decision about one group, each made when it is first needed.
 
     Attributes:
         order: Its queued ARCs, in order.
@@ -51,12 +51,12 @@ class GroupPlans:
     def due(self, queued: Sequence[ArcEntry], possible: Collection[ArcEntry]) -> Turn | None:
         """Return the ARC whose time is now, and the holders to revoke for it; None if there is none.
 
-        A slice is ended only for an ARC that fits without tolerance, for any end of the hand-overs under way: else
-        it might be ended for a gap that closes meanwhile.
+        A slice is ended only for an ARC that fits without tolerance, whenever the present hand-overs end. Otherwise the
+        slice might be ended for a gap that closes meanwhile.
 
         Args:
-            queued: The first of the order, or all.
-            possible: ARCs that no single holder keeps from a start now.
+            queued: The first ARCs of the order, or all.
+            possible: ARCs that no single holder prevents from starting now.
         """
         table, now = self._table, self.now
         if not any(now.starts_now(arc) for arc in queued if arc in possible):
@@ -86,7 +86,7 @@ class GroupPlans:
 
 
 class Plan:
-    """The places of the queued ARCs of one group, as long as nothing changes."""
+    """The places of the queued ARCs of one group; valid while nothing changes."""
 
     def __init__(
         self,
@@ -104,10 +104,10 @@ class Plan:
         Args:
             order: Queued ARCs of the group, in order.
             group: Active ARCs.
-            now_s: From when on.
-            slack_s: By how much an ARC may overlap those before it, but not by more than half its slice.
-            handed_over: Plan as if all RCs that are being freed were free already.
-            among_equals: False: a later start binds lower ARCs only, and equals if it belongs to a reservation.
+            now_s: Earliest time.
+            slack_s: Longest overlap of an ARC with those before it, but at most half its slice.
+            handed_over: True: plan as if all RCs that are being freed were free already.
+            among_equals: False: a later start binds only lower ARCs; it binds equals, too, if it has a reservation.
         """
         self._table = table
         self._order = order
@@ -121,7 +121,7 @@ class Plan:
         self._reserved: list[_Reservation] = []
 
     def start_s(self, arc: ArcEntry) -> float:
-        """Return when an ARC of the order can start; infinite: never, as things are."""
+        """Return when an ARC of the order can start; infinite: never in the present state."""
         while arc not in self._starts_s:
             self._find_next()
         return self._starts_s[arc]
@@ -147,7 +147,7 @@ class Plan:
     def _earliest_s(self, arc: ArcEntry, place: int) -> float:
         """Return the first time from which the ARC fits for its whole length; infinite if there is none.
 
-        A higher ARC stays once it runs: an ARC that overlaps its slot never starts.
+        A higher ARC may stay after its slot. Therefore an ARC that overlaps the slot of a higher one never starts.
         """
         now_s, table = self._now_s, self._table
         if not table.usable(arc):
@@ -185,7 +185,7 @@ class Plan:
         return rank(other.path, arc.path) != 0
 
     def _against(self, arc: ArcEntry, place: int) -> list[Hold]:
-        """Return the ARCs at a common RC that keep the ARC from an earlier start, as of the search for its place."""
+        """Return the ARCs at a common RC that prevent an earlier start, by the state of the search for its place."""
         touches, soon_s = arc.touches, self._now_s + INSTANT_S
         against: list[Hold] = []
         for holder in self._holders:

@@ -1,10 +1,10 @@
-"""Planner: finds the ARC whose turn it is in a group, and the start times of the others (rule 3).
+"""Planner: finds the ARC of a group whose turn it is, and the start times of the others (rule 3).
 
-A planner reads the schedule and changes nothing. There are two: one plans a group whole, the other examines each RC's
-first in line; a mission file can name another class (``own_planner``). Both backfill with reservations: *conservative*
-backfilling reserves a start for every job that waits, the EASY kind for the first in line only (Mu'alem and Feitelson,
-"Utilization, predictability, workloads, and user runtime estimates in scheduling the IBM SP2 with backfilling", IEEE
-TPDS 12, 2001).
+A planner reads the schedule and changes nothing. There are two: one plans a group whole, the other examines the first
+ARC in line at each RC. A mission file can name another class (``own_planner``). Both backfill with reservations:
+*conservative* backfilling reserves a start for every job that waits, the EASY kind for the first in line only (Mu'alem
+and Feitelson, "Utilization, predictability, workloads, and user runtime estimates in scheduling the IBM SP2 with
+backfilling", IEEE TPDS 12, 2001).
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from typing import NamedTuple, Protocol
 from backbone.scheduling.entries import ArcEntry
 
 Hold = tuple[ArcEntry, float, float]
-"""An obstacle to another ARC: the ARC, the begin (minus infinity: it holds its RCs) and end of its time."""
+"""An obstacle to another ARC: the ARC, the begin of its time (minus infinity: it holds its RCs) and the end."""
 
 
 class Slot(NamedTuple):
-    """The place the plan found for an ARC.
+    """The planned place of an ARC.
 
     Attributes:
-        start_s: When its RCs begin to settle; infinite: never, as things are.
-        against: ARCs at a common RC that keep it from an earlier start.
+        start_s: Time at which its RCs begin to settle; infinite: never in the present state.
+        against: ARCs at a common RC that prevent an earlier start.
     """
 
     arc: ArcEntry
@@ -37,14 +37,14 @@ class Slot(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """An ARC whose time has come, and the holders to revoke first (none: it connects)."""
+    """An ARC whose time has come, and the holders to revoke first; without holders, it connects."""
 
     arc: ArcEntry
     in_the_way: Sequence[ArcEntry]
 
 
 def in_order_of_revocation(turn: Turn) -> list[ArcEntry]:
-    """Return the holders to revoke; ended slices before preempted ones.
+    """Return the holders to revoke, ended slices before preempted ones.
 
     A preemption must not look like the reason for the end of another slice.
     """
@@ -69,16 +69,16 @@ class Planner(Protocol):
         """Whether a later start binds equals, too."""
 
     def look_near(self, rc: str) -> None:
-        """Examine the ARCs that a change of this RC concerns in the next decision."""
+        """Examine, in the next decision, the ARCs that a change of this RC concerns."""
 
     def due(self, now_s: float) -> Turn | None:
         """Return an ARC whose time is now and the holders to revoke for it; None if it finds none.
 
-        To be called again after the turn was carried out, until there is none.
+        The caller calls it again after carrying out the turn, until it returns None.
         """
 
     def forgotten(self, group: Sequence[ArcEntry], now_s: float) -> ArcEntry | None:
-        """Return an ARC of the group whose time is now, also without a change; for checks."""
+        """Return an ARC of the group whose time is now, even if nothing has changed; for checks."""
 
     def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
         """Return the place of every queued ARC of the group, in order."""
@@ -93,4 +93,4 @@ class Planner(Protocol):
         """Return the queued ARCs that come before a queued one, in order."""
 
     def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return the ARCs whose reserved starts the ARC waits for, where only the first in line has one."""
+        """Return the ARCs whose reserved starts the ARC waits for, if only the first in line at an RC has one."""

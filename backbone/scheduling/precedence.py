@@ -1,4 +1,4 @@
-"""Precedence: every order of ARCs, the smallest key first but none before one that is higher (rule 2).
+"""Precedence: sorts ARCs by key, but no ARC before one that is higher (rule 2).
 
 Source: RAM 2002, "behavior manager".
 """
@@ -15,26 +15,26 @@ T = TypeVar("T")
 
 
 def by_precedence(items: Sequence[T], path: Callable[[T], Path], key: Callable[[T], Any]) -> list[T]:
-    """Return the items in order: each is the one of the smallest key among those without a higher remaining item.
+    """Return the items in order: each has the smallest key among those without a higher remaining item.
 
-    Sorting by (level, key) would be shorter and wrong: equality is not transitive, there are no levels.
-    Each branch of the tree has an order of its own; equal siblings' orders are merged by their first items.
+    Sorting by (level, key) would be shorter and wrong, because equality is not transitive and levels do not exist.
+    Each branch of the tree has an order of its own; the orders of equal siblings are merged by their first items.
 
     Args:
-        items: In any order.
-        path: Of an item; a node has the same number in all of them.
-        key: Of an item; of two with the same key the one that is first in ``items`` comes first.
+        items: The items, in any order.
+        path: Returns the path of an item; a node has the same number in all paths.
+        key: Returns the key of an item; of two items with equal keys the first in ``items`` comes first.
     """
     keyed = sorted((key(item), place, path(item)) for place, item in enumerate(items))
     return [items[place] for _, place, _ in _in_order(keyed, 0)]
 
 
 _Keyed = tuple[Any, int, Path]
-"""Key of an item, its place among those given (no two are the same), and its path."""
+"""Key of an item, its place among the given items (unique), and its path."""
 
 
 def _in_order(keyed: list[_Keyed], depth: int) -> list[_Keyed]:
-    """Return items of one branch, ``depth`` nodes below the root, in order; they are given sorted."""
+    """Return items of one branch, ``depth`` nodes below the root, in order; ``keyed`` is sorted."""
     ordered: list[_Keyed] = []
     by_number: dict[int, list[_Keyed]] = {}
     for one in keyed:

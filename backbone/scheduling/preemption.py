@@ -1,9 +1,9 @@
-"""Preemption: the holders that an ARC, or an RC that can give less, displaces (rules 4, 5 and 11).
+"""Preemption: the holders that must yield to an ARC, or because an RC can give less (rules 4, 5 and 11).
 
 Rules of this file (numbers as in docs and ``why``); nothing changes:
 
-* 4  Lower holders, and served equal ones, are displaced for the ARC whose time has come: no more than necessary.
-* 5  Of equals whose slices are over the one that was granted first goes first.
+* 4  Lower holders, and served equal ones, are displaced for the ARC whose time has come, but no more than necessary.
+* 5  Of equals whose slices are over, the one that was granted first is revoked first.
 * 8  Under ``strict`` no ARC starts while a higher usable one of its group waits.
 """
 
@@ -22,7 +22,7 @@ _PATH = attrgetter("path")
 
 
 def must_let_higher_go_first(table: Table, arc: ArcEntry) -> bool:
-    """Return whether the policy ``strict`` holds the ARC back: a higher usable one of its group waits."""
+    """Return whether the policy ``strict`` holds the ARC back because a higher usable ARC of its group waits."""
     return table.strict and any(
         other.state is RequestState.WAITING and other.goes_before(arc) and table.usable(other)
         for other in table.state.groups.of[arc].arcs
@@ -34,11 +34,12 @@ def in_the_way(
 ) -> list[ArcEntry]:
     """Return the holders to revoke so that the ARC can start, no more than necessary.
 
-    Lower ones go first, the last in order first; then equals whose slices are over, the one granted first first
-    (rule 5): so each of several equals on a sharable RC stays for the same number of slices.
+    Lower ones are revoked first, the last in order before the others; then equals whose slices are over, the one
+    granted first before the others (rule 5). So each of several equals on a sharable RC stays for the same number of
+    slices.
 
-    ARCs that only wait for RCs that are being freed (``pending``) count as started: else they would get the
-    room made here a moment later, and both would displace each other again and again.
+    ARCs that only wait for RCs that are being freed (``pending``) count as started. Otherwise they would get this room
+    a moment later, and both would displace each other again and again.
     """
     holders = [holder for holder in group if holder.state in CONNECTED and holder.touches & arc.touches]
     movable = [holder for holder in holders if table.stands_until_s(holder, arc, now_s) <= now_s + INSTANT_S]
@@ -54,14 +55,14 @@ def left_over(
     movable: Sequence[ArcEntry],
     served: Sequence[ArcEntry] = (),
 ) -> list[ArcEntry]:
-    """Return the holders that do not fit beside the ARC and the staying ones; last in order first.
+    """Return the holders that do not fit beside the ARC and the staying ones, the last in order first.
 
     Args:
         table: Questions about the schedule.
         arc: The ARC that starts.
         staying: Holders that stay.
-        movable: The others; the first in order stay if they fit.
-        served: Equals whose slices are over; they stay before those if they fit, the one granted last first.
+        movable: The other holders; the first in order stay if they fit.
+        served: Equals whose slices are over; they stay before ``movable`` ones if they fit, the latest grant first.
     """
     kept, left = list(staying), []
     latest = by_precedence(served, _PATH, lambda holder: (-holder.granted_s, -holder.stamp[0], -holder.stamp[1]))
@@ -74,7 +75,7 @@ def left_over(
 
 
 def overloading(table: Table, rc: str) -> list[ArcEntry]:
-    """Return the holders the RC cannot serve beside those before them in order, last first."""
+    """Return the holders that the RC cannot serve beside those before them in order, the last first."""
     holders = [h for h in table.state.arcs.values() if h.state in CONNECTED and rc in h.uses]
     kept: list[ArcEntry] = []
     left: list[ArcEntry] = []
@@ -84,12 +85,12 @@ def overloading(table: Table, rc: str) -> list[ArcEntry]:
 
 
 def understating(table: Table, rc: str, joining: Sequence[ArcEntry] = ()) -> list[ArcEntry]:
-    """Return the connected ARCs that must ask anew, so that the RC serves the rest by measured packet times.
+    """Return the connected ARCs that must request again, so that the RC serves the rest by measured packet times.
 
-    Only ARCs whose packets take longer than their requests say, the last in order first, no more than necessary.
+    Only ARCs whose packets take longer than their requests state, the last in order first, no more than necessary.
 
     Args:
-        joining: An ARC that is about to be connected, too.
+        joining: An ARC that is about to be connected; empty: none.
     """
     kept = [holder for holder in table.state.rcs[rc].holders if holder.state in CONNECTED] + [*joining]
     asked: list[ArcEntry] = []

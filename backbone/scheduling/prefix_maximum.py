@@ -1,6 +1,6 @@
-"""Prefix maximum: the largest value among the paths that are higher than a path, without comparing each with each.
+"""Prefix maximum: the largest value among the paths that are higher than a path, without comparing all pairs.
 
-Two paths part at siblings, so for every node it is enough to know its children's numbers.
+Two paths part at siblings, so it suffices to know the numbers of each node's children.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import math
 
 from backbone.scheduling.priority import Path
 
-OWN = math.inf  # a node's own request counts as a child of the largest number: it is above all its children
+OWN = math.inf  # a node's own request counts as a child with the largest number, because it is above all children
 
 
 class PrefixMaximum:
@@ -19,7 +19,7 @@ class PrefixMaximum:
         self._largest: dict[tuple[str, ...], dict[float, float]] = {}
 
     def add(self, path: Path, value: float) -> None:
-        """Take in a path with a value.
+        """Add a path with a value.
 
         Example:
             >>> above = PrefixMaximum()
@@ -34,7 +34,7 @@ class PrefixMaximum:
             names = (*names, name)
 
     def largest(self, path: Path) -> float:
-        """Return the largest value of those higher than the path; minus infinity if there is none."""
+        """Return the largest value among the paths higher than this one; minus infinity if there is none."""
         found = -math.inf
         names: tuple[str, ...] = ()
         for name, number in path:

@@ -1,7 +1,7 @@
-"""Order of priorities: numbers count among siblings of the behavior tree only.
+"""Order of priorities: numbers are compared only among siblings of the behavior tree.
 
-``higher`` is a partial order. Two ARCs neither of which is higher are *equals*, but being equal is
-not transitive, so there is no list of levels; ``precedence`` makes every order.
+``higher`` is a partial order. Two ARCs of which neither is higher are *equals*. Being equal is not transitive, so there
+is no list of levels; ``precedence`` sorts ARCs.
 
 Source: IROS 2001 and RAM 2002, "behavior manager": priorities are compared among siblings; for
 distant nodes walk up to the nearest ancestors with a common parent. Consoles are siblings of the
@@ -14,9 +14,9 @@ Path = tuple[tuple[str, int], ...]
 """Nodes from the root to the owner, each with its number among its siblings."""
 
 Level = tuple[Path, int]
-"""Path of a parent, and the number its children of this level have: they are equals."""
+"""Path of a parent, and a number of its children; the children with this number are equals."""
 
-CONSOLE = "console "  # a legal node name holds no space: a console is never mistaken for a node of the tree
+CONSOLE = "console "  # a legal node name has no space, so a console is never mistaken for a node of the tree
 
 
 def higher(a: Path, b: Path) -> bool:

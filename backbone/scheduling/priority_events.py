@@ -49,7 +49,7 @@ class PriorityEvents:
         self._change(moved=lambda place: carried(place, old, new))
 
     def age(self) -> None:
-        """Raise ARCs that wait long, if the rules say so; they keep their level until they are served or idle."""
+        """Raise ARCs that wait long, if the rules demand aging; they keep their level until they are served or idle."""
         for arc in self._state.arcs.values():
             if arc.state is RequestState.WAITING:
                 self._state.raise_to(arc, int((self._decision.now_s - arc.since_s) / self._aging_s + ROUNDING))
@@ -59,12 +59,12 @@ class PriorityEvents:
             self._change()
 
     def next_aging_s(self) -> float | None:
-        """Return when the next ARC rises; None if none does."""
+        """Return when the next ARC rises; None if no ARC will."""
         waiting = [arc for arc in self._state.arcs.values() if arc.state is RequestState.WAITING]
         return min((arc.since_s + (arc.raised + 1) * self._aging_s for arc in waiting), default=None)
 
     def _change(self, change: Callable[[], None] | None = None, moved: Callable[[Place], Place] | None = None) -> None:
-        """Change the tree, and count its numbers, and the places where ARCs moved to, from now on."""
+        """Change the tree, move ARCs, and apply the numbers of the tree from now on."""
         if change is not None:
             change()
         places = [(arc, moved(arc.place_in_tree) if moved else arc.place_in_tree) for arc in self._state.arcs.values()]
@@ -77,6 +77,6 @@ class PriorityEvents:
         self._decision.instructions.append(RenewLeases())
 
     def renumber(self) -> None:
-        """Give all ARCs the present numbers of their nodes."""
+        """Set the present numbers of their nodes in all ARCs."""
         arcs = self._state.arcs.values()
         self._state.set_paths([(arc, arc.place_in_tree, self._tree.path(arc.place_in_tree)) for arc in arcs])

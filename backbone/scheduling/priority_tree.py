@@ -14,9 +14,9 @@ from backbone.scheduling.requests import PathNode
 class PriorityTree:
     """The places and numbers of all nodes and consoles that ever sent a request.
 
-    A number or a place set by an operator stays until the operator sets another; a request's own
-    numbers and places count for all other nodes. A request goes on naming the path its owner was
-    started with: the moves since then lead from that path to the present one.
+    A number or place that an operator set stays until the operator sets another. All other nodes have the numbers and
+    places of the newest request. A request always names the path with which its owner was started; later moves lead
+    from that path to the present one.
     """
 
     def __init__(self, mission: str, priority: int) -> None:
@@ -31,7 +31,7 @@ class PriorityTree:
         """Add the nodes on this path.
 
         Returns:
-            Their names, root first, and whether a node known before has another number now.
+            Their names, root first, and whether a node that was known before has a new number.
         """
         way = list(nodes)
         if console:
@@ -49,7 +49,7 @@ class PriorityTree:
         return names, renumbered
 
     def path(self, names: tuple[str, ...]) -> Path:
-        """Return the path with its present numbers; the common part of two paths consists of the same objects."""
+        """Return the path with its present numbers; paths with a common part share its objects."""
         numbered = [
             (name, self._numbers[way] + self._raised.get(way, 0))
             for name, way in ((name, names[: depth + 1]) for depth, name in enumerate(names))
@@ -57,19 +57,19 @@ class PriorityTree:
         return tuple(self._shared.setdefault(node, node) for node in numbered)
 
     def nodes(self, names: tuple[str, ...]) -> list[PathNode]:
-        """Return the path of a request, with its numbers as they were set, without aging."""
+        """Return the path of a request with its numbers as set, without aging."""
         return [
             PathNode(name.removeprefix(CONSOLE), self._numbers[names[: depth + 1]]) for depth, name in enumerate(names)
         ]
 
     def age(self, levels: Iterable[tuple[tuple[str, ...], int]]) -> bool:
-        """Raise nodes whose ARCs wait long by some levels, and no other ones; return whether that changed any.
+        """Raise nodes whose ARCs wait long by some levels, and no others; return whether that changed any node.
 
-        A node rises with all its ancestors, or it would rise among its siblings only. The mission's own node
-        does not rise: a long wait never outranks a console. Consoles do not rise either.
+        A node rises together with all its ancestors, because otherwise it would rise only among its siblings. The
+        mission's own node does not rise, so a long wait never outranks a console. Consoles do not rise either.
 
         Args:
-            levels: Paths of the nodes, with the levels by which they rise; for one node the largest counts.
+            levels: Paths of the nodes, with the levels by which they rise; the largest level of a node counts.
         """
         raised: dict[tuple[str, ...], int] = {}
         for names, by in levels:
@@ -107,15 +107,15 @@ class PriorityTree:
         return ""
 
     def move(self, node: str, parent: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Move the node of this name, with all below it, below the other one.
+        """Move the node of this name, with its descendants, below the other one.
 
-        Its number stays: it counts among its new siblings from now on.
+        Its number stays, and counts among its new siblings from now on.
 
         Returns:
             Its old path and its new path.
 
         Raises:
-            ValueError: There is an ``obstacle``.
+            ValueError: ``obstacle`` returns a reason.
         """
         obstacle = self.obstacle(node, parent)
         if obstacle:

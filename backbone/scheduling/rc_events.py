@@ -22,7 +22,7 @@ class RcEvents:
         self._table = schedule.table
 
     def known(self, event: RcKnown) -> None:
-        """Add an RC, or take in the state of a known one."""
+        """Add an RC, or apply the new state of a known one."""
         if event.rc not in self._state.rcs:
             rc = self._state.add_rc(event)
             if rc.up:
@@ -46,7 +46,7 @@ class RcEvents:
                 self._transitions.revoke(arc, "rc", name)
 
     def removed(self, name: str) -> None:
-        """Remove an RC that is down and that no request names; others stay."""
+        """Remove an RC if it is down and no request names it; otherwise it stays."""
         rc = self._state.rcs.get(name)
         if rc is not None and not rc.up:
             self._state.remove_rc(rc)
@@ -58,7 +58,7 @@ class RcEvents:
         if rc is None:
             return
         if rc.up and any(arc.state in CONNECTED and name in arc.uses for arc in self._state.arcs.values()):
-            self.went_down(name)  # it was away for a moment and forgot its holders
+            self.went_down(name)  # it was away for a moment and lost its holders
         if not self._state.rc_up(rc, last_epoch):
             return
         if self._trace.has_introduced(name):

@@ -1,7 +1,7 @@
-"""Rehearsal: plays the components around a schedule manager, to show a schedule before the mission starts.
+"""Rehearsal: simulates the components around a schedule manager, to show a schedule before the mission starts.
 
-RCs settle and disconnect in the times they declare, decision processes stop after a given pause, timers
-fire when they are due. No bus, no clock: time jumps from one event to the next.
+RCs settle and disconnect in their declared times, decision processes stop after a given pause, timers fire when they
+are due. No bus, no clock: time jumps from one event to the next.
 
 Rules of this file:
 
@@ -41,7 +41,7 @@ class Decides(Protocol):
     """The rehearsed object: a schedule manager, or a wrapper of one."""
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
-        """Take in an event and return the instructions."""
+        """Apply an event and return the instructions."""
 
 
 def at_once(deadline_s: float) -> float:
@@ -51,7 +51,7 @@ def at_once(deadline_s: float) -> float:
 
 
 class Rehearsal:
-    """Plays time, RCs and decision processes for one schedule manager.
+    """Simulates time, RCs and decision processes for one schedule manager.
 
     Attributes:
         now_s: Mission time of the last event.
@@ -72,7 +72,7 @@ class Rehearsal:
         Args:
             manager: The schedule manager.
             opening_lines: Records with which the trace begins.
-            pause_s: Deadline in seconds → seconds a decision process takes to stop.
+            pause_s: Deadline in seconds → seconds that a decision process takes to stop.
         """
         self.now_s = 0.0
         self.trace: list[Line] = [record.line for record in opening_lines]
@@ -97,14 +97,14 @@ class Rehearsal:
         wake_s: float | None,
         pause_s: Callable[[float], float],
     ) -> Rehearsal:
-        """Go on from a present schedule.
+        """Continue from a present schedule.
 
         Args:
-            manager: A copy of the schedule manager for this rehearsal alone.
-            under_way: Outcomes of the context switches that have begun, with their times.
+            manager: A copy of the schedule manager, used only by this rehearsal.
+            under_way: Outcomes of the running context switches, with their times.
             release_s: RC → its release time.
-            wake_s: When the manager asked to be woken.
-            pause_s: Deadline in seconds → seconds a decision process takes to stop.
+            wake_s: Time at which the manager must be woken.
+            pause_s: Deadline in seconds → seconds that a decision process takes to stop.
         """
         rehearsal = cls(manager, pause_s=pause_s)
         rehearsal.now_s, rehearsal._wake_s = now_s, wake_s
@@ -123,7 +123,7 @@ class Rehearsal:
         """Apply the event now.
 
         Raises:
-            AssertionError: Time stands still: the manager connects one ARC ``MOST_AT_ONCE`` times at one instant.
+            AssertionError: Time does not advance: the manager connects an ARC ``MOST_AT_ONCE`` times at one instant.
         """
         if isinstance(event, RcKnown):
             self._release_s[event.rc] = event.disconnect_s
@@ -149,13 +149,13 @@ class Rehearsal:
                     assert_never(instruction)
 
     def run(self, until_s: float) -> None:
-        """Let time pass; all events due by the last instant have happened afterwards."""
+        """Let time pass; afterwards all events due until then have been applied."""
         while self.step(until_s):
             pass
         self.now_s = max(self.now_s, until_s)
 
     def step(self, until_s: float) -> bool:
-        """Apply the next event if it is due by then; return whether one was."""
+        """Apply the next event if it is due by ``until_s``; return whether one was."""
         next_s = self._next_s()
         if next_s is None or next_s > until_s:
             return False
@@ -169,7 +169,7 @@ class Rehearsal:
         event = heapq.heappop(self._agenda)[2]
         if not isinstance(event, Opened):
             self.tell(event)
-        elif self._opening.get(event.arc) is event:  # else its connection was broken off
+        elif self._opening.get(event.arc) is event:  # else its connection was aborted
             del self._opening[event.arc]
             self.tell(event)
         return True
@@ -189,16 +189,16 @@ class Rehearsal:
 
 @dataclass(slots=True)
 class Run:
-    """One time an ARC had its RCs.
+    """A time for which an ARC had its RCs.
 
     Attributes:
         uses: RC → share of its time, 0 to 1; an exclusive use is 1.
-        connect_s: When its RCs began to settle.
-        grant_s: When it was granted; None: that never happened.
-        revoke_s: When it was revoked; the end of the trace if it was not.
-        free_s: When its RCs were free again; the end of the trace if they were not.
-        why: Why it was revoked; empty: it was not.
-        by: ARC or RC that caused this.
+        connect_s: Time at which its RCs began to settle.
+        grant_s: Time of its grant; None: it was not granted.
+        revoke_s: Time of its revocation; else the end of the trace.
+        free_s: Time at which its RCs were free again; else the end of the trace.
+        why: Reason of the revocation; empty: it was not revoked.
+        by: ARC or RC that caused the revocation.
     """
 
     arc: str
@@ -220,7 +220,7 @@ class Timetable:
     """Runs and waits of a trace, up to a time.
 
     Attributes:
-        end_s: The last moment that counts.
+        end_s: Last moment of the timetable.
         runs: All runs in the order of their beginnings.
         asked_s: ARC → time of its first request.
     """
@@ -244,7 +244,7 @@ class Timetable:
         return [run for run in self.runs if run.arc == arc]
 
     def worst_wait_s(self, arc: str) -> float:
-        """Return the longest wait of this ARC; a wait that goes on counts."""
+        """Return the longest wait of this ARC, including a wait that has not ended."""
         since_s = self._waiting_since_s.get(arc)
         return max(self._worst_wait_s.get(arc, 0.0), 0.0 if since_s is None else self.end_s - since_s)
 
@@ -253,7 +253,7 @@ class Timetable:
         return arc in self._waiting_since_s
 
     def utilization(self) -> dict[str, float]:
-        """Return for each RC the share of the time, 0 to 1, that ARCs could use it; a sharable RC by streams."""
+        """Return, for each RC, the share of the time, 0 to 1, in which ARCs could use it; a sharable RC by streams."""
         used_s = defaultdict(float, dict.fromkeys(self._rcs, 0.0))
         for run in self.runs:
             for rc, share in run.uses.items():
@@ -261,7 +261,7 @@ class Timetable:
         return {rc: seconds / self.end_s if self.end_s > 0 else 0.0 for rc, seconds in used_s.items()}
 
     def mean_parallel(self, since_s: float = 0.0) -> float:
-        """Return how many ARCs ran at once, averaged over the time from ``since_s`` on."""
+        """Return the average number of ARCs that ran at once, over the time from ``since_s`` on."""
         granted_s = sum(
             max(0.0, run.revoke_s - max(run.grant_s, since_s)) for run in self.runs if run.grant_s is not None
         )

@@ -25,18 +25,18 @@ from backbone.ranges import (
 )
 from backbone.wire import Message
 
-LEASE_S = 2.0  # chosen: outlives a restart of the hub or RC manager (under 1 s), ends an orphan's hold soon
+LEASE_S = 2.0  # chosen: longer than a restart of hub or RC manager (under 1 s), but an orphan's hold ends soon
 
 
 class Usage(Message, frozen=True):
-    """One periodic stream on a sharable RC (RAM 2002, "Sharable Resources": usage parameter).
+    """A periodic stream on a sharable RC (RAM 2002, "Sharable Resources": usage parameter).
 
     Attributes:
         period_s: Constant interval between requests.
-        packet_time_s: Time one request takes.
-        deadline_s: It must be done this long after its release; 0: the period.
-        jitter_s: Its release may be late by this much.
-        kind: What the requests are, for people (``drive``).
+        packet_time_s: Duration of one request.
+        deadline_s: Time from its release to its deadline; 0: the period.
+        jitter_s: Largest delay of its release.
+        kind: Kind of the requests, for people (``drive``).
     """
 
     period_s: Period
@@ -50,8 +50,8 @@ class MeasuredPackets(Message, frozen=True):
     """Packets that take longer on the air than their ARC declared.
 
     Attributes:
-        kind: Of their stream, as the request names it.
-        packet_time_s: The longest time of one of them until now, above 0, seconds.
+        kind: Kind of their stream, as in the request.
+        packet_time_s: Longest measured time of such a packet, above 0, seconds.
     """
 
     arc: Mention
@@ -60,7 +60,7 @@ class MeasuredPackets(Message, frozen=True):
 
 
 class RcUse(Message, frozen=True):
-    """How an ARC uses one RC: exclusively, or by streams on a sharable one.
+    """An ARC's use of one RC: exclusive, or by streams on a sharable one.
 
     Attributes:
         streams: Its streams; none means exclusive.
@@ -70,7 +70,7 @@ class RcUse(Message, frozen=True):
 
 
 class PathNode(Message, frozen=True):
-    """One node on the way from the root to a decision process."""
+    """A node on the path from the root to a decision process."""
 
     name: Name
     priority: Priority
@@ -80,12 +80,12 @@ class SchedulingRequest(Message, frozen=True):
     """An ARC's request for run time (RAM 2002, "The RC Scheduler").
 
     Attributes:
-        path: From the mission's root (or the console itself) to the decision process.
+        path: Nodes from the mission's root (or the console itself) to the decision process.
         console: True if the owner is a console: its path is a sibling of the mission's root.
-        alternatives: Sets of RCs that would do, best first: RC name → use.
+        alternatives: Acceptable sets of RCs, best first: RC name → use.
         minimum_runtime_s: Shortest useful time, above 0.
         maximum_runtime_s: End of all extensions, at least the minimum; 0: the minimum.
-        idle: True: it exists but wants no time now.
+        idle: True: the request exists, but wants no time now.
         stops_at_once: True: the decision process commands nothing that must be brought to rest, so the end of
             its slice need not wait for it.
     """
@@ -143,11 +143,11 @@ class Holder(Message, frozen=True):
 
 
 class Lease(Message, frozen=True):
-    """One renewed hold.
+    """A renewed hold.
 
     Attributes:
         arc: Its holder.
-        epoch: Of the connection.
+        epoch: Epoch of the connection.
         rank: Place by user priority among the present holders of a sharable RC, 0 first; negative: unchanged. It
             changes when others come and go, and with every change of priority.
     """
@@ -159,7 +159,7 @@ class Lease(Message, frozen=True):
 
 
 class SchedulingRefusal(Refusal):
-    """The request cannot be scheduled, ever; nothing changed."""
+    """The request can never be scheduled; nothing changed."""
 
     code = "scheduling.refused"
     remedy = "Change the request."
@@ -190,7 +190,7 @@ class UnknownRequest(SchedulingRefusal):
     """The RC manager knows no request, node or RC of this name."""
 
     code = "scheduling.unknown"
-    remedy = "See 'scout-backbone status' for the names that are there."
+    remedy = "See 'scout-backbone status' for the present names."
 
 
 class NotMovable(SchedulingRefusal):

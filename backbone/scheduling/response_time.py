@@ -1,10 +1,9 @@
 """Response-time analysis: the streams that a sharable RC can serve together, each packet by its deadline.
 
-A sharable RC sends one packet at a time and never breaks one off. Among waiting packets the one of
-the highest user priority goes first, then the one of the shorter period (rate monotonic), then the
-first by name. Whether all deadlines hold is decided exactly, by response-time analysis of every
-packet in the longest busy period; looking at the first packet only is too optimistic for a
-non-preemptive server.
+A sharable RC sends one packet at a time and never interrupts it. Among waiting packets the one with the highest user
+priority is sent first, then the one with the shorter period (rate monotonic), then the first by name. Response-time
+analysis of every packet in the longest busy period decides exactly whether all deadlines hold. Analyzing only the first
+packet is too optimistic for a non-preemptive server.
 
 Rules of this file:
 
@@ -38,11 +37,11 @@ LEAST_IDLE = 1e-4  # chosen: closer to a full load the linear bounds divide by t
 
 
 def admissible(streams: Sequence[Stream], capacity: float, analysis: Analysis = "exact") -> bool:
-    """Return whether the RC can serve all of them.
+    """Return whether the RC can serve all these streams.
 
     Args:
         streams: Highest priority first.
-        capacity: Part of its time the RC may give, 0 to 1.
+        capacity: Part of its time that the RC may give, 0 to 1.
         analysis: ``exact``: every packet is done by its deadline. ``sum``: only the shares are added
             up, as the papers do; this admits sets that miss deadlines.
     """
@@ -79,15 +78,14 @@ def feasible_order(
 ) -> list[int] | None:
     """Return an order in which every packet is done by its deadline, if there is one.
 
-    The lowest place is assigned first, to any stream that is in time there; the choice never spoils the
-    rest, because a stream's response depends on the set of streams above it, not on their order. Of several
-    streams the one of the longest deadline takes it, so the order is deadline monotonic where that suffices.
+    The lowest place is assigned first, to any stream that is in time there. The choice never spoils the rest, because a
+    stream's response depends on the set of streams above it, not on their order. If several streams fit, the one with
+    the longest deadline gets the place, so the order is deadline monotonic if that suffices.
 
     Args:
         streams: In any order.
-        capacity: Part of its time the RC may give, 0 to 1.
-        before: ``before(a, b)``: stream number a must stay above stream number b.
-            A strict partial order.
+        capacity: Part of its time that the RC may give, 0 to 1.
+        before: ``before(a, b)``: stream number a must stay above stream number b. A strict partial order.
 
     Returns:
         Numbers of the streams, highest first; None: there is no such order.
@@ -112,7 +110,7 @@ def remedy(streams: Sequence[tuple[str, Stream]], capacity: float) -> str:
 
     Args:
         streams: Names for people and streams whose user priorities are free to choose.
-        capacity: Part of its time the RC may give, 0 to 1.
+        capacity: Part of its time that the RC may give, 0 to 1.
     """
     order = feasible_order([one for _, one in streams], capacity)
     if order is None:
@@ -129,7 +127,7 @@ class _Load:
         self.share = self.lag_us = self.burst_us = 0.0
 
     def add(self, one: Stream) -> None:
-        """Count this stream too."""
+        """Add a stream."""
         key = one.period_us, one.jitter_us
         self._packets_us[key] = self._packets_us.get(key, 0) + one.packet_us
         share = one.packet_us / one.period_us
@@ -138,7 +136,7 @@ class _Load:
         self.burst_us += share * one.jitter_us + one.packet_us
 
     def exact_share(self) -> Fraction:
-        """Return the part of the RC's time it needs, without rounding."""
+        """Return the part of the RC's time that they need, without rounding."""
         return sum((Fraction(packet, period) for (period, _), packet in self._packets_us.items()), Fraction(0))
 
     def kinds(self) -> list[tuple[int, int, int]]:
@@ -220,7 +218,7 @@ def _worst_us(one: Stream, above: _Load, blocking: int, *, enough_us: int) -> in
 
 
 def _has_end(one: Stream, above: _Load, blocking: int) -> bool:
-    """Return whether the busy period of these streams ever ends.
+    """Return whether the busy period of these streams has an end.
 
     At full load it ends only without jitter: a late packet delays all later ones for ever.
     """

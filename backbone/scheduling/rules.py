@@ -1,7 +1,6 @@
-"""The scheduling rules that a mission chooses, where more than one is right.
+"""The scheduling rules that a mission can choose.
 
-Rule of this file: plain data with its ranges, so that a mission file is checked by the very types the
-RC manager starts with.
+Rule of this file: plain data with its ranges, so that the same types validate a mission file and start the RC manager.
 """
 
 from __future__ import annotations

@@ -81,8 +81,8 @@ class ScheduleManager:
             tolerance_s: Reaction and timer tolerance of this run.
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
-            goes_on: True if the trace goes on after that of an earlier RC manager.
-            planner: Plans all groups; None: those of this package do.
+            goes_on: True if the trace continues the trace of an earlier RC manager.
+            planner: Plans all groups; None: the planners of this package plan them.
         """
         self.rules = rules
         self._beginning = (tolerance_s, exact_up_to, mission, mission_priority, goes_on)
@@ -109,7 +109,7 @@ class ScheduleManager:
         self._closing = Closing(decision, self._transitions, schedule, self._arcs, ends, self._priorities, rules)
 
     def begun_anew(self, rules: SchedulingRules, planner: PlannerType | None = None) -> ScheduleManager:
-        """Return another one that begins as this one began, with these rules."""
+        """Return another manager with the same begin, but with these rules."""
         tolerance_s, exact_up_to, mission, mission_priority, goes_on = self._beginning
         return ScheduleManager(
             rules,
@@ -128,7 +128,7 @@ class ScheduleManager:
 
     @property
     def wake_s(self) -> float | None:
-        """Mission time at which it asked to be woken; None: it did not."""
+        """Mission time at which the manager must be woken; None: no time."""
         return self._closing.wake_s
 
     # Events in, instructions out: apply, plan, switch.
@@ -209,7 +209,7 @@ class ScheduleManager:
     # Views.
 
     def choose(self, request: SchedulingRequest) -> tuple[str, ...]:
-        """Return the set of RCs this request should wait for; nothing changes.
+        """Return the set of RCs that this request should wait for; nothing changes.
 
         Raises:
             MissingRuntime: The request has no valid minimum run time.
@@ -220,10 +220,10 @@ class ScheduleManager:
         return choose(self._state, request)
 
     def require_movable(self, node: str, parent: str) -> None:
-        """Return if the node of the behavior tree can be moved below this parent; nothing changes.
+        """Return if the node of the behavior tree can be moved below this parent, else raise; nothing changes.
 
         Raises:
-            NotMovable: It cannot.
+            NotMovable: The node cannot be moved there.
         """
         obstacle = self.tree.obstacle(node, parent)
         if obstacle:
@@ -252,7 +252,7 @@ class ScheduleManager:
         return [self._transitions.opening_line()]
 
     def check(self) -> None:
-        """Make sure that the invariants of the schedule hold.
+        """Return if the invariants of the schedule hold, else raise.
 
         Raises:
             AssertionError: An invariant is broken; with the story of the ARCs concerned.

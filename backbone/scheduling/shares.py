@@ -1,15 +1,16 @@
-"""Shares: which part of each RC the ARCs had, over the last minutes and between two re-plannings.
+"""Shares: the part of each RC that each ARC had, over the last minutes and between two re-plannings.
 
-A unit RC is given whole; of a sharable RC a share is given, the sum of the holder's streams. An ARC has an RC from its
+An ARC gets a unit RC whole; of a sharable RC it gets a share, the sum of its streams. An ARC has an RC from its
 connection until it is free, settling included.
 
 Rules of this file:
 
-* Pure: it reads the lines of the trace, so it counts exactly what the trace has.
+* Pure: it reads the lines of the trace, so it agrees with the trace.
 * Its size is bounded by the RCs, the ARCs with a request, and ``PERIODS_KEPT``; the cost of a line by the RCs that it
   concerns and their present holders.
-* An RC is planned again when another set of ARCs asks for it, a priority changes, or the RC goes down, comes back or
-  has another capacity. Between two such times is a period; its shares are those after the one and before the other.
+* An RC is planned again when another set of ARCs requests it, a priority changes, or the RC goes down, comes back or
+  changes its capacity. The time between two re-plannings is a period; its shares are those after the first and before
+  the second.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from backbone.scheduling.views import Period, RcUtilization
 
 MINUTE_S, TEN_MINUTES_S = 60.0, 600.0
 PERIODS_KEPT = 20  # chosen: some minutes of operation by hand
-CAUSES_KEPT = 4  # chosen: a line for people; at one instant seldom more than two things happen
+CAUSES_KEPT = 4  # chosen: a line for people; seldom more than two events come at one instant
 PRESENT_S = -1.0
 
 
@@ -35,7 +36,7 @@ class _Period:
     """The present period of an RC.
 
     Attributes:
-        had_s: ARC → seconds for which it had the whole RC, or would have for its share of it; only of ended holds.
+        had_s: ARC → seconds for which it had the RC, multiplied by its share; only of ended holds.
     """
 
     since_s: float
@@ -44,7 +45,7 @@ class _Period:
 
 
 class _RcShares:
-    """One RC: its present holders with their shares, and its periods."""
+    """The shares of one RC: its present holders, and its periods."""
 
     def __init__(self, known_s: float) -> None:
         self.known_s = known_s
@@ -72,7 +73,7 @@ class _RcShares:
         self._step(now_s)
 
     def planned_again(self, cause: str, now_s: float) -> None:
-        """Begin a period; one that began at the same time gets a further cause."""
+        """Begin a period; if the present one began at the same time, add the cause to it."""
         if now_s > self.period.since_s:
             self.periods.append(self.present(now_s, until_s=now_s))
             self.period = _Period(now_s)
@@ -80,12 +81,12 @@ class _RcShares:
             self.period.causes.append(cause)
 
     def set_capacity(self, capacity: float, now_s: float) -> None:
-        """Set the part of its time that it can give."""
+        """Set the part of its time that the RC can give."""
         self.capacity = capacity
         self._step(now_s)
 
     def present(self, now_s: float, *, until_s: float = PRESENT_S) -> Period:
-        """Return the present period up to now."""
+        """Return the present period, counted up to now."""
         had_s = dict(self.period.had_s)
         for arc, (share, since_s) in self._given.items():
             self._count(had_s, arc, share, since_s, now_s)
@@ -122,11 +123,11 @@ class Shares:
             self._rcs[rc] = _RcShares(now_s)
 
     def forget(self, rc: str) -> None:
-        """Count this RC no more."""
+        """Stop counting this RC."""
         self._rcs.pop(rc, None)
 
     def take(self, line: Line) -> None:
-        """Count what a line of the trace says."""
+        """Count a line of the trace."""
         now_s = line["t"]
         match line["ev"]:
             case "request":
@@ -150,7 +151,7 @@ class Shares:
         """Return the utilization of each RC.
 
         Args:
-            periods: True: with the last periods, oldest first.
+            periods: True: include the last periods, oldest first.
         """
         return [
             RcUtilization(
@@ -205,7 +206,7 @@ class Shares:
 
 
 def _share_of(streams: object) -> float:
-    """Return the share of an RC's time by the ``use`` of a request's line."""
+    """Return the share of an RC's time in the ``use`` field of a request's line."""
     if streams == EXCLUSIVE or not isinstance(streams, list):
         return 1.0
     return min(1.0, utilization([stream(Usage(each["period"], each["cost"])) for each in streams]))

@@ -1,4 +1,4 @@
-"""Slice ends: when the slices end for whose end an ARC waits (rule 5).
+"""Slice ends: the ends of those slices for whose end an ARC waits (rule 5).
 
 Rule of this file: a slice ends only if an ARC waits for one of its RCs. Otherwise its end is not watched.
 """
@@ -30,14 +30,14 @@ class SliceExpiry:
         self._state.concerns(arc.uses)
 
     def wait_for(self, arc: ArcEntry) -> None:
-        """Check the slice of a running ARC when it ends: an ARC waits for its end."""
+        """Check the slice of a running ARC at its end, because an ARC waits for that end."""
         if not arc.awaited:
             arc.awaited = True
             self._pushed += 1
             heapq.heappush(self._ends, (arc.look_s, self._pushed, arc))
 
     def check(self, now_s: float) -> float | None:
-        """Free the RCs of ended slices for the ARCs that wait for them; return when the next check is due."""
+        """Free the RCs of ended slices for the ARCs that wait for them; return the time of the next check."""
         state = self._state
         state.now_s = now_s
         state.version += 1  # time alone changes plans

@@ -1,8 +1,8 @@
-"""Snapshot: a schedule manager with all that it decides by, as bytes, and back.
+"""Snapshot: writes all state by which a schedule manager decides as bytes, and reads it back.
 
-A replay that begins in the middle of a recording begins with one. It is the graph of the manager's objects, node by
-node. To read it makes objects of the classes listed here and sets their attributes; nothing else is called, so bytes
-of unknown origin do no harm. Measured: 0.15 ms for a kilobyte; 8 ARCs make 12 kB, 370 make 530 kB.
+A replay from the middle of a recording starts from a snapshot. It is the graph of the manager's objects, node by node.
+Reading it makes objects of the classes listed here and sets their attributes. No other code is called, so bytes of
+unknown origin do no harm. Measured: 0.15 ms for a kilobyte; 8 ARCs make 12 kB, 370 make 530 kB.
 
 Pure.
 """
@@ -44,7 +44,7 @@ from backbone.scheduling.transitions import Transitions
 from backbone.scheduling.whole_group import WholeGroupPlanner
 
 FORM = 3
-"""Grows when a snapshot of an earlier release cannot be read any more."""
+"""Grows when snapshots of an earlier release can no longer be read."""
 _OBJECTS: dict[str, type[Any]] = {
     kind.__name__: kind
     for kind in (
@@ -88,7 +88,7 @@ _CACHES = {
     "TraceWriter": {"_story"},
     "OpenDecision": {"instructions", "ended"},
 }
-"""Class → attributes that begin empty: what is computed again, and what only people read."""
+"""Class → attributes that begin empty, because they are computed again or only people read them."""
 _CONTAINERS: dict[str, type[Any]] = {kind.__name__: kind for kind in (list, dict, set, deque)}
 _FIXED: dict[str, type[Any]] = {kind.__name__: kind for kind in (tuple, frozenset)}
 _MOST_BITS = 63
@@ -96,7 +96,7 @@ _UNREADABLE = (msgspec.DecodeError, ValueError, LookupError, TypeError, Attribut
 
 
 class NoSnapshot(Refusal):
-    """The state cannot be written, or the bytes are no state of this release."""
+    """The state cannot be written, or the bytes are not a state of this release."""
 
     code = "scheduler.snapshot"
     remedy = "Replay the recording with the release that made it, see 'scout-backbone recording info'."
@@ -106,16 +106,16 @@ def written(manager: ScheduleManager) -> bytes:
     """Return the state of the manager; it does not change.
 
     Raises:
-        NoSnapshot: Something in it is of a class of its own: a planner from the mission file.
+        NoSnapshot: The state contains an object of another class, such as a planner from the mission file.
     """
     return _Writer().written(manager)
 
 
 def read(raw: bytes) -> ScheduleManager:
-    """Return a manager in that state: from the same events it decides the same.
+    """Return a manager in that state; it makes the same decisions from the same events.
 
     Raises:
-        NoSnapshot: The bytes are no snapshot of this release.
+        NoSnapshot: The bytes are not a snapshot of this release.
     """
     try:
         form, nodes = msgspec.msgpack.decode(raw, type=tuple[int, list[list[Any]]])
@@ -125,12 +125,12 @@ def read(raw: bytes) -> ScheduleManager:
     except _UNREADABLE as error:
         raise NoSnapshot(f"no snapshot of a schedule: {error}") from error
     if not isinstance(manager, ScheduleManager):
-        raise NoSnapshot("the snapshot is of something else than a schedule")
+        raise NoSnapshot("the snapshot does not contain a schedule")
     return manager
 
 
 class _Writer:
-    """A value is written as it is, or as the number of its node in a list; a node is its kind and its values."""
+    """Writes a plain value as it is, and any other value as a node number; a node is its kind and its values."""
 
     def __init__(self) -> None:
         self._nodes: list[list[Any]] = []
@@ -196,7 +196,7 @@ class _Writer:
 
 
 class _Reader:
-    """Makes what can hold others first, empty; then what must be whole at once; then fills."""
+    """Makes the objects that can contain others first, empty; then the immutable ones; then fills the first."""
 
     def __init__(self, nodes: list[list[Any]]) -> None:
         self._nodes = nodes
@@ -264,7 +264,7 @@ def _attribute_names(value: Any) -> tuple[str, ...]:
 
 
 def _require_attribute(kind: type[Any], name: str) -> None:
-    """Return if objects of this class can have an attribute of this name; it replaces nothing of the class."""
+    """Return if objects of this class can have an attribute of this name that replaces nothing of the class."""
     slots = getattr(kind, "__slots__", ())
     if name not in slots if slots else hasattr(kind, name):
         raise LookupError(f"{kind.__name__} has no {name}")

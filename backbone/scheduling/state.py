@@ -1,7 +1,7 @@
-"""State: the RCs and the ARCs of the schedule, and which of them concern each other.
+"""State: the RCs and the ARCs of the schedule, and their relations.
 
-Rules of this file: no decision, no message. Every change notes the RCs that it concerns, so that the planners examine
-those only, and raises ``version``: results for an earlier version are outdated. The steps of an ARC's life are in
+Rules of this file: no decision, no message. Every change records the RCs that it concerns, so that the planners examine
+only those, and increases ``version``: results for an earlier version are outdated. The steps of an ARC's life are in
 ``transitions``; each of them ends with ``enter``.
 """
 
@@ -31,11 +31,11 @@ class ScheduleState:
         fairness: The order among equals.
         now_s: Time of the last change of an ARC's state.
         version: Grows with every change.
-        service_version: Grows with every change of what RCs can serve, and of priorities.
-        rc_versions: RC → a number that grows with every other change that concerns it.
-        changed: RCs that changes concerned since the planners examined them, first concerned first.
+        service_version: Grows with every change of the RCs' service or of priorities.
+        rc_versions: RC → a number that grows with every other change that concerns the RC.
+        changed: RCs that changes concerned since the last examination by the planners, in the order of the changes.
         bits: RC → its bit in sets of RCs.
-        held_alone: RCs that an ARC holds alone whose slice is not over, as a set of bits.
+        held_alone: RCs held exclusively by an ARC whose slice is not over, as a set of bits.
     """
 
     def __init__(self, *, discipline: Discipline, admission: Analysis, tolerance_s: float, exact_up_to: int) -> None:
@@ -52,7 +52,7 @@ class ScheduleState:
         self.groups: Groups[ArcEntry] = Groups(exact_up_to)
         self.users = self.groups.users
         self.roomy: dict[str, bool] = {}
-        """Sharable RC → whether its whole active demand fits, where this is known; see ``Compatibility``."""
+        """Sharable RC → whether its whole active demand fits, if known; see ``Compatibility``."""
         self.compatibility = Compatibility(self.rcs, self.users, admission, self.roomy)
         self._accounts = EqualTime(self.rivals, tolerance_s) if discipline == "time" else None
         self.fairness: Fairness = self._accounts or Turns()
@@ -69,14 +69,14 @@ class ScheduleState:
     # Changes.
 
     def concerns(self, rcs: Iterable[str]) -> None:
-        """Note that a change concerns these RCs."""
+        """Record that a change concerns these RCs."""
         for rc in rcs:
             self.changed[rc] = None
             self.rc_versions[rc] = self.rc_versions.get(rc, 0) + 1
         self.version += 1
 
     def _service_changed(self, rcs: Collection[str]) -> None:
-        """Drop the cached answers about these RCs, and with them the first ARCs in line everywhere."""
+        """Drop the cached answers about these RCs, and the cached first ARCs in line everywhere."""
         self.service_version += 1
         self.concerns(rcs)
         self.compatibility.service_changed(rcs)
@@ -84,7 +84,7 @@ class ScheduleState:
     # RCs.
 
     def add_rc(self, known: RcKnown) -> RcEntry:
-        """Take in an RC and return its entry."""
+        """Add an RC and return its entry."""
         self.bits.setdefault(known.rc, 1 << len(self.bits))
         entry = RcEntry(
             known.rc,
@@ -101,7 +101,7 @@ class ScheduleState:
         return entry
 
     def remove_rc(self, rc: RcEntry) -> None:
-        """Remove an RC that no ARC uses; its name may return for another one, whose epochs go on."""
+        """Remove an RC that no ARC uses; a later RC of this name continues its epochs."""
         self._epochs_of_removed[rc.name] = rc.epoch
         del self.rcs[rc.name]
         self.changed.pop(rc.name, None)
@@ -120,7 +120,7 @@ class ScheduleState:
         return True
 
     def rc_up(self, rc: RcEntry, last_epoch: int) -> bool:
-        """Count the RC as up, its next epoch above this one; return whether it was down."""
+        """Count the RC as up, with its next epoch above ``last_epoch``; return whether it was down."""
         rc.epoch = max(rc.epoch, last_epoch)
         if rc.up:
             return False
@@ -133,7 +133,7 @@ class ScheduleState:
         rc.capacity = capacity
         self._service_changed([rc.name])
 
-    # ARCs come, change and go.
+    # Arrival, change and departure of ARCs.
 
     def add_arc(
         self,
@@ -144,13 +144,13 @@ class ScheduleState:
         longest_s: float,
         now_s: float,
     ) -> ArcEntry:
-        """Take in an ARC, idle, and return its entry.
+        """Add an idle ARC and return its entry.
 
         Args:
             request: Its request.
             uses: The RCs chosen for it, all of them known.
             place: Names from the root to its owner.
-            path: The same with their numbers.
+            path: The same nodes with their numbers.
             longest_s: Longest time of its slices, also for a shorter request.
         """
         level = self._level_of(path)
@@ -181,11 +181,11 @@ class ScheduleState:
         return arc
 
     def request_again(self, arc: ArcEntry, request: SchedulingRequest) -> None:
-        """Keep the ARC's newest request."""
+        """Replace the ARC's request by its newest one."""
         arc.request = request
 
     def measure(self, arc: ArcEntry, uses: Mapping[str, RcUse]) -> None:
-        """Note the uses with which its packets would be as long as measured; its present request does not change."""
+        """Record the ARC's uses with measured packet times; its present request does not change."""
         arc.measured = {rc: [stream(usage) for usage in uses[rc].streams] for rc in arc.streams}
         self.concerns(arc.shares)
 
@@ -196,13 +196,13 @@ class ScheduleState:
         self.concerns(arc.uses)
 
     def forget(self, arc: ArcEntry) -> None:
-        """Remove an ARC; it holds nothing afterwards."""
+        """Remove an ARC, which holds nothing."""
         self.enter(arc, RequestState.IDLE, arc.since_s)
         self.compatibility.forget(arc)
         del self.arcs[arc.name]
 
     def set_paths(self, paths: Iterable[tuple[ArcEntry, tuple[str, ...], Path]]) -> None:
-        """Set these places of ARCs in the tree, with these numbers."""
+        """Set the places of these ARCs in the tree, and their numbers."""
         for arc, place, path in paths:
             arc.place_in_tree, arc.path, arc.level = place, path, self._level_of(path)
         self._service_changed([*self.rcs])
@@ -244,13 +244,13 @@ class ScheduleState:
             self._accounts.joined(arc, now_s)
 
     def set_afterwards(self, arc: ArcEntry, afterwards: Afterwards) -> None:
-        """Set the state of an ARC that is being revoked, once its RCs are free."""
+        """Set the state that an ARC will have when its revoked RCs are free."""
         arc.afterwards = afterwards
         arc.queued = afterwards is Afterwards.WAIT
         self.concerns(arc.uses)
 
     def retry_at(self, arc: ArcEntry, time_s: float | None, why: str = "") -> None:
-        """Set when an idle ARC wants time again; None: at its own request."""
+        """Set when an idle ARC is queued again; None: at its own request."""
         arc.retry_s, arc.retry_why = time_s, why
 
     # Questions.
@@ -263,7 +263,7 @@ class ScheduleState:
         return self._accounts.runs_on(arc, filter(self.compatibility.usable, waiting), self.now_s)
 
     def beside(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return the others that use an RC of this one."""
+        """Return the other ARCs that use an RC of this one."""
         beside = dict.fromkeys(user for rc in arc.uses for user in self.users.get(rc, ()))
         beside.pop(arc, None)
         return [*beside]
@@ -274,7 +274,7 @@ class ScheduleState:
         return [other for other in self.beside(arc) if not rank(other.path, arc.path) and not fits(arc, [other])]
 
     def group_of(self, arc: ArcEntry) -> Sequence[ArcEntry]:
-        """Return the ARC's group; none if it is not active."""
+        """Return the ARC's group; empty if the ARC is not active."""
         return [*self.groups.of[arc].arcs] if arc in self.groups else []
 
     def in_groups(self) -> list[list[ArcEntry]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 
-SLOT_S = 10.0  # chosen: a sixth of the shortest time that people ask about
+SLOT_S = 10.0  # chosen: a sixth of the shortest time that people ask for
 SLOTS_KEPT = 60
 LONGEST_S = SLOT_S * SLOTS_KEPT
 
@@ -17,7 +17,7 @@ class StepAverage:
     """A value of 0 at first, and its average.
 
     Args:
-        began_s: Begin of the first slot; the averages go back to it at most.
+        began_s: Begin of the first slot; no average includes earlier time.
     """
 
     def __init__(self, began_s: float) -> None:
@@ -35,7 +35,7 @@ class StepAverage:
         self._value = value
 
     def over(self, last_s: float, now_s: float) -> float:
-        """Return the average since the begin of the slot that was ``last_s`` ago.
+        """Return the average since the begin of the slot ``last_s`` ago.
 
         Args:
             last_s: A multiple of ``SLOT_S``, at most ``LONGEST_S``.

@@ -24,7 +24,7 @@ class Stream(NamedTuple):
 
     @property
     def share(self) -> Fraction:
-        """Part of the RC's time it needs, 0 to 1."""
+        """Part of the RC's time that the stream needs, 0 to 1."""
         return Fraction(self.packet_us, self.period_us)
 
 
@@ -37,7 +37,7 @@ def stream(usage: Usage) -> Stream:
 
 
 def utilization(streams: Sequence[Stream]) -> float:
-    """Return the part of the RC's time they need together."""
+    """Return the part of the RC's time that the streams need together."""
     return sum(one.packet_us / one.period_us for one in streams)
 
 

@@ -18,7 +18,7 @@ from backbone.scheduling.transitions import Transitions
 
 
 class Switching:
-    """Carries turns out: instructions to the loop, and the states of the ARCs."""
+    """Carries out turns: instructions to the loop, and state changes of the ARCs."""
 
     def __init__(self, decision: OpenDecision, transitions: Transitions, schedule: MasterSchedule) -> None:
         self._decision = decision
@@ -27,7 +27,7 @@ class Switching:
         self._state = schedule.state
 
     def make_way(self, turn: Turn) -> None:
-        """Revoke the holders of the RCs of the ARC whose turn it is; ended slices before preempted ones."""
+        """Revoke the holders that block the ARC whose turn it is; ended slices before preempted ones."""
         for holder in in_order_of_revocation(turn):
             served, overridden = holder.served(self._decision.now_s), turn.arc.goes_before(holder)
             forced = overridden and not served
@@ -40,7 +40,7 @@ class Switching:
                 self._transitions.revoke(holder, "slice", turn.arc.name)
 
     def connect(self, arc: ArcEntry) -> None:
-        """Connect an ARC whose RCs are all free, each under a new epoch: they begin to settle."""
+        """Connect an ARC whose RCs are all free, each with a new epoch, so that they begin to settle."""
         now_s, rcs, ranks = self._decision.now_s, self._state.rcs, self.ranks(arc)
         for rc in arc.uses:
             rcs[rc].epoch += 1

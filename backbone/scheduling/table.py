@@ -28,7 +28,7 @@ _PATH = attrgetter("path")
 
 
 class Table:
-    """Questions about one state; nothing changes.
+    """Questions about one state, which does not change.
 
     Attributes:
         strict: No ARC starts while a higher usable one of its group waits.
@@ -38,7 +38,7 @@ class Table:
     """
 
     def __init__(self, state: ScheduleState, *, strict: bool) -> None:
-        """Ask this state.
+        """Answer about this state.
 
         Args:
             strict: No ARC starts while a higher usable one of its group waits.
@@ -76,13 +76,13 @@ class Table:
     # Blockers (rule 4).
 
     def stands_until_s(self, holder: ArcEntry, arc: ArcEntry, now_s: float) -> float:
-        """Return until when the holder, or the ARC itself while its RCs are being freed, blocks the ARC."""
+        """Return how long the holder, or the ARC itself while its RCs are being freed, blocks the ARC."""
         if holder.state is RequestState.REVOKING:
             return max(now_s + SOON_S, holder.since_s + holder.release_s)
         before = 0 if holder.level is arc.level else rank(holder.path, arc.path)
         if before:
             return math.inf if before > 0 else now_s
-        if holder.state is RequestState.CONNECTING:  # its slice begins with its grant: it cannot be over yet
+        if holder.state is RequestState.CONNECTING:  # its slice begins with its grant, so it cannot be over yet
             return max(now_s + SOON_S, holder.began_s + holder.length_s)
         return max(now_s, holder.end_s)
 
@@ -91,12 +91,12 @@ class Table:
         return arc.state is RequestState.REVOKING and now_s > arc.since_s + arc.release_s
 
     def holders(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return the others that hold an RC of the ARC."""
+        """Return the other ARCs that hold an RC of the ARC."""
         rcs = self.state.rcs
         return [*dict.fromkeys(holder for rc in arc.uses for holder in rcs[rc].holders if holder is not arc)]
 
     def could_start(self, arc: ArcEntry, holders: Iterable[ArcEntry], now_s: float) -> bool:
-        """Return whether no incompatible ARC of these holds an RC of it for longer than until now."""
+        """Return whether none of these holders blocks the ARC beyond now."""
         touches, soon_s = arc.touches, now_s + INSTANT_S
         for holder in holders:
             if (
@@ -111,13 +111,13 @@ class Table:
     def line(
         self, group: Iterable[ArcEntry], now_s: float, order: Callable[[Iterable[ArcEntry]], list[ArcEntry]]
     ) -> tuple[list[ArcEntry], set[ArcEntry]]:
-        """Return the queued ARCs of a group, in order, and those that no single holder keeps from a start now.
+        """Return the queued ARCs of a group, in order, and those that no single holder prevents from starting now.
 
-        If there is none of the latter, the order is not worked out and empty.
+        If there are none of the latter, the order is not computed, and is empty.
 
         Args:
             group: Active ARCs of one group.
-            now_s: When they would start.
+            now_s: Time of their start.
             order: ARCs → the queued ones, in order.
         """
         holders = [arc for arc in group if arc.holds]

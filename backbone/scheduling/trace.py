@@ -1,7 +1,7 @@
-"""The schedule trace: lines from which an independent judge can replay every decision.
+"""The schedule trace: lines with which an independent judge can replay every decision.
 
-``TraceWriter`` writes them. Times are mission seconds, written in full so that a replay finds the very same decision
-times.
+``TraceWriter`` writes them. Times are mission seconds, written with all digits, so that a replay gets exactly the same
+decision times.
 """
 
 from __future__ import annotations

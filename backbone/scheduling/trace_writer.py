@@ -1,6 +1,6 @@
 """TraceWriter: writes the lines of the trace, each with its cause.
 
-Rule of this file: every name in a line was introduced by a line before it: RCs, and the nodes of the behavior tree,
+Rule of this file: every name in a line was introduced by an earlier line: RCs, and the nodes of the behavior tree,
 parents first.
 """
 
@@ -26,8 +26,8 @@ class TraceWriter:
         """Begin with nothing introduced.
 
         Args:
-            decision: The present one.
-            goes_on: True if the lines follow an earlier RC manager's, by which an RC may be down.
+            decision: The present decision.
+            goes_on: True if the lines follow those of an earlier RC manager, in which an RC may be down.
         """
         self._decision, self._goes_on = decision, goes_on
         self._is_up: dict[str, bool] = {}
@@ -37,7 +37,7 @@ class TraceWriter:
         self._story: deque[Line] = deque(maxlen=STORY_LINES)
 
     def record(self, event: str, cause: str = "", **fields: object) -> None:
-        """Write a line of this kind, of now unless the fields say another time, with its fields in this order."""
+        """Write a line of this kind with its fields in this order; its time is now unless a field sets another."""
         line: Line = {"ev": event, "t": self._decision.now_s, **fields}
         if event == "rc_state":
             self._is_up[line["id"]] = line["state"] == "up"
@@ -45,7 +45,7 @@ class TraceWriter:
         self._decision.instructions.append(Record(line, cause))
 
     def record_request(self, arc: ArcEntry, rcs: Iterable[RcEntry], *, idle: bool) -> None:
-        """Write the ARC's request for these RCs, and in its line whether it is idle."""
+        """Write the ARC's request for these RCs, with its idle state."""
         for rc in rcs:
             self.introduce_rc(rc)
         self.introduce_nodes(arc.path)
@@ -65,7 +65,7 @@ class TraceWriter:
     # Names.
 
     def introduce_rc(self, rc: RcEntry) -> None:
-        """Introduce a new RC: when it is up for the first time, or requested before."""
+        """Introduce a new RC when it is first up or requested."""
         if rc.name in self._is_up:
             return
         self._is_up[rc.name] = True
@@ -88,7 +88,7 @@ class TraceWriter:
         return rc in self._is_up
 
     def forget_rc(self, rc: str) -> None:
-        """Introduce an RC of this name anew: it is another one."""
+        """Introduce an RC of this name again, because it is another one."""
         if self._is_up.pop(rc, None) is not None:
             self._removed.add(rc)
 
@@ -110,7 +110,7 @@ class TraceWriter:
         return [*self._nodes]
 
     def nodes_moved(self, old: tuple[str, ...], new: tuple[str, ...]) -> None:
-        """Keep the id of each node at and below ``old``, which is now at ``new``: lines go on with the old ids."""
+        """Keep the id of each node at and below ``old``, which is now at ``new``; lines continue with the old ids."""
         self._ids = {carried(way, old, new): self._id(way) for way in self._nodes}
         self._nodes = {carried(way, old, new): told for way, told in self._nodes.items()}
 
@@ -124,7 +124,7 @@ class TraceWriter:
         return [line for line in self._story if not names or line.get("arc", line.get("id")) in names]
 
     def says_up(self, rc: str) -> bool | None:
-        """Return whether the RC is up by the lines so far; None without such a line."""
+        """Return whether the RC is up according to the lines so far; None without such a line."""
         return self._is_up.get(rc)
 
 

@@ -59,7 +59,7 @@ class Transitions:
         """Begin with nothing to carry out.
 
         Args:
-            decision: The present one.
+            decision: The present decision.
             schedule: The plans and the state.
             ends: The ends of slices.
             trace: Writes the lines.
@@ -76,10 +76,10 @@ class Transitions:
         self._relaxed = False
         self._stamped = 0
 
-    # It waits.
+    # The ARC waits.
 
     def queue(self, arc: ArcEntry) -> None:
-        """Queue the ARC behind its equals; the trace has a line if its group is too large to be planned whole."""
+        """Queue the ARC behind its equals; write a line if its group is too large to be planned whole."""
         arc.stamp = self.stamp()
         arc.reservation = arc.retry_s = None
         arc.has_forced = False
@@ -89,12 +89,12 @@ class Transitions:
             self.trace.record("meta", "a group is too big to be planned whole", **self._meta())
 
     def stamp(self) -> tuple[float, int]:
-        """Return a new stamp: behind all that were given."""
+        """Return a new stamp, later than all given ones."""
         self._stamped += 1
         return self._decision.now_s, self._stamped
 
     def enter(self, arc: ArcEntry, state: RequestState) -> None:
-        """Let the ARC enter this state now; the ends of the slices it waits for are checked."""
+        """Let the ARC enter this state now, and check the ends of the slices for which it waits."""
         self._state.enter(arc, state, self._decision.now_s)
         if state is RequestState.WAITING:
             for holder in [holder for rc in arc.uses for holder in self._state.rcs[rc].holders]:
@@ -107,13 +107,13 @@ class Transitions:
         self.enter(arc, RequestState.IDLE)
 
     def reserve(self, arc: ArcEntry, *, forced: bool) -> None:
-        """Place a waiting ARC before all equals until it is connected; note if others were preempted for it."""
+        """Place a waiting ARC before all equals until it is connected; record whether others were preempted for it."""
         arc.has_forced |= forced
         if arc.reservation is None:
             arc.reservation = self.stamp()[1]
             self._state.concerns(arc.uses)
 
-    # It has its RCs.
+    # The ARC has its RCs.
 
     def grant(self, arc: ArcEntry) -> None:
         """Grant an ARC whose RCs have settled: its slice begins."""
@@ -122,8 +122,8 @@ class Transitions:
         arc.turns += 1
         self.enter(arc, RequestState.RUNNING)
         self._ends.end_at(arc, self._slice_end_s(arc))
-        # On a sharable RC an ARC of shorter settling time may overtake: the overtaken epoch is in the line of its
-        # connection only, so that a reader sees each RC's numbers grow.
+        # On a sharable RC an ARC with a shorter settling time may overtake another. The overtaken epoch is only in the
+        # line of its connection, so that the numbers of each RC grow in the trace.
         newest = {rc: epoch for rc, epoch in arc.epochs.items() if epoch > self._state.rcs[rc].granted_epoch}
         for rc, epoch in newest.items():
             self._state.rcs[rc].granted_epoch = epoch
@@ -146,7 +146,7 @@ class Transitions:
         self._ends.end_at(arc, granted_s + arc.minimum_s)
 
     def renew(self, arc: ArcEntry) -> None:
-        """Begin a new slice of a served ARC that stays where an equal's slice ended; its place is behind its equals."""
+        """Begin a new slice of a served ARC that stays when an equal's slice ended; its place is behind its equals."""
         arc.stamp = self.stamp()
         arc.slice_s = self._decision.now_s
         arc.turns += 1
@@ -159,7 +159,7 @@ class Transitions:
         self._ends.end_at(arc, until_s)
         self.trace.record("extend", "it asked to go on (rule 14)", arc=arc.name, until=until_s)
 
-    # It loses its RCs.
+    # The ARC loses its RCs.
 
     def revoke(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
         """Revoke all RCs of a connected ARC."""
@@ -169,7 +169,7 @@ class Transitions:
         self._decision.instructions.append(revoked)
 
     def lose(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
-        """Count the ARC's RCs as being disconnected; a served ARC has its next place behind its equals."""
+        """Count the ARC's RCs as being disconnected; the next place of a served ARC is behind its equals."""
         cause = because(why, by)
         if arc.served(self._decision.now_s):
             arc.stamp = self.stamp()
@@ -179,7 +179,7 @@ class Transitions:
         self.trace.record("revoke", cause, arc=arc.name, why=why, **({"by": by} if by else {}))
 
     def free(self, arc: ArcEntry, state: RequestState) -> None:
-        """Queue or idle an ARC whose RCs are in their safe states."""
+        """Queue or idle an ARC when its RCs are in their safe states."""
         arc.epochs = {}
         self.enter(arc, state)
 

@@ -10,14 +10,14 @@ from backbone.wire import Message
 
 
 class RcView(Message, frozen=True, tag="RcView/2"):
-    """One RC in the master schedule.
+    """An RC in the master schedule.
 
     Attributes:
         state: ``up`` or ``down``.
-        capacity: Share of its time it can give.
+        capacity: Share of its time that it can give.
         holders: Its holders, with epochs and begins.
         last_epoch: Largest epoch given so far.
-        next: ARCs that get it, in the order of their predicted starts.
+        next: ARCs that get it next, in the order of their predicted starts.
         until_s: Mission time at which the slice of each holder ends; negative: it is being disconnected.
         next_s: Mission times of their predicted starts, for each of ``next``.
         is_robot: True if it is a robot, which operators can stop.
@@ -37,16 +37,16 @@ class RcView(Message, frozen=True, tag="RcView/2"):
 
 
 class RequestView(Message, frozen=True):
-    """One request in the master schedule.
+    """A request in the master schedule.
 
     Attributes:
         state: State of the request.
         since_s: Mission time at which it entered that state.
         until_s: End of its slice; negative if it holds nothing.
         expected_start_s: Predicted grant; negative if it runs or none can be predicted.
-        because: One line: why it runs or waits.
+        because: Reason why it runs or waits, one line.
         blockers: ARCs that block it directly; ``why`` names all that would have to be revoked.
-        minimum_runtime_s: As asked for.
+        minimum_runtime_s: Requested minimum run time.
         priority: Its priority path, for people: ``mission:10/surveillance:5/watch-scout1:3``.
         rule: Rule of SCHEDULING.md that decides it.
         would_change: The event that would end this, for people.
@@ -90,7 +90,7 @@ class Why(Message, frozen=True, tag="Why/2"):
         blockers: ARCs that cause this; without them a waiting ARC starts as soon as its RCs are up and free.
         expected_start_s: Predicted grant; negative if none.
         would_change: The event that would end the wait, for people.
-        at_s: Mission time of the answer; negative: not told.
+        at_s: Mission time of the answer; negative: unknown.
     """
 
     name: Mention
@@ -108,7 +108,7 @@ class Period(Message, frozen=True):
 
     Attributes:
         until_s: Mission time of the second; negative: it has not come.
-        because: Cause of the first, for people.
+        because: Cause of the first re-planning, for people.
         shares: ARC → share of the time, or of the capacity, that it had.
     """
 
@@ -123,8 +123,8 @@ class RcUtilization(Message, frozen=True):
 
     Attributes:
         since_s: Mission time at which counting began.
-        minute: Over the last minute, or since then.
-        ten_minutes: Over the last ten minutes, or since then.
+        minute: Share over the last minute, or since ``since_s`` if that is shorter.
+        ten_minutes: Share over the last ten minutes, or since ``since_s`` if that is shorter.
         periods: The last periods, oldest first, the present one last; empty unless asked for.
     """
 
@@ -143,7 +143,7 @@ class Utilization(Message, frozen=True):
 
 
 class RequestAttributes(Message, frozen=True):
-    """The request of one ARC, as it counts now.
+    """The present request of one ARC.
 
     Attributes:
         state: State of the request.

@@ -1,7 +1,7 @@
 """Whole group: each queued ARC of a group has a reserved start, so that backfilling never delays it (rule 3).
 
 This is conservative backfilling (see ``planner``), with priorities and with sets of RCs instead of one number of
-processors. It costs a plan of the whole group whenever something in it changed.
+processors. It costs a plan of the whole group after every change in it.
 
 Rules of this file (numbers as in docs and ``why``):
 
@@ -37,7 +37,7 @@ class WholeGroupPlanner:
         """Begin with no groups to examine.
 
         Args:
-            slack_s: By how much two reservations may overlap. Hand-over takes time: without it an ARC never fits a
+            slack_s: Longest overlap of two reservations. Hand-over takes time, so without slack an ARC never fits a
                 gap that is exactly as long as its slice.
         """
         self._table = table
@@ -49,7 +49,7 @@ class WholeGroupPlanner:
         self._planned = -1
 
     def look_near(self, rc: str) -> None:
-        """Examine the group that uses the RC in the next decision."""
+        """Examine, in the next decision, the group that uses the RC."""
         self._near[rc] = None
 
     def due(self, now_s: float) -> Turn | None:
@@ -72,8 +72,8 @@ class WholeGroupPlanner:
     def forgotten(self, group: Sequence[ArcEntry], now_s: float) -> ArcEntry | None:
         """Return an ARC of the group whose time is now.
 
-        Where RCs are freed late, or an ARC runs on beyond its slice under the discipline ``time``, plans change as
-        time passes; such a group is examined when they are free, or when that ARC's next check is due.
+        If RCs are freed late, or an ARC runs on beyond its slice under the discipline ``time``, plans change as time
+        passes. Such a group is examined when the RCs are free, or when that ARC's next check is due.
         """
         runs_on = not self.reserves and any(arc.served(now_s) for arc in group)
         if runs_on or any(self._table.is_overdue(arc, now_s) for arc in group):
@@ -88,7 +88,7 @@ class WholeGroupPlanner:
             return None
         plans = self._plans[group] = GroupPlans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
         last = max(place for place, arc in enumerate(order) if arc in possible)
-        queued = order[: last + 1]  # later ARCs change nothing for these
+        queued = order[: last + 1]  # later ARCs do not affect these
         if self.reserves:
             return plans.due(queued, possible)
         while queued:
@@ -102,7 +102,7 @@ class WholeGroupPlanner:
         in_turns = GroupPlans(self._table, _in_turns(group), group.arcs, now_s, slack_s=self._slack_s)
         turn = in_turns.due(in_turns.order, possible)
         only_lower = turn is not None and all(turn.arc.goes_before(holder) for holder in turn.in_the_way)
-        return turn if only_lower else None  # no equal loses by it: it starts in a gap, or overrides
+        return turn if only_lower else None  # it harms no equal: it starts in a gap, or preempts lower ARCs
 
     def _forget_outdated(self) -> None:
         if self._planned != self._state.version:
@@ -110,10 +110,10 @@ class WholeGroupPlanner:
             self._planned = self._state.version
 
     def _in_turn(self, turn: Turn, group: Group[ArcEntry], now_s: float) -> bool:
-        """Return whether the turn would be right also if equals took turns.
+        """Return whether the turn would also be right if equals took turns.
 
-        RCs come free as whole sets: an ARC that had least time, but would not get all its RCs so, ends no slice. Nor
-        does it start in a gap that ARCs higher than it will need.
+        RCs become free as whole sets. If the ARC with the least time would not get all its RCs by a turn, it ends no
+        slice. Nor does it start in a gap that higher ARCs will need.
         """
         order = _in_turns(group)
         plan = functools.partial(Plan, self._table, order, now_s=now_s, slack_s=0.0, handed_over=True)
@@ -132,7 +132,7 @@ class WholeGroupPlanner:
         return True
 
     def _needs_more(self, arc: ArcEntry, keepers: Sequence[ArcEntry], due: Sequence[ArcEntry]) -> bool:
-        """Return whether the ARC does not fit beside the holders, or not beside them and other ARCs that are due."""
+        """Return whether the ARC does not fit beside the holders, or not beside holders and other due ARCs."""
         others = [other for other in due if other is not arc]
         return not (self._table.fits(arc, keepers) and self._table.fits(arc, [*keepers, *others]))
 
@@ -145,10 +145,10 @@ class WholeGroupPlanner:
 
         Args:
             group: Active ARCs; all of a group, or a hypothetical part of it.
-            now_s: From when on.
-            handed_over: Plan as if all RCs that are being freed were free already.
-            slack_s: By how much an ARC may overlap those before it, but not by more than half its slice;
-                None: by the tolerance of this run.
+            now_s: Earliest time.
+            handed_over: True: plan as if all RCs that are being freed were free already.
+            slack_s: Longest overlap of an ARC with those before it, but at most half its slice; None: the tolerance of
+                this run.
         """
         arcs = [*group]
         slack_s = self._slack_s if slack_s is None else slack_s
@@ -183,7 +183,7 @@ class WholeGroupPlanner:
         return []
 
     def order(self, arcs: Iterable[ArcEntry]) -> list[ArcEntry]:
-        """Return the queued ones among ARCs of one group, the first in line first (rule 2)."""
+        """Return the queued ARCs among ARCs of one group, the first in line first (rule 2)."""
         return self._table.in_order([arc for arc in arcs if arc.queued])
 
 
@@ -192,7 +192,7 @@ def _may_displace(arc: ArcEntry, holder: ArcEntry, now_s: float) -> bool:
 
 
 def _in_turns(group: Group[ArcEntry]) -> list[ArcEntry]:
-    """Return the queued ARCs in the order they would have if equals took turns."""
+    """Return the queued ARCs in the order that they would have if equals took turns."""
 
     def seniority(arc: ArcEntry) -> tuple[float, int]:
         is_first = arc.reservation is not None and arc.has_forced

@@ -38,12 +38,12 @@ def is_loopback(address: str) -> bool:
 
 
 class Host(Declared):
-    """One machine that may run components."""
+    """A machine that may run components."""
 
     name: Name = Field(description="Name of the machine within this file.")
-    address: Address = Field(description="IP address or host name; 127.0.0.1 is the machine 'up' is typed on.")
+    address: Address = Field(description="IP address or host name; 127.0.0.1 is the machine on which 'up' is typed.")
     tags: Names = Field(
-        default=(), description="What the machine has, as names separated by blanks; types may ask for them."
+        default=(), description="Abilities of the machine, as names separated by blanks; types can require them."
     )
     port: Port = Field(
         default=HUB_PORT,
@@ -60,13 +60,13 @@ class Host(Declared):
 
 
 class HostsElement(Declared):
-    """The machines; the first one runs the core services. Left out: base, the machine 'up' is typed on."""
+    """The machines; the first one runs the core services. Left out: one host, base, on which 'up' is typed."""
 
     host: tuple[Host, ...] = ()
 
 
 class ServiceElement(Declared):
-    """One core service: nameserver, component_database, placer, dependency_database, rc_manager or creator."""
+    """A core service: nameserver, component_database, placer, dependency_database, rc_manager or creator."""
 
     type: Name = Field(description="Its component type.")
     host: Name = Field(default="", description="The host it runs on; left out: the first.")
@@ -74,25 +74,25 @@ class ServiceElement(Declared):
 
 
 class CoreElement(Declared):
-    """What is set of the core services.
+    """Settings of the core services.
 
-    Each runs without being written: creator on every host, the others on the first.
+    A core service that is left out runs, too: creator on every host, the others on the first.
     """
 
     service: tuple[ServiceElement, ...] = ()
 
 
 class NeedsElement(Declared):
-    """A kind of resource an ARC needs one of."""
+    """A kind of resource of which an ARC needs one."""
 
     type: Name = Field(description="The component type of that resource.")
     role: Name = Field(default="", description="Its role in the ARC; left out: named like the type.")
 
 
 class TypeElement(Declared):
-    """One component type; it takes the place of a shipped one of its name.
+    """A component type; it replaces a shipped type of the same name.
 
-    With needs inside it is an ARC, a set of resources claimed and given back as one.
+    A type with needs inside is an ARC, a set of resources that is claimed and released as a whole.
     """
 
     name: Name = Field(description="Name of the type, used wherever this file says type or kind.")
@@ -100,7 +100,7 @@ class TypeElement(Declared):
         alias="class", description="The Python class that runs it, written package.module:Class."
     )
     subsystem: Subsystem = Field(
-        description="Where its components belong: backbone, resource_pool, mission_control or ui_console."
+        description="Subsystem of its components: backbone, resource_pool, mission_control or ui_console."
     )
     multiplicity: Multiplicity = Field(
         default=MultiplicityWord.MANY, description="How many may run at the same time: one or many."
@@ -112,31 +112,31 @@ class TypeElement(Declared):
     restart: Flag = Field(
         default=True,
         description=(
-            "Whether it is started again however it ended, unless it was ordered to stop; false: its owner asks "
-            "for another one."
+            "Whether it is started again after any end, unless it was ordered to stop; false: its owner asks for "
+            "another one."
         ),
     )
     uses: Names = Field(
-        default=(), description="Types of resource that each resource of this type must be tied to by a uses element."
+        default=(), description="Types of resource: each resource of this type must name one of each by a uses element."
     )
     needs: tuple[NeedsElement, ...] = ()
 
 
 class TypesElement(Declared):
-    """The mission's own component types, besides those that the project brings along."""
+    """The mission's own component types, in addition to the shipped ones."""
 
     type: tuple[TypeElement, ...] = ()
 
 
 class UsesElement(Declared):
-    """Another resource this one only works with; several of one type are alternatives."""
+    """Another resource that this one needs to work; several of one type are alternatives."""
 
     type: Name = Field(description="Component type of the other resource.")
     name: Name = Field(description="Name of the other resource.")
 
 
 class ResourceElement(Declared):
-    """One physical resource."""
+    """A physical resource."""
 
     type: Name = Field(description="Component type of its resource controller.")
     name: Name = Field(description="Name of the resource and of its controller.")
@@ -150,12 +150,12 @@ class ResourceElement(Declared):
     connect_s: Seconds = Field(
         default=0.0,
         description=(
-            "Settling time: how long after the order to connect it can be used, tuning included; seconds, 0 or "
-            "more, at most a day."
+            "Settling time, from the order to connect until it can be used, tuning included; seconds, 0 or more, at "
+            "most a day."
         ),
     )
     disconnect_s: Seconds = Field(
-        default=0.0, description="Time it takes to let go, seconds, 0 or more, at most a day."
+        default=0.0, description="Time from the order to disconnect until it is free, seconds, 0 to a day."
     )
     driver: Driver = Field(
         default="simulated",
@@ -164,7 +164,7 @@ class ResourceElement(Declared):
             "by the mission's world."
         ),
     )
-    features: Names = Field(default=(), description="What it has, as names separated by blanks, for wishes (camera).")
+    features: Names = Field(default=(), description="Its features (camera), as names separated by blanks, for wishes.")
     process: Name = Field(
         default="",
         description="Name of the process it shares with all others of that name; all are on the host that any of them "
@@ -181,22 +181,22 @@ class ResourcesElement(Declared):
 
 
 class WishElement(Declared):
-    """Which resource the ARC should get for a role: by name, by features, or both. Roles without a wish: any."""
+    """The resource that an ARC should get for a role, by name, features, or both. A role without a wish gets any."""
 
     type: Name = Field(description="The role in the ARC: the type of resource, unless its needs element names a role.")
-    name: Name = Field(default="", description="Name of the resource wanted.")
+    name: Name = Field(default="", description="Name of the wanted resource.")
     features: Names = Field(default=(), description="Features it must have, as names separated by blanks.")
 
 
 class ArcAttributes(Declared):
-    """What is written in the tag of an ARC."""
+    """The attributes in the tag of an ARC."""
 
     kind: Name = Field(description="Component type of the ARC, one with needs.")
     minimum_runtime_s: Duration = Field(
         description="Shortest time in which the behavior can do something useful, seconds, above 0, at most a day."
     )
     maximum_runtime_s: Seconds = Field(
-        default=0.0, description="Where extensions of its time end, seconds, at least the minimum; 0: at the minimum."
+        default=0.0, description="Longest slice with all extensions, seconds, at least the minimum; 0: the minimum."
     )
     period_s: Duration = Field(
         default=0.05, description="Interval between its radio packets, seconds, above 0, at most a day."
@@ -211,13 +211,13 @@ class ArcAttributes(Declared):
 
 
 class ArcElement(ArcAttributes):
-    """The set of resources a behavior claims, for how long at a time, and how often it uses the radio."""
+    """The set of resources that a behavior claims, with its run times and its use of the radio."""
 
     wish: tuple[WishElement, ...] = ()
 
 
 class BehaviorAttributes(Declared):
-    """What is written in the tag of a behavior."""
+    """The attributes in the tag of a behavior."""
 
     type: Name = Field(description="Its component type, of subsystem mission_control.")
     name: Name = Field(description="Name of the behavior, unique in the mission.")
@@ -238,7 +238,7 @@ class BehaviorElement(BehaviorAttributes):
 
 
 class LastElement(Declared):
-    """The last branch: not started with the mission, but when it is ordered to end.
+    """The last branch of the behavior tree; it starts when the mission is ordered to end.
 
     Then consoles and all other behaviors are stopped, the hardware stays up, and the branch runs until it has finished
     or its time is over.
@@ -246,7 +246,7 @@ class LastElement(Declared):
 
     within_s: Duration = Field(
         default=60.0,
-        description="Its time from its start, seconds of the mission, above 0, at most a day; then the mission ends.",
+        description="Longest run of the branch, seconds of the mission, above 0, at most a day; then the mission ends.",
     )
     behavior: BehaviorElement
 

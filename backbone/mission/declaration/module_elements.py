@@ -26,21 +26,21 @@ from backbone.wire import MAX_LARGE_MESSAGE_BYTES
 
 
 class InputElement(Declared):
-    """An input of a module that is connected by another key than its class declares."""
+    """An input of a module, connected to another key than its class declares."""
 
     name: Name = Field(description="Name of the input in the module's class.")
-    key: Name = Field(description="Key of the output, or of what is given from outside, whose values it takes.")
+    key: Name = Field(description="Key of the output, or of the given values, that the input receives.")
 
 
 class OutputElement(Declared):
-    """An output of a module that has another key than its class declares."""
+    """An output of a module, published under another key than its class declares."""
 
     name: Name = Field(description="Name of the output in the module's class.")
     key: Name = Field(description="Its key, unique in the mission.")
 
 
 class ModuleElement(Declared):
-    """An algorithm with declared inputs and outputs; who takes what follows from keys and classes."""
+    """An algorithm with declared inputs and outputs; keys and classes determine its connections."""
 
     name: Name = Field(description="Name of the module, unique in the mission.")
     class_path: ClassPath = Field(
@@ -76,7 +76,7 @@ class UnitElement(Declared):
     on_input: OnInput = Field(
         default="any",
         description=(
-            "When an input from outside the unit begins a round: any of them, all of them since they last did, or none."
+            "When values from outside begin a round: each one (any), a new one for every input (all), or never (none)."
         ),
     )
     own_thread: Flag = Field(
@@ -102,9 +102,9 @@ class UnitElement(Declared):
 
 
 class GivenElement(Declared):
-    """Values that no module of the mission produces, but another component publishes."""
+    """Values that no module of the mission produces, because another component publishes them."""
 
-    key: Name = Field(description="The key by which modules take them.")
+    key: Name = Field(description="The key under which modules receive them.")
     class_path: ClassPath = Field(alias="class", description="Class of the values, written package.module:Class.")
     address: SourceAddress = Field(description="Address under which they are published, as subsystem/component.")
     conversation: Conversation = Field(
@@ -113,28 +113,28 @@ class GivenElement(Declared):
 
 
 class QualityElement(Declared):
-    """How the values of one key travel between units, where it is not as for all outputs.
+    """How the values of one key travel between units, if not by the defaults of all outputs.
 
-    An output that a unit publishes has all of it. What is given from outside has a deadline only, because another
-    component sends it.
+    All attributes apply to an output that a unit publishes. To given values only the deadline applies, because another
+    component sends them.
     """
 
-    key: Name = Field(description="The key of an output, or one that is given from outside.")
+    key: Name = Field(description="The key of an output, or of given values.")
     deadline_s: Seconds = Field(
         default=0.0,
-        description="A unit that takes the key from elsewhere says so when no value comes for so long, and when it "
-        "comes again; 0: never.",
+        description="A unit that receives the key from elsewhere logs when no value arrives for so long, and when the "
+        "values come again; 0: never.",
     )
     reliable: Flag = Field(
         default=False,
-        description="Whether a full queue is waited for, up to a second, instead of dropping the value there.",
+        description="Whether the sender waits for a full queue, up to a second, instead of dropping the value.",
     )
     urgency: Urgency = Field(
         default=UrgencyWord.NORMAL, description="The queue in which values wait: urgent, normal, low or lowest."
     )
     express: Flag = Field(
         default=False,
-        description="Whether each value leaves at once, for single small ones; of a burst more are dropped then.",
+        description="Whether each value is sent at once, for single small ones; it drops more values of a burst.",
     )
     most_bytes: MessageBytes = Field(
         default=MAX_LARGE_MESSAGE_BYTES,
@@ -143,7 +143,7 @@ class QualityElement(Declared):
 
 
 class ModulesElement(Declared):
-    """The execution units with their modules, and what comes to them from outside."""
+    """The execution units with their modules, and the values given from outside."""
 
     given: tuple[GivenElement, ...] = ()
     quality: tuple[QualityElement, ...] = ()

@@ -1,4 +1,4 @@
-"""Common base of all declared elements, and the element that several others hold."""
+"""Common base of all declared elements, and the element that several others contain."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from backbone.mission.declaration.values import ParameterName, Text
 
 
 def attribute_name(field: str) -> str:
-    """Return a field's name as mission files write it."""
+    """Return a field's name as written in mission files."""
     return field.replace("_", "-")
 
 
 class Declared(BaseModel):
     """An element of a mission file.
 
-    A field is an attribute, or if its type is another element, what stands inside; the order of the fields is the one
-    in which a person writes them. The docstring is the element's meaning, a field's description the attribute's.
+    A field is an attribute, or, if its type is another element, a child. The order of the fields is the usual order of
+    writing. The docstring is the element's meaning, a field's description the attribute's.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, alias_generator=attribute_name)

@@ -1,11 +1,11 @@
-"""Kinds of value an attribute can have, each with its range.
+"""Kinds of attribute values, each with its range.
 
 Rules of this file:
 
 * A kind reads the text of an attribute, as XML Schema would: decimals without exponent, ``true`` or ``1``, names
   separated by blanks. A value that has its type already passes, so that code can make the same objects.
-* ``kind`` is the name of the simple type in the XML schema; ``meaning`` is the remedy for a wrong value, where the
-  attribute's own description does not tell it.
+* ``kind`` is the name of the simple type in the XML schema; ``meaning`` is the remedy for a wrong value, if the
+  attribute's own description does not state it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _FLAGS = {"true": True, "1": True, "false": False, "0": False}
 
 
 def decimal(text: str) -> float | None:
-    """Return the number that a decimal is; None if the text is none."""
+    """Return the number; None if the text is not a decimal number."""
     return float(text) if _DECIMAL.fullmatch(text := text.strip(_BLANKS)) else None
 
 

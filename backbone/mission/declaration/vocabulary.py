@@ -1,7 +1,7 @@
-"""The declared elements as rules: what may stand where, what must, defaults, meanings.
+"""The declared elements as rules: allowed and required attributes and children, defaults, meanings.
 
-The rules are read from the JSON schema that pydantic makes of the declared classes, so that XML schema, reference page,
-editing and the designer's forms need know nothing of pydantic.
+The rules are read from the JSON schema that pydantic makes of the declared classes. So XML schema, reference page,
+editing and the designer's forms are independent of pydantic.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class AttributeRule:
     Attributes:
         kind: Its kind of value, see ``values``.
         required: Whether it must be given.
-        default: Its value where it is left out; None: none.
-        documentation: What it means, with unit and range.
+        default: Its value if it is left out; None: it has no default.
+        documentation: Its meaning, with unit and range.
         schema: The JSON schema of its values.
     """
 
@@ -40,7 +40,7 @@ class AttributeRule:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words it can be; none if it takes other values."""
+        """The words that it accepts; empty if it accepts other values."""
         return ("true", "false") if self.schema.get("type") == "boolean" else tuple(self.schema.get("enum", ()))
 
     @property
@@ -54,9 +54,9 @@ class ElementRule:
     """Declaration of an element.
 
     Attributes:
-        attributes: By name, in the order in which they are written.
-        children: Tag → how often it must stand in it at least, and may at most; in the order in which they are written.
-        documentation: What it means.
+        attributes: By name, in the usual order of writing.
+        children: Tag → fewest and most of these children; in the usual order of writing.
+        documentation: Its meaning.
     """
 
     attributes: dict[str, AttributeRule]
@@ -95,7 +95,7 @@ def _collect(tag: str, schema: Schema, definitions: Schema, found: dict[str, Ele
 
 
 def _resolved(schema: Schema, definitions: Schema) -> Schema:
-    """Return a schema without references and without the alternative that nothing is given."""
+    """Return a schema without references and without the alternative for an absent value."""
     if "anyOf" in schema:
         [one] = [each for each in schema["anyOf"] if each.get("type") != "null"]
         return {**_resolved(one, definitions), **{key: schema[key] for key in schema if key != "anyOf"}}
@@ -111,7 +111,7 @@ def _attribute(schema: Schema, *, is_required: bool) -> AttributeRule:
 
 
 def _text(default: object) -> str | None:
-    """Return a default as a mission file writes it; None if it says nothing."""
+    """Return a default as written in a mission file; None if there is none to write."""
     match default:
         case None | "" | [] | ():
             return None

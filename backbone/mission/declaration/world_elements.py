@@ -39,11 +39,11 @@ class RoomElement(Declared):
 
 
 class AirElement(Declared):
-    """What the air between the robots and the base does to pictures and command packets; left out: mild air."""
+    """Disturbances of pictures and packets on the air between robots and base; left out: the mild defaults."""
 
     noise: Scale = Field(
         default=0.1,
-        description="Scale of all five kinds of picture noise together, 0 to 10: 0 none, 1 as the papers tell.",
+        description="Scale of all five kinds of picture noise together, 0 to 10: 0 none, 1 as in the papers.",
     )
     white_noise: Scale = Field(
         default=1.0, description="Scale of the receiver's grain, 0 to 10; it grows with distance."
@@ -70,7 +70,7 @@ class AirElement(Declared):
     snow: Share = Field(default=1.0, description="Contrast of the noise on an unused frequency, 0 to 1.")
     radio_loss: Share = Field(default=0.0, description="Share of command packets lost at any distance, 0 to 1.")
     radio_delay_s: Share = Field(
-        default=0.002, description="From a packet's end on the air to the robot's having read it, seconds, 0 to 1."
+        default=0.002, description="Time from a packet's end on the air until the robot has read it, seconds, 0 to 1."
     )
     antenna_x_m: Coordinate | None = Field(
         default=None, description="The base's antenna along the room's width, meters; left out: the middle of the room."
@@ -114,7 +114,7 @@ class RampElement(Declared):
 
 
 class LandmarkElement(Declared):
-    """The home base's board with the four-blob target, which Scouts find their way to."""
+    """The home base's board with the four-blob target, to which Scouts navigate."""
 
     name: Name = Field(description="Name of the landmark, unique in the world.")
     x_m: Coordinate = Field(description="Middle of its face along the room's width, meters, inside the room.")
@@ -134,7 +134,7 @@ class DarkElement(Declared):
 
 
 class RobotElement(Declared):
-    """The body of a robot, and where it begins; its network id is the resource's."""
+    """The body of a robot, and its starting place; its network id is the resource's."""
 
     name: Name = Field(description="Name of the robot's resource.")
     x_m: Coordinate = Field(description="Middle of its axle along the room's width, meters, inside the room.")
@@ -150,7 +150,7 @@ class RobotElement(Declared):
     carried_by: Name = Field(
         default="",
         description=(
-            "The target of shape carrier that brings it and sets it down at this place; left out: it stands there."
+            "The target of shape carrier that brings it and sets it down here; left out: it is here from the beginning."
         ),
     )
     battery_j: Energy | None = Field(
@@ -170,13 +170,13 @@ class PointElement(Declared):
 
 
 class TargetElement(Declared):
-    """A body that walks its way points again and again."""
+    """A body that walks along its way points repeatedly."""
 
     name: Name = Field(description="Name of the target, unique in the world.")
     shape: Shape = Field(
         description=(
-            "What it looks like: pioneer, person, or carrier, which walks its way points once and sets down who "
-            "it brings."
+            "Its appearance: pioneer, person, or carrier, which walks along its way points once and sets down the "
+            "robots that it brings."
         )
     )
     speed_m_s: Speed = Field(description="Its speed in meters a second, above 0, at most 100.")

@@ -1,7 +1,8 @@
 """The XML schema of mission files, for editors and other tools; made from the declared elements.
 
-The schema accepts every good mission file. In one place it is more lenient than ``check``: XSD 1.0 cannot count two
-children that stand in any order beside repeated ones, so it counts the required one, or else the first.
+The schema accepts every valid mission file. In one place it is more lenient than ``check``: if two counted children may
+come in any order beside repeated ones, XSD 1.0 can count only one, so the schema counts the required one, or else the
+first.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def _attribute_begin(name: str, rule: AttributeRule) -> str:
 
 
 def _content(rule: ElementRule) -> list[str]:
-    """Return which children may stand in the element, in any order."""
+    """Return the content model of the element: its children may come in any order."""
     single = [tag for tag, (_least, most) in rule.children.items() if most == 1]
     repeated = [tag for tag in rule.children if tag not in single]
     if not rule.children:

@@ -1,6 +1,6 @@
-"""Answers: what can be asked about the schedule of one schedule manager.
+"""Answers: answers questions about the schedule of one schedule manager.
 
-Rule of this file: it reads, it never changes; what comes is played forward on a copy.
+Rule of this file: it reads and never changes; the future is played forward on a copy.
 """
 
 from __future__ import annotations
@@ -30,49 +30,49 @@ class Answers:
         """Answer about the schedule of this manager.
 
         Args:
-            manager: Nothing in it changes.
+            manager: The schedule manager; nothing in it changes.
         """
         self._manager = manager
         self._state = manager.master_schedule.state
         self._explanation = Explanation(manager.master_schedule, manager.rules, self._granted_s)
 
     def scheduled(self, arc: str, now_s: float) -> Scheduled:
-        """Return where the request of this ARC is.
+        """Return the state of this ARC's request.
 
         Raises:
-            UnknownRequest: It has none.
+            UnknownRequest: The ARC has no request.
         """
         if arc not in self._state.arcs:
             raise UnknownRequest(f"no request of {arc!r} is known", name=arc)
         return self._explanation.scheduled(self._state.arcs[arc], self._not_before(now_s))
 
     def schedule(self, now_s: float) -> Schedule:
-        """Return who holds what, who waits for whom, and until when."""
+        """Return the holders, the waiting ARCs with their blockers, and the times."""
         return self._explanation.schedule(self._not_before(now_s))
 
     def why(self, name: str, now_s: float) -> Why:
-        """Return why an ARC, an owner (name or address) or an RC is as it is.
+        """Return the reasons for the state of an ARC, an owner (name or address) or an RC.
 
         Raises:
-            UnknownRequest: There is none of this name.
+            UnknownRequest: No ARC, owner or RC has this name.
         """
         at_s = self._not_before(now_s)
         return msgspec.structs.replace(self._explanation.why(name, at_s), at_s=at_s)
 
     def attributes(self, name: str) -> Attributes:
-        """Return what an ARC, an owner (name or address), or all at and below a node ask for.
+        """Return the requests of an ARC, of an owner (name or address), or of a node and its descendants.
 
         Raises:
-            UnknownRequest: There is none of this name.
+            UnknownRequest: No ARC, owner or node has this name.
         """
         return attributes(self._state.arcs.values(), name, self._manager.tree.nodes)
 
     def _not_before(self, now_s: float) -> float:
-        """Return the time of the question; one before the last decision is answered as of that decision."""
+        """Return the time of the question, but not before the last decision."""
         return max(now_s, self._manager.decided_s)
 
     def _granted_s(self, arc: ArcEntry, now_s: float) -> float:
-        """Return when a waiting ARC is granted if nothing else happens, by playing a copy of the schedule forward.
+        """Return the time at which a waiting ARC is granted without further events, by playing a copy forward.
 
         Infinite: not within ``FORESEEN_S``.
         """
@@ -86,7 +86,7 @@ class Answers:
         return math.inf
 
     def _going_on(self, now_s: float) -> Rehearsal:
-        """Return a rehearsal of what comes; of the time to stop cleanly half is expected to be taken."""
+        """Return a rehearsal of the future; it assumes that processes use half of the time to stop cleanly."""
         under_way: list[tuple[float, Opened | Freed]] = []
         grace_s = self._manager.rules.grace_s
         for arc in self._state.arcs.values():

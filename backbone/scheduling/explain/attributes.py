@@ -1,6 +1,6 @@
-"""Attributes: run times, priorities and RCs of requests as they count now.
+"""Attributes: the present run times, priorities and RCs of requests.
 
-Rule of this file: it reads, it never changes.
+Rule of this file: it reads and never changes.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from backbone.scheduling.views import Attributes, RequestAttributes
 
 
 def attributes(arcs: Iterable[ArcEntry], name: str, way: Callable[[tuple[str, ...]], list[PathNode]]) -> Attributes:
-    """Return the requests of the ARC or owner of this name, or of all at and below the node of this name.
+    """Return the requests of the ARC or owner of this name, or of the node of this name and its descendants.
 
     Args:
-        arcs: All there are.
-        name: Of an ARC, of a decision process (name or address), or of a node of the behavior tree.
-        way: Names from the root to an owner → the same with their numbers.
+        arcs: All ARCs.
+        name: Name of an ARC, of a decision process (or its address), or of a node of the behavior tree.
+        way: Names from the root to an owner → the same nodes with their numbers.
 
     Raises:
-        UnknownRequest: The name fits none of them.
+        UnknownRequest: No ARC, owner or node has this name.
     """
     meant = [arc for arc in arcs if name in (arc.name, arc.request.owner, *_nodes(arc))]
     if not meant:

@@ -4,7 +4,7 @@ There are two questions. The plan names the *direct* blockers at once, for every
 schedule. *All* blockers include the ARCs that would come before the ARC if the direct ones were gone;
 this costs a plan for each of them, and is computed for one ARC on demand.
 
-Rule of this file: it errs towards naming one too many, never one too few.
+Rule of this file: in doubt it names one blocker too many, never one too few.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Blockers:
         """Answer for this schedule.
 
         Args:
-            schedule: Nothing in it changes.
+            schedule: The schedule; nothing in it changes.
         """
         self._schedule = schedule
         self._table = schedule.table
@@ -39,9 +39,9 @@ class Blockers:
         self._in_turns = schedule.state.fairness.discipline == "turns"
 
     def direct(self, slot: Slot, now_s: float) -> list[ArcEntry]:
-        """Return the ARCs that block the planned ARC now or have a reservation of its time, in order.
+        """Return the ARCs that block the planned ARC now or have a reservation in its time, in order.
 
-        In a large group: the ARCs that block it and the first ones in line before it.
+        In a large group: the ARCs that block it and those first in line before it.
         """
         arc, planner = slot.arc, self._schedule.planner_of(slot.arc)
         met = [*dict.fromkeys(other for other, _, _ in meeting(slot.against, now_s, now_s + arc.length_s))]
@@ -54,15 +54,15 @@ class Blockers:
         return alone or met
 
     def altogether(self, arc: ArcEntry, now_s: float, *, grace_s: float) -> list[ArcEntry]:
-        """Return ARCs without which this one starts as soon as its RCs are free, as few as the search finds.
+        """Return a set of ARCs without which this one starts as soon as its RCs are free; small, not always smallest.
 
-        If an RC of it is down or has too little capacity: the blockers once the RC is up and has enough.
+        If an RC of it is down or has too little capacity: the blockers after the RC is up and has enough.
 
         Args:
-            grace_s: Time a decision process has to stop cleanly at the end of a slice.
+            grace_s: Time that a decision process has to stop cleanly at the end of a slice.
 
         Returns:
-            In the order in which to remove them; none if only RCs settle or come free.
+            The ARCs in the order in which to remove them; empty if only RCs settle or become free.
         """
         held, rivals = self._holders_in_the_way(arc, now_s), self._rivals(arc)
         left = {*left_over(self._table, arc, [], [*held, *(one for one in rivals if one.touches & arc.touches)])}
@@ -109,7 +109,7 @@ class Blockers:
 
     def _stays(self, holder: ArcEntry, arc: ArcEntry, now_s: float) -> bool:
         if not self._in_turns and not rank(holder.path, arc.path):
-            return True  # the end of its slice for this one depends on more than time
+            return True  # whether its slice ends for this ARC depends on more than time
         return self._table.stands_until_s(holder, arc, now_s) > now_s + INSTANT_S
 
     def _rivals(self, arc: ArcEntry) -> list[ArcEntry]:
@@ -128,7 +128,7 @@ class Blockers:
         return [one for one in rivals if self._table.usable(one)]
 
     def _older_equals(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return equals that are behind the ARC only while one waits that is higher than they are."""
+        """Return equals that are behind the ARC only while an ARC waits that is higher than they are."""
         return [
             one
             for one in self._state.beside(arc)
@@ -149,7 +149,7 @@ class Blockers:
         now_s: float,
         grace_s: float,
     ) -> bool:
-        """Return whether the ARC would start after one hand-over if these were gone."""
+        """Return whether the ARC would start after one hand-over without these ARCs."""
         rest = [other for other in group if other not in gone]
         sharing = [other for other in rest if other is not arc and other.holds and other.touches & arc.touches]
         if any(self._stays(h, arc, now_s) and h.state in CONNECTED and not self._table.fits(arc, [h]) for h in sharing):
@@ -166,14 +166,14 @@ class Blockers:
             before = self._schedule.planner_of(arc).before(arc)
             overtaking = [one for one in order[: order.index(arc)] if starting and one not in before]
             if any(not self._table.fits(arc, [one]) for one in overtaking):
-                return False  # the ARC that held them back starts as well, and then they come before the ARC
+                return False  # the ARC that held them back starts as well, and then they precede the ARC
             others = [slot for slot in slots if self._table.strict and slot.start_s > now_s + INSTANT_S]
             if any(slot.arc is not arc and higher(slot.arc.path, arc.path) for slot in others):
                 return False
         return True
 
     def _fits_throughout(self, slot: Slot, start_s: float, end_s: float) -> bool:
-        """Return whether the ARC fits beside all ARCs of this span, but for those whose RCs are being freed."""
+        """Return whether the ARC fits beside all ARCs of this span, except those whose RCs are being freed."""
         met = [hold for hold in meeting(slot.against, start_s, end_s) if hold[0].state is not RequestState.REVOKING]
         reserved = [hold for hold in slot.against if hold[0].state is RequestState.REVOKING and hold[1] > start_s]
         met += meeting(reserved, start_s, end_s)

@@ -1,7 +1,7 @@
 """Explanation: the state of the master schedule in sentences, with the deciding rule.
 
-Rule of this file: it reads, it never changes; and it asks the plan that decides, so that its answers
-come true if no event comes between.
+Rule of this file: it reads and never changes. It uses the plan that also decides, so that its predictions come true
+if no event comes in between.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ class Explanation:
         """Explain this schedule.
 
         Args:
-            schedule: Nothing in it changes.
+            schedule: The schedule; nothing in it changes.
             rules: Rules of the decisions.
-            granted_s: Waiting ARC, time of the question → when it is granted, by playing the schedule forward;
-                infinite: not foreseeable.
+            granted_s: Returns when a waiting ARC is granted, by playing the schedule forward; arguments: ARC, time of
+                the question; infinite: not foreseeable.
         """
         self._granted_s = granted_s
         self._schedule = schedule
@@ -71,7 +71,7 @@ class Explanation:
     # Views.
 
     def scheduled(self, arc: ArcEntry, now_s: float) -> Scheduled:
-        """Return the place of one request."""
+        """Return the state of one request."""
         slot, granted_s = self._place(arc, now_s)
         return Scheduled(
             rcs=list(arc.uses),
@@ -147,7 +147,7 @@ class Explanation:
         """Return the reasons for an ARC, an owner or an RC.
 
         Raises:
-            UnknownRequest: There is none of this name.
+            UnknownRequest: No ARC, owner or RC has this name.
         """
         if name in self._state.arcs:
             arc = self._state.arcs[name]
@@ -159,10 +159,10 @@ class Explanation:
             return self._why_owner(name, owned, now_s)
         if name in self._state.rcs:
             return self._why_rc(self._state.rcs[name], now_s)
-        raise UnknownRequest(f"nothing named {name!r} asks for run time, and no RC is named so", name=name)
+        raise UnknownRequest(f"no ARC or owner named {name!r} asks for run time, and no RC has this name", name=name)
 
     def _why_owner(self, name: str, owned: Sequence[ArcEntry], now_s: float) -> Why:
-        """Return the reasons for all its ARCs; state and rule are those of the one that waits longest."""
+        """Return the reasons for all its ARCs; state and rule are those of the ARC that waits longest."""
         answers = [self._why_arc(arc, now_s) for arc in owned]
         first = min(answers, key=lambda why: (why.state != RequestState.WAITING, why.name))
         return Why(
@@ -333,7 +333,7 @@ class Explanation:
                 return "wants no time"
 
     def _place(self, arc: ArcEntry, now_s: float) -> tuple[Slot | None, float]:
-        """Return the place of the ARC in the plan, if it is queued, and its foreseen grant."""
+        """Return the place of the ARC in the plan, if it is queued, and its predicted grant."""
         if not arc.queued:
             return None, math.inf
         slots = self._schedule.planner_of(arc).slots_around(arc, now_s)
@@ -352,12 +352,12 @@ class Explanation:
 
 def _what_brings_back(rc: RcEntry) -> str:
     if rc.fault:
-        return f"it makes sense again; a restart helps: 'scout-backbone stop {rc.name}', then 'start {rc.kind}'"
+        return f"its report is credible again; a restart helps: 'scout-backbone stop {rc.name}', then 'start {rc.kind}'"
     return "its process answers again"
 
 
 def _expected_s(arc: ArcEntry, granted_s: float) -> float:
-    """Return when the next grant is foreseen; negative: it has one, or none can be foreseen."""
+    """Return the predicted time of the next grant; negative: it is granted already, or no grant is foreseeable."""
     if arc.state is RequestState.CONNECTING:
         return arc.began_s + arc.settle_s
     return granted_s if granted_s < math.inf else UNKNOWN_S

@@ -1,4 +1,4 @@
-"""Packet lines: what ARCs declared of their packets and what was measured, in words."""
+"""Packet lines: declared and measured packet times of ARCs, in words."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Start prediction: the next grants of waiting ARCs, hand-overs included.
 
-The plan is made of slices only: it decides which ARC may start, and a hand-over must not cost an ARC its gap.
-The prediction adds the time until the RCs of the ARC before are free.
+The plan consists of slices only, because it decides which ARC may start, and a hand-over must not cost an ARC its gap.
+The prediction adds the time until the RCs of the preceding ARC are free.
 
 Rule of this file: it predicts and decides nothing.
 """
@@ -27,8 +27,8 @@ class StartPrediction:
         """Predict for this schedule.
 
         Args:
-            schedule: Nothing in it changes.
-            rules: Rules of the decisions; half of the time to stop cleanly is expected to be taken.
+            schedule: The schedule; nothing in it changes.
+            rules: Rules of the decisions; the prediction assumes that half of the time to stop cleanly is used.
         """
         self._schedule = schedule
         self._table = schedule.table
@@ -36,7 +36,7 @@ class StartPrediction:
         self._rules = rules
 
     def grants_s(self, slots: Sequence[Slot], now_s: float) -> dict[ArcEntry, float]:
-        """Return when each of these will be granted if no event comes; infinite: not foreseeable.
+        """Return the time of each grant if no event comes; infinite: not foreseeable.
 
         Args:
             slots: Places of all queued ARCs of a group, in order.
@@ -52,7 +52,7 @@ class StartPrediction:
         return {arc: start_s + arc.settle_s for arc, start_s in starts_s.items()}
 
     def _frees_s(self, slot: Slot, starts_s: dict[ArcEntry, float], now_s: float) -> list[float]:
-        """Return when the RCs that the ARC waits for will be free."""
+        """Return the times at which the RCs that the ARC waits for will be free."""
         arc = slot.arc
         times_s = []
         for other, begin_s, end_s in slot.against:
@@ -89,7 +89,7 @@ class StartPrediction:
                 above.add(slot.arc.path, starts_s[slot.arc])
 
     def _beside_reserved_s(self, slot: Slot, start_s: float) -> float:
-        """Return the first time from then on at which the reservations of others leave room for the ARC."""
+        """Return the first time from ``start_s`` on at which the reservations of others leave room for the ARC."""
         for other, begin_s, end_s in sorted(slot.against, key=lambda hold: hold[1]):
             meets = (
                 begin_s < start_s + slot.arc.length_s and end_s > start_s and not self._table.fits(slot.arc, [other])

@@ -230,14 +230,14 @@ def test_line_breaks_inside_a_value_do_not_move_with_it() -> None:
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda: add(SMALL, (0,), NewElement("behavior")), "In <hosts> may stand: <host>"),
+        (lambda: add(SMALL, (0,), NewElement("behavior")), "<hosts> may contain: <host>"),
         (lambda: add(SMALL, (0, 0), NewElement("host")), "has no elements inside"),
         (lambda: add(SMALL, (), NewElement("hosts")), "has its <hosts> already"),
         (lambda: add(SMALL, (0,), NewElement("host", {"color": "red"})), "Its attributes: name, address, tags, port"),
         (lambda: add(SMALL, (0,), NewElement("host", {}, [NewElement("host")])), "does not belong"),
         (lambda: set_attribute(SMALL, (0,), "name", "x"), "no attribute"),
-        (lambda: set_attribute(SMALL, (0, 0), "name", "\x00"), "cannot stand in XML"),
-        (lambda: set_attribute(SMALL, (0, 0), "name", "\ud800"), "cannot stand in XML"),
+        (lambda: set_attribute(SMALL, (0, 0), "name", "\x00"), "is not allowed in XML"),
+        (lambda: set_attribute(SMALL, (0, 0), "name", "\ud800"), "is not allowed in XML"),
         (lambda: set_attribute(SMALL, (0, 0), "name", "x" * MAX_BYTES), "Split the mission"),
         (lambda: set_attribute(SMALL, (9, 9), "name", "x"), "no element stands at 9/9"),
         (lambda: remove(SMALL, ()), "cannot be removed"),

@@ -95,7 +95,7 @@ def test_an_rc_that_talks_nonsense_is_put_aside_alone_and_comes_back(
             assert two.is_open
             reasons = await why(here, "video")
             assert reasons.state == "down"
-            assert f"put aside: it says that it saw epoch {2**64 - 1}" in reasons.lines[0]
+            assert f"put aside: it reports epoch {2**64 - 1}" in reasons.lines[0]
             assert "put aside" in (await why(here, "one")).lines[0]
             waits: Scheduled = await three.ask_for(request("three", "video"))
             assert waits.state is RequestState.WAITING

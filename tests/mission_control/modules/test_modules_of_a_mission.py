@@ -211,7 +211,7 @@ def test_a_module_that_cannot_be_imported_is_a_fault_at_its_class(
     [broken] = faults(tmp_path, mission(unit("one", module("broken", "broken_module:Broken"))))
     assert broken == "5:23 broken_module:Broken: RuntimeError: being written"
     [dying] = faults(tmp_path, mission(unit("one", module("dying", "dying_module:Dying"))))
-    assert "the modules' classes tell nothing" in dying
+    assert "the modules' classes cannot be asked" in dying
 
 
 def test_an_execution_unit_is_no_behavior(tmp_path: Path) -> None:
