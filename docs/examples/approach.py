@@ -1,9 +1,9 @@
-"""Six modules from a picture to an alarm: somebody comes towards a camera that stands still.
+"""Six modules that raise an alarm if a person comes towards a camera that stands still.
 
 picture → PictureAverage → PictureDifference → RegionFinder → RegionVote → GrowthEstimator → ApproachAlarm → alarm
 
-What they exchange are messages, and each value follows from the values before it alone. So any of them can be in any
-unit, process or host, and they say the same: docs/how-to/arrange-modules.md.
+The modules exchange messages, and each value depends only on the values before it. So each module can be in any unit,
+process or host, and the outputs are the same: docs/how-to/arrange-modules.md.
 """
 
 from collections import deque
@@ -37,7 +37,7 @@ class Found(Message, frozen=True):
 class Growing(Message, frozen=True):
     captured_s: Instant
     robot: Mention
-    growth_hz: Growth  # at 0.5 a body that comes on at one speed is there after 2 s; negative: it goes away
+    growth_hz: Growth  # at 0.5 a body at constant speed arrives after 2 s; negative: it moves away
 
 
 class Alarm(Message, frozen=True):
@@ -48,7 +48,7 @@ class Alarm(Message, frozen=True):
 
 
 class PictureAverage(Module):
-    """The mean of the last pictures, at half their size: noise gets less."""
+    """The mean of the last pictures, at half their size, which reduces noise."""
 
     class Inputs(Module.Inputs):
         picture: GreyPicture
@@ -73,7 +73,7 @@ class PictureAverage(Module):
 
 
 class PictureDifference(Module):
-    """How far each picture is from an earlier one."""
+    """The difference of each picture from an earlier one."""
 
     class Inputs(Module.Inputs):
         average: GreyPicture
@@ -100,7 +100,7 @@ class PictureDifference(Module):
 
 
 class RegionFinder(Module):
-    """The largest region that differs by more than noise does."""
+    """The largest region whose difference exceeds the noise."""
 
     class Inputs(Module.Inputs):
         difference: GreyPicture
@@ -120,7 +120,7 @@ class RegionFinder(Module):
 
 
 class RegionVote(Module):
-    """The region, where several of the last pictures had one; a watching behavior takes ``judged`` as its vision."""
+    """The region, if several of the last pictures had one; a watching behavior uses ``judged`` as its vision."""
 
     class Inputs(Module.Inputs):
         found: Found
@@ -141,7 +141,7 @@ class RegionVote(Module):
 
 
 class GrowthEstimator(Module):
-    """How fast the region grows: the slope of a line through the logarithms of its last heights."""
+    """The growth rate of the region: the slope of a line through the logarithms of its last heights."""
 
     class Inputs(Module.Inputs):
         certain: Found
@@ -171,7 +171,7 @@ class GrowthEstimator(Module):
 
 
 class ApproachAlarm(Module):
-    """On as long as most of the last estimates say that somebody comes."""
+    """The alarm is on as long as most of the last estimates show an approach."""
 
     class Inputs(Module.Inputs):
         growing: Growing

@@ -1,4 +1,4 @@
-"""Two modules that talk: one makes waves, the other smooths it.  python docs/examples/pair.py"""
+"""Two connected modules: one makes a wave, the other smooths it.  python docs/examples/pair.py"""
 
 from backbone.wire import Message
 from mission_control.modules.module import Module

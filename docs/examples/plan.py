@@ -1,4 +1,4 @@
-"""A planner that thinks for seconds, and a follower that acts twenty times a second on the newest plan."""
+"""A planner that computes for seconds, and a follower that acts twenty times a second on the newest plan."""
 
 from typing import Annotated
 
@@ -22,7 +22,7 @@ class Plan(Message, frozen=True):
 
 
 class Planner(Module):
-    """Deliberative: works out the length of the way from each cell to the goal, until nothing changes any more."""
+    """Deliberative: computes the length of the way from each cell to the goal, until no length changes any more."""
 
     class Inputs(Module.Inputs):
         place: Annotated[Place, LATEST] = Place(*START)
@@ -46,7 +46,7 @@ class Planner(Module):
 
 
 class Follower(Module):
-    """Reactive: a step towards the next cell of the newest plan in each round; without a plan it stays."""
+    """Reactive: makes a step towards the next cell of the newest plan in each round; without a plan it stays."""
 
     class Inputs(Module.Inputs):
         plan: Annotated[Plan | None, LATEST] = None

@@ -1,4 +1,4 @@
-"""Follows the ball, also through pictures in which it is hidden."""
+"""Tracks the ball, also through pictures in which it is hidden."""
 
 from mission_control.modules.module import Module
 from red_ball.messages import Ball, ColorPicture, Spot
@@ -35,7 +35,7 @@ class BallTracker(Module):
         last = self.ball
         if last is None:
             return Ball(spot.x_px, spot.y_px, 0.0, 0.0, 0)
-        past = last.pictures_ago + 1  # the place was foreseen for all but one of them
+        past = last.pictures_ago + 1  # the place was predicted for all of them but one
         x_px_a_picture = last.x_px_a_picture + (spot.x_px - last.x_px - last.x_px_a_picture) / past
         y_px_a_picture = last.y_px_a_picture + (spot.y_px - last.y_px - last.y_px_a_picture) / past
         return Ball(spot.x_px, spot.y_px, x_px_a_picture, y_px_a_picture, 0)

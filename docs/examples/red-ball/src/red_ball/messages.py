@@ -1,4 +1,4 @@
-"""What the modules say to each other."""
+"""The messages between the modules."""
 
 from backbone.ranges import Pixels
 from backbone.wire import Message
@@ -23,11 +23,11 @@ class Spot(Message, frozen=True):
 
 
 class Ball(Message, frozen=True):
-    """Where the ball is, and how far it moves from picture to picture."""
+    """The place of the ball, and its motion from picture to picture."""
 
     x_px: float
     y_px: float
     x_px_a_picture: float
     y_px_a_picture: float
     pictures_ago: int
-    """How old the newest spot is; 0: this picture has one."""
+    """Age of the newest spot in pictures; 0: this picture has a spot."""

@@ -1,4 +1,4 @@
-"""Pictures of a red ball that rolls over a grey table and comes in again on the left."""
+"""Pictures of a red ball that rolls over a grey table and enters again on the left."""
 
 import numpy as np
 
