@@ -23,8 +23,8 @@ from typing import Generic, TypeVar
 
 import msgspec
 
-from backbone.errors import Refusal
-from backbone.exchange_course import UNPROVED, complaint
+from backbone.errors import Refusal, complaint
+from backbone.exchange_course import UNPROVED
 
 T = TypeVar("T")
 

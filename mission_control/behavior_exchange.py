@@ -22,14 +22,13 @@ from functools import partial
 import msgspec
 
 from backbone.component.log_level import LogLevel
-from backbone.errors import LinkError, Refusal
+from backbone.errors import LinkError, Refusal, complaint
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
 from backbone.exchange_course import (
     ExchangeCourse,
     ExchangePhase,
     ExchangeRules,
     class_path_of,
-    complaint,
     remark_on_file,
 )
 from backbone.launcher.messages import TakeBranch

@@ -22,7 +22,7 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.log_level import LogLevel
 from backbone.component.messages import WrongParameter
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
 from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
 from backbone.exchange_course import (
     UNPROVED,
@@ -30,7 +30,6 @@ from backbone.exchange_course import (
     ExchangePhase,
     ExchangeRules,
     class_path_of,
-    complaint,
     hand_over,
     remark_on_file,
 )

@@ -19,11 +19,14 @@ from backbone.component.component import AnyComponent
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
-from backbone.errors import BackboneError, Refusal, code_of, revive
+from backbone.errors import BackboneError, Refusal, code_of, complaint, revive
+from backbone.printable_text import printable
 from backbone.waiting import end_tasks
 
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
 _REFUSED = "%s ended, refused [%s]: %s (remedy: %s)"
+MOST_CAUSE = 300  # chosen: exception, place and a sentence; it is shown in one line beside other facts
+_CAUSE_LINE = re.compile(r" (\S+) ended(?: by a bug:|, refused \[\S+\]:|: \w+:) (.*)$")
 _REFUSED_LINE = re.compile(r" (\S+) ended, refused \[([^]]+)\]: (.*) \(remedy: (.*)\)$")
 
 
@@ -71,7 +74,7 @@ def exit_code_of(error: BaseException, address: str) -> int:
             log.error("%s ended: %s: %s", address, type(error).__name__, error)
             return EXIT_NO_HUB
         case _:
-            log.error("%s ended by a bug", address, exc_info=error)
+            log.error("%s ended by a bug: %s", address, printable(complaint(error), MOST_CAUSE), exc_info=error)
             return EXIT_BUG
 
 
@@ -93,6 +96,17 @@ def refusal_in_log(lines: Iterable[str], address: str) -> Refusal | None:
         if found is not None and found[1] == address:
             refusal = revive(found[2], found[3], found[4], {})
     return refusal
+
+
+def cause_in_log(lines: Iterable[str], address: str) -> str:
+    """Return why a component ended last, as ``exit_code_of`` logged it; empty: the log does not say.
+
+    Example:
+        >>> cause_in_log(["12:00 ERROR x: rc/x ended by a bug: ValueError: no picture"], "rc/x")
+        'ValueError: no picture'
+    """
+    found = [match for match in map(_CAUSE_LINE.search, lines) if match is not None and match[1] == address]
+    return printable(found[-1][2], MOST_CAUSE) if found else ""
 
 
 async def _live(component_class: type[AnyComponent], launch: Launch) -> None:

@@ -25,6 +25,7 @@ from backbone.component.membership import (
 )
 from backbone.creator.alarm import Alarm
 from backbone.creator.decisions import Instruction
+from backbone.creator.failed_starts import cause_of_end
 from backbone.creator.shared_processes import (
     AdmitMember,
     EndMemberAlone,
@@ -168,7 +169,8 @@ class SharedProcessKeeper:
         ended = await ask_until_answered(
             bus, self._clock, at, AwaitEnd(life), MemberEnded, each_s=AWAIT_EACH_S, within_s=math.inf
         )
-        self._carry_out(self._shared.member_ended(life, ended.exit_code, self._now_s()))
+        cause = cause_of_end(launch, ended.exit_code)
+        self._carry_out(self._shared.member_ended(life, ended.exit_code, self._now_s(), cause))
 
     async def _end_member(self, bus: Bus, at: str, life: int) -> None:
         try:

@@ -10,9 +10,9 @@ import msgspec
 
 from backbone.component.component import Component
 from backbone.component.log_level import LogLevel
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
-from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, complaint, remark_on_file
+from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, remark_on_file
 from backbone.naming import did_you_mean
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start

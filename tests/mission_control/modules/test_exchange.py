@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_modules import Number
 
-from backbone.exchange_course import ExchangePhase, ExchangeRules, complaint
+from backbone.errors import complaint
+from backbone.exchange_course import ExchangePhase, ExchangeRules
 from mission_control.modules.exchange import Exchange, Turned, handed_over
 from mission_control.modules.exchangeable import judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
