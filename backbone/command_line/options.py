@@ -85,13 +85,17 @@ def _name_of(command: CommandInfo | TyperInfo) -> str:
 
 def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
     for parameter in parameters:
-        parameter.process_value = partial(_processed, parameter.process_value, parameter.required)
+        parameter.process_value = partial(_processed, parameter, parameter.process_value)
 
 
-def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: object) -> Any:
+def _processed(parameter: Any, process_value: Callable[[Any, Any], Any], ctx: Any, value: object) -> Any:
     """Return the value as the command gets it; an absent optional value, or one beside completions, stays as it is."""
-    is_absent = value is None and not is_required
-    return value if is_absent or ctx.resilient_parsing else process_value(ctx, value)
+    if (value is None and not parameter.required) or ctx.resilient_parsing:
+        return value
+    given = process_value(ctx, value)
+    if isinstance(given, float) and not math.isfinite(given):  # no range refuses NaN, and some have no upper end
+        raise typer.BadParameter(f"{given} is no finite number; see the range in --help", ctx, parameter)
+    return given
 
 
 def _first_paragraph(text: str) -> str:
@@ -238,13 +242,6 @@ NameOrCause = Annotated[
 ]
 ComponentName = Annotated[str, typer.Argument(autocompletion=complete_name, help="A component of the mission.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-
-
-def finite(value: float | None) -> float | None:
-    """Refuse NaN, which no range refuses; for options with a range."""
-    if value is not None and not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
-    return value
 
 
 def named_value(given: str) -> tuple[str, object]:
