@@ -21,6 +21,7 @@ from typer.main import get_command_name
 from typer.models import CommandInfo, TyperInfo
 
 from backbone import __version__
+from backbone.command_line.standard_streams import standard_streams
 from backbone.command_line.where import Where
 from backbone.errors import BackboneError
 from backbone.launcher.endings import ExitCode
@@ -64,10 +65,11 @@ def run_table(table: typer.Typer) -> None:
     if named in [["--version"], *([_name_of(each)] for commands in tables for each in commands)]:
         for commands in tables:
             commands[:] = [each for each in commands if [_name_of(each)] == named]
-    try:
-        table()
-    except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
+    with standard_streams():
+        try:
+            table()
+        except KeyboardInterrupt:
+            sys.exit(ExitCode.INTERRUPTED)
 
 
 def _words_before_the_cursor() -> list[str]:
