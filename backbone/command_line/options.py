@@ -258,5 +258,5 @@ def json_or_text(text: str) -> object:
     """Return the value of a text that is JSON; any other text as it is."""
     try:
         return json.loads(text)
-    except json.JSONDecodeError:
+    except (json.JSONDecodeError, RecursionError):
         return text

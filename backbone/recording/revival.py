@@ -37,7 +37,7 @@ def revived(kind: type[Kind], body: dict[str, Any] | list[Any]) -> Kind:
     try:
         listed = body if isinstance(body, list) else _listed_struct(kind, body)
         return msgspec.json.decode(msgspec.json.encode(listed), type=kind)
-    except (msgspec.DecodeError, LookupError, TypeError, AttributeError) as error:
+    except (msgspec.DecodeError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise OtherForm(f"{schema_of(kind)}: {error}") from error
 
 
@@ -74,7 +74,10 @@ def message_from(classes: Mapping[str, type[Message]], said: object) -> Message:
         known = ", ".join(sorted(fields)) or "no fields"
         told = f"{schema_of(kind)} has no field {unknown!r}{did_you_mean(unknown, fields)}; it has {known}"
         raise OtherForm(told, remedy=WRITE_ONE)
-    return revived(kind, said)
+    try:
+        return revived(kind, said)
+    except OtherForm as error:
+        raise OtherForm(error.detail, remedy=WRITE_ONE) from error
 
 
 def _listed(kind: inspect.Type, value: Any) -> Any:
