@@ -34,7 +34,7 @@ from backbone.exchange_course import (
 from backbone.launcher.messages import TakeBranch
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
-from backbone.reading_anew import ReadAnew, WrongClass
+from backbone.reading_anew import ReadAnew, WrongClass, read_anew
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message
 from mission_control.implementation import (
@@ -198,7 +198,7 @@ class BehaviorExchanges:
     async def _swap(self, asked: SwapClass) -> Swapped:
         old = self.present
         check_exchangeable(old)
-        anew = await asyncio.to_thread(ReadAnew, asked.class_path, self._load)  # it acts on while its file is imported
+        anew = await read_anew(asked.class_path, self._load)  # it acts on while its file is imported
         try:
             new = made_beside(old, asked, anew.kind)
         except Refusal:

@@ -35,7 +35,7 @@ from backbone.exchange_course import (
 )
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
-from backbone.reading_anew import ReadAnew, WrongClass
+from backbone.reading_anew import WrongClass, read_anew
 from backbone.waiting import set_within
 from resource_pool.driver_slot import DriverSlot, methods_of
 from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions, driver_class, driver_path
@@ -165,7 +165,7 @@ class DriverExchanges:
 
     async def _swap(self, asked: SwapClass, slot: DriverSlot) -> Swapped:
         path = driver_path(self._rc.driver_kind, asked.class_path, self._rc.name)
-        anew = await asyncio.to_thread(ReadAnew, path, lambda named: driver_class(named, self._rc.name))
+        anew = await read_anew(path, lambda named: driver_class(named, self._rc.name))
         try:
             going = self._going = self._made(asked, slot, anew.kind)
         except Refusal:
