@@ -44,7 +44,7 @@ from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.host_ear import HostEar
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import Recording, missing_numbers
+from backbone.recording.reader import Recording, missing_numbers, open_file
 from backbone.recording.recorder import Recorder
 from backbone.recording.recovering import recover_file
 from backbone.recording.revival import revived
@@ -336,7 +336,7 @@ def opened(path: Path) -> Iterator[Recording]:
         NoRecording: It is none, or its recorder was killed.
     """
     try:
-        file = path.open("rb")
+        file = open_file(path)
     except OSError as error:
         raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
     with file:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import IO, Any
 
 import msgspec
@@ -200,6 +202,17 @@ class Recording:
             raise NoRecording(f"the recording is damaged: {error}") from error
 
 
+def open_file(path: Path) -> IO[bytes]:
+    """Open the file of a recording for reading.
+
+    Raises:
+        OSError: It cannot be read; or it is a pipe or a device, which would be waited for, and has no end to begin at.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError(errno.ESPIPE, "it is no regular file", str(path))
+    return path.open("rb")
+
+
 def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
     """Return sender → how many of its messages are missing between its first and its last, for those that lack any.
 
@@ -221,7 +234,9 @@ def check_index(file: IO[bytes]) -> None:
         ValueError: It is not, or the file has no end.
     """
     end = file.seek(0, os.SEEK_END) - _END.size
-    file.seek(max(0, end))
+    if end < 0:
+        raise ValueError("it is too short")
+    file.seek(end)
     footer = file.read(_END.size)
     _operation, _length, begin, _offsets, checksum = _END.unpack(footer)
     if not 0 < begin <= end:

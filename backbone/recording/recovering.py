@@ -14,7 +14,7 @@ from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 
-from backbone.recording.reader import DAMAGED, MOST_RECORD_BYTES, NoRecording, NotOfMessages, check_index
+from backbone.recording.reader import DAMAGED, MOST_RECORD_BYTES, NoRecording, NotOfMessages, check_index, open_file
 from backbone.recording.writer import CHUNK_BYTES, PROFILE
 
 
@@ -98,7 +98,7 @@ def recover_file(path: Path, to: Path) -> Recovered:
         FileExistsError: The new file exists.
         OSError: One of them cannot be opened, or there is no room for the new one.
     """
-    with path.open("rb") as damaged, to.open("xb") as made:
+    with open_file(path) as damaged, to.open("xb") as made:
         try:
             return recover(damaged, made)
         except BaseException:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
@@ -16,7 +18,7 @@ from backbone.bus.interface import Copies, Told
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.recording.hearing import is_meant
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import NoRecording, Recorded, Recording
+from backbone.recording.reader import NoRecording, Recorded, Recording, open_file
 from backbone.recording.recovering import recover, recover_file
 from backbone.recording.revival import revived
 from backbone.recording.writer import RecordingWriter
@@ -142,6 +144,17 @@ def test_a_damaged_chunk_costs_its_own_messages_alone(at: int) -> None:
     broken[chunks[at] + 100] ^= 1
     assert recover(io.BytesIO(broken), made) == (4, 1)
     assert [one.sequence for one in read(made.getvalue())] == [n for n in range(6) if n // 2 != at]
+
+
+@pytest.mark.parametrize(
+    "use", [open_file, lambda path: recover_file(path, path.with_name("whole"))], ids=["open", "recover"]
+)
+def test_a_pipe_is_refused_and_not_waited_for(use: Callable[[Path], object], tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.mcap"
+    os.mkfifo(pipe)
+    with pytest.raises(OSError, match="no regular file"):
+        use(pipe)
+    assert not pipe.with_name("whole").exists()
 
 
 def test_what_cannot_be_recovered_leaves_no_file(tmp_path: Path) -> None:
