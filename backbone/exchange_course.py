@@ -22,7 +22,7 @@ from backbone.errors import complaint
 from backbone.exchange import Swapped
 
 T = TypeVar("T")
-UNPROVED = (Exception, SystemExit)
+UNPROVED = (Exception, SystemExit, KeyboardInterrupt)
 """What code that has not proved itself may raise without an end of the component."""
 
 

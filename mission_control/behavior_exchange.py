@@ -279,5 +279,5 @@ async def _survived(life: Coroutine[object, None, None]) -> None:
     """Live; an exit that the class asks for is its failure, and not the end of the process."""
     try:
         await life
-    except SystemExit as error:
+    except (SystemExit, KeyboardInterrupt) as error:
         raise WrongClass(complaint(error)) from error

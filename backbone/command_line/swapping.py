@@ -10,7 +10,7 @@ from backbone.bus.interface import Bus
 from backbone.command_line.connection import connected
 from backbone.command_line.where import Where
 from backbone.component.messages import AskParameters, AskState, ComponentState, Parameters
-from backbone.errors import LinkError, Refusal
+from backbone.errors import LinkError, OutcomeUnknown, Refusal
 from backbone.exchange import NotExchanged, Silent, SwapClass, SwapModule, Swapped, UnknownModule
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission.tables import EXECUTION_UNIT
@@ -32,7 +32,7 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
         UnknownModule: Nothing of the mission that can be exchanged has this name.
         Silent: What has this name does not answer; nothing was changed.
         Refusal: The new one cannot take the place; nothing was changed.
-        LinkError: It did not answer; the outcome is unknown.
+        OutcomeUnknown: It did not answer.
     """
     async with connected(where) as (bus, clock):
         at, question = await _question(bus, asked)
@@ -44,6 +44,9 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
             raise NotExchanged(
                 f"{asked.module} is no module, behavior or resource", remedy="See 'scout-backbone status' for these."
             ) from None
+        except LinkError as error:
+            told = f"{component_of(at)} ended or hung while it exchanged {asked.module}: {error}"
+            raise OutcomeUnknown(told, remedy=f"See 'scout-backbone why {component_of(at)}', and 'log'.") from error
     counts = "round" if question is asked else "command" if at.startswith(f"{Subsystem.MISSION_CONTROL}/") else "call"
     show([_told(asked, swapped, counts)])
     if swapped.remark:
