@@ -21,11 +21,11 @@ def last_lines(run_directory: str, name: str) -> list[str]:
     return _end_of_log(run_directory, name)[-LAST_LINES:]
 
 
-def cause_of_end(launch: Launch | None, returncode: int) -> str:
+def cause_of_end(launch: Launch | None, pid: int, returncode: int) -> str:
     """Return the bug or the refusal that ended a component; empty: another end, or its log does not say."""
     if launch is None or not launch.run_directory or returncode not in _LOGGED:
         return ""
-    return cause_in_log(_end_of_log(launch.run_directory, launch.process or launch.name), launch.address)
+    return cause_in_log(_end_of_log(launch.run_directory, launch.process or launch.name), launch.address, pid)
 
 
 def _end_of_log(run_directory: str, name: str) -> list[str]:

@@ -299,7 +299,7 @@ class ProcessKeeper:
             forget_heartbeat(next(iter(self._kept.values())).launch.run_directory, pid)
         if not self._shared.has(pid):
             name = next((one.name for one in self._supervision if one.pid == pid), "")
-            cause = cause_of_end(self._kept.launch_of(name), returncode)
+            cause = cause_of_end(self._kept.launch_of(name), pid, returncode)
             self._carry_out(self._supervision.exited(pid, returncode, self._now_s(), cause))
             return
         self._shared.exited(pid, returncode)

@@ -333,8 +333,9 @@ def test_who_falls_says_the_bug_that_its_log_ends_with(on_bench: Callable, tmp_p
         started = msgspec.structs.replace(launch("Failing", "failing"), run_directory=str(tmp_path))
         path = log_path(str(tmp_path), "failing")
         path.parent.mkdir()
-        bug = "12:00 ERROR failing x: resource_pool/failing ended by a bug: ValueError: no picture (pair.py, line 7)"
-        path.write_text("\n".join([bug, "Traceback (most recent call last):", *["  a frame"] * LAST_LINES, ""]))
+        told = "12:00 ERROR x: process {}: resource_pool/failing ended by a bug: {}"
+        bug, older = told.format(FIRST_PID, "ValueError: no picture (pair.py, line 7)"), told.format(7, "KeyError: 'a'")
+        path.write_text("\n".join([bug, older, "Traceback (most recent call last):", *["  a frame"] * LAST_LINES, ""]))
         await bench.keeper.start(started, POLICY, 5.0)
         bench.bus.publish("resource_pool/failing", Conversation.COMMAND, Stop("now"))
         await VirtualClock().sleep_s(0.05)
