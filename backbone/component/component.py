@@ -35,6 +35,7 @@ from backbone.component.messages import (
 )
 from backbone.component.name_claim import claim_name
 from backbone.component.story import StoryBook, complaint
+from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
 from backbone.waiting import first_of
@@ -298,7 +299,7 @@ class Component(Generic[P_co]):
             LinkError: No nameserver answered within ``REGISTER_WITHIN_S``.
             BaseException: The bug that ended the component.
         """
-        self.bus.on_bug = self.fail
+        self.bus.on_bug, self.bus.on_unreadable = self.fail, UnreadableKeys(self).tell
         try:
             if await self._unless_ended(self._claim_name(), "claim"):
                 await self._live_and_report_end()
