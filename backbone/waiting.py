@@ -49,6 +49,15 @@ async def end_tasks(*tasks: asyncio.Future[Any]) -> None:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
+def bug_of(task: asyncio.Task[Any]) -> BaseException | None:
+    """Return the bug that ended a task; a ``CancelledError`` is one if nobody cancelled it."""
+    if not task.cancelled():
+        return task.exception()
+    return (
+        None if task.cancelling() else RuntimeError(f"{task.get_name()} raised CancelledError, and nobody cancelled it")
+    )
+
+
 def settle(future: asyncio.Future[Any], outcome: object) -> None:
     """Set the result of the future, or the exception, unless it is done: who waited may have been cancelled."""
     if future.done():

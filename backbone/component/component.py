@@ -38,7 +38,7 @@ from backbone.component.story import StoryBook, complaint
 from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
-from backbone.waiting import first_of
+from backbone.waiting import bug_of, first_of
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
@@ -358,7 +358,7 @@ class Component(Generic[P_co]):
 
     def _task_ended(self, task: asyncio.Task[None]) -> None:
         self._tasks.pop(task, None)
-        if not task.cancelled() and (bug := task.exception()) is not None:
+        if (bug := bug_of(task)) is not None:
             self._group = None  # the group is ending and must get no new tasks
             self.fail(bug)
 
