@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import msgspec
@@ -12,7 +13,7 @@ from backbone.errors import Refusal
 from backbone.naming import did_you_mean
 from backbone.recording.json_schema import TAG, fields_of
 from backbone.recording.reader import Recorded
-from backbone.wire import Message, schema_of
+from backbone.wire import Message, plain, schema_of
 
 WRITE_ONE = 'Write an object like {"schema": "Halt", "epoch": 3}; "watch KEY --json" shows messages with their fields.'
 Kind = TypeVar("Kind", bound=Message)
@@ -50,6 +51,12 @@ def message_as_sent(classes: Mapping[str, type[Message]], message: Recorded) -> 
         return revived(kind, message.body)
     except OtherForm:
         return None
+
+
+def with_names(classes: Mapping[str, type[Message]], message: Recorded) -> Recorded:
+    """Return the message with the names of its fields, if its class is known here and the recorder did not know it."""
+    said = message_as_sent(classes, message) if isinstance(message.body, list) else None
+    return message if said is None else replace(message, body=plain(said))
 
 
 def message_from(classes: Mapping[str, type[Message]], said: object) -> Message:
