@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Iterable
 
 from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.interface import Bus
 from backbone.command_line.connection import connected
+from backbone.command_line.unit_modules import REPLY_TIME_S, modules_by_unit
 from backbone.command_line.where import Where
-from backbone.component.messages import AskParameters, AskState, ComponentState, Parameters
+from backbone.component.messages import AskState, ComponentState
 from backbone.errors import LinkError, OutcomeUnknown, Refusal
 from backbone.exchange import NotExchanged, Silent, SwapClass, SwapModule, Swapped, UnknownModule
 from backbone.launcher.endings import ExitCode, say, show
@@ -21,7 +21,6 @@ from backbone.placer.messages import ListPlacements, Placements
 from backbone.spoken import counted
 from backbone.wire import UnknownMessage
 
-REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
 READ_WITHIN_S = 60.0  # chosen: an import of a large library on a busy machine, and the answer
 
 
@@ -69,7 +68,9 @@ async def _question(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
     """Return whom to ask for the exchange, and what."""
     listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
     units = [one.address for one in listed.components if one.type == EXECUTION_UNIT]
-    at, silent = await _modules_of(bus, units)
+    told = await modules_by_unit(bus, units)
+    at = {str(one["name"]): unit for unit, modules in told.items() for one in modules or ()}
+    silent = [unit for unit, modules in told.items() if modules is None]
     if asked.module in at:
         return at[asked.module], asked
     others = {component_of(one.address): one.address for one in listed.components if _may_be_exchanged(one)}
@@ -102,21 +103,3 @@ async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str])
         remedy = "Start it: its owner does, or 'scout-backbone start'; then swap again."
         return Silent(f"{name} is stopped: {stopped[name]}", remedy=remedy)
     return UnknownModule(f"no module, behavior or resource {name!r} runs{did_you_mean(name, known)}")
-
-
-async def _modules_of(bus: Bus, units: list[str]) -> tuple[dict[str, str], list[str]]:
-    """Return module → address of the unit that runs it, and the units that did not answer."""
-
-    async def ask(unit: str) -> Parameters | None:
-        try:
-            return await bus.ask(unit, AskParameters(), Parameters, within_s=REPLY_TIME_S)
-        except LinkError:
-            return None
-
-    told = dict(zip(units, await asyncio.gather(*map(ask, units)), strict=True))
-    at = dict[str, str]()
-    for unit, answer in told.items():
-        modules = answer.values.get("modules") if answer is not None else None
-        listed = modules if isinstance(modules, list) else []
-        at |= {str(one["name"]): unit for one in listed if isinstance(one, dict)}
-    return at, [unit for unit, answer in told.items() if answer is None]
