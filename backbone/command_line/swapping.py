@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterable
 
 from backbone.addresses import NAMESERVER, PLACER
@@ -43,6 +44,9 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
             raise NotExchanged(
                 f"{asked.module} is no module, behavior or resource", remedy="See 'scout-backbone status' for these."
             ) from None
+        except asyncio.CancelledError:
+            say(f"the exchange goes on without this command; 'scout-backbone log --text {asked.module}' shows its end")
+            raise
         except LinkError as error:
             told = f"{component_of(at)} ended or hung while it exchanged {asked.module}: {error}"
             raise OutcomeUnknown(told, remedy=f"See 'scout-backbone why {component_of(at)}', and 'log'.") from error
