@@ -82,6 +82,20 @@ def code_of(refusal: Refusal) -> str:
     return str(refusal.facts.get("code", refusal.code)) if isinstance(refusal, UnknownRefusal) else refusal.code
 
 
+def complaint(error: BaseException) -> str:
+    """Return an exception as one line, with the place in the code if it has one.
+
+    Example:
+        >>> complaint(ValueError("no picture"))
+        'ValueError: no picture'
+    """
+    told, trace = " ".join(f"{type(error).__name__}: {error}".split()), error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    where = "" if trace is None else f" ({trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno})"
+    return told + where
+
+
 class LinkError(BackboneError):
     """No answer arrived; the outcome is unknown."""
 

@@ -18,11 +18,12 @@ from typing import TypeVar
 
 import msgspec
 
+from backbone.errors import complaint
 from backbone.exchange import Swapped
 
 T = TypeVar("T")
-UNPROVED = (Exception, SystemExit)
-"""Exceptions of unproved code that do not end the component."""
+UNPROVED = (Exception, SystemExit, KeyboardInterrupt)
+"""What code that has not proved itself may raise without an end of the component."""
 
 
 class ExchangePhase(StrEnum):
@@ -172,17 +173,3 @@ def hand_over(old: object, new: object) -> bool:
 def _name_of(value: object) -> str:
     kind = type(value)
     return f"{kind.__module__}.{kind.__qualname__}"
-
-
-def complaint(error: BaseException) -> str:
-    """Return an exception as one line, with the place in the code if it has one.
-
-    Example:
-        >>> complaint(ValueError("no picture"))
-        'ValueError: no picture'
-    """
-    told, trace = " ".join(f"{type(error).__name__}: {error}".split()), error.__traceback__
-    while trace is not None and trace.tb_next is not None:
-        trace = trace.tb_next
-    where = "" if trace is None else f" ({trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno})"
-    return told + where

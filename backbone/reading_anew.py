@@ -19,15 +19,19 @@ import importlib.util
 import sys
 from collections.abc import Callable
 from enum import Enum
+from functools import partial
 from types import ModuleType
 from typing import Generic, TypeVar
 
 import msgspec
 
-from backbone.errors import Refusal
-from backbone.exchange_course import UNPROVED, complaint
+from backbone.errors import Refusal, complaint
+from backbone.exchange_course import UNPROVED
+from backbone.waiting import in_thread_within
 
 T = TypeVar("T")
+READ_WITHIN_S = 20.0  # chosen: an import of the largest libraries on a busy machine; the command waits for a minute
+HANGS = "Look for a loop or a wait; then end the process, which holds the import: its creator starts it again."
 
 
 class WrongClass(Refusal):
@@ -74,11 +78,25 @@ class ReadAnew(Generic[T]):
             raise wrong(f"{class_path}: {complaint(error)}", class_path=class_path) from error
 
     def undo(self) -> None:
-        """Let imports find the former module again."""
-        if self._before is not None:
-            _place(self._file, self._before)
-        else:
-            sys.modules.pop(self._file, None)
+        """Let imports find again what they found before."""
+        _put_back(self._file, self._before)
+
+
+async def read_anew(class_path: str, load: Callable[[str], T], wrong: type[WrongClass] = WrongClass) -> ReadAnew[T]:
+    """Return the class, read in a thread of its own; see ``ReadAnew``.
+
+    Raises:
+        WrongClass: The file cannot be read, or its reading does not end within ``READ_WITHIN_S``.
+        ValuesChanged: It declares classes of values otherwise.
+    """
+    file = class_path.partition(":")[0]
+    before = sys.modules.get(file)
+    try:
+        return await in_thread_within(partial(ReadAnew, class_path, load, wrong), READ_WITHIN_S)
+    except TimeoutError:
+        _put_back(file, before)
+        told = f"{class_path}: the import of its file has not ended within {READ_WITHIN_S:g} s"
+        raise wrong(told, remedy=HANGS, class_path=class_path) from None
 
 
 def _read(file: str, before: ModuleType, wrong: type[WrongClass]) -> None:
@@ -93,6 +111,13 @@ def _read(file: str, before: ModuleType, wrong: type[WrongClass]) -> None:
     _place(file, fresh)
     exec(code, fresh.__dict__)  # noqa: S102  as an import does
     _keep_values(before, fresh)
+
+
+def _put_back(file: str, before: ModuleType | None) -> None:
+    if before is not None:
+        _place(file, before)
+    else:
+        sys.modules.pop(file, None)
 
 
 def _place(file: str, module: ModuleType) -> None:

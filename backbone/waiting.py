@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable
-from typing import Any
+import contextvars
+import threading
+from collections.abc import Awaitable, Callable
+from concurrent.futures import Executor, Future
+from functools import partial
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 
 async def set_within(event: asyncio.Event, within_s: float | None) -> bool:
@@ -43,6 +49,15 @@ async def end_tasks(*tasks: asyncio.Future[Any]) -> None:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
+def bug_of(task: asyncio.Task[Any]) -> BaseException | None:
+    """Return the bug that ended a task; a ``CancelledError`` is one if nobody cancelled it."""
+    if not task.cancelled():
+        return task.exception()
+    return (
+        None if task.cancelling() else RuntimeError(f"{task.get_name()} raised CancelledError, and nobody cancelled it")
+    )
+
+
 def settle(future: asyncio.Future[Any], outcome: object) -> None:
     """Set the result or the exception of the future, unless it is done: its waiter may have been cancelled."""
     if future.done():
@@ -51,3 +66,33 @@ def settle(future: asyncio.Future[Any], outcome: object) -> None:
         future.set_exception(outcome)
     else:
         future.set_result(outcome)
+
+
+class _OwnThread(Executor):
+    """Runs each function in a thread of its own, for which the end of the process does not wait."""
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **named: Any) -> Future[T]:
+        outcome: Future[T] = Future()
+        outcome.set_running_or_notify_cancel()
+
+        def run() -> None:
+            try:
+                outcome.set_result(fn(*args, **named))
+            except BaseException as error:
+                outcome.set_exception(error)
+
+        threading.Thread(target=run, daemon=True).start()
+        return outcome
+
+
+async def in_thread_within(work: Callable[[], T], within_s: float) -> T:
+    """Return what the work returns, done in a thread of its own while the event loop goes on.
+
+    Work that hangs holds up neither who waits nor the end of the process: its thread is left to itself.
+
+    Raises:
+        TimeoutError: It takes longer than these seconds of the machine.
+    """
+    done = partial(contextvars.copy_context().run, work)
+    async with asyncio.timeout(within_s):
+        return await asyncio.get_running_loop().run_in_executor(_OwnThread(), done)

@@ -88,10 +88,10 @@ class Acting:
                 return None
             except LinkError as error:
                 log.info("%s acts again: %s", self._actor.name, error)
-            except SystemExit as left:
+            except (SystemExit, KeyboardInterrupt) as left:
                 if self._actor.gate.is_first:
                     raise
-                raise WrongClass(f"SystemExit: {left}") from left  # of a class that has not proved itself
+                raise WrongClass(f"{type(left).__name__}: {left}") from left  # of a class that has not proved itself
             except EmergencyStopped as stopped:
                 await self._wait_until_it_may_move(arc, stopped)
                 continue

@@ -22,20 +22,19 @@ from functools import partial
 import msgspec
 
 from backbone.component.log_level import LogLevel
-from backbone.errors import LinkError, Refusal
+from backbone.errors import LinkError, Refusal, complaint
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
 from backbone.exchange_course import (
     ExchangeCourse,
     ExchangePhase,
     ExchangeRules,
     class_path_of,
-    complaint,
     remark_on_file,
 )
 from backbone.launcher.messages import TakeBranch
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
-from backbone.reading_anew import ReadAnew, WrongClass
+from backbone.reading_anew import ReadAnew, WrongClass, read_anew
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message
 from mission_control.implementation import (
@@ -199,7 +198,7 @@ class BehaviorExchanges:
     async def _swap(self, asked: SwapClass) -> Swapped:
         old = self.present
         check_exchangeable(old)
-        anew = await asyncio.to_thread(ReadAnew, asked.class_path, self._load)  # it acts on while its file is imported
+        anew = await read_anew(asked.class_path, self._load)  # it acts on while its file is imported
         try:
             new = made_beside(old, asked, anew.kind)
         except Refusal:
@@ -280,5 +279,5 @@ async def _survived(life: Coroutine[object, None, None]) -> None:
     """Live; an exit that the class asks for is its failure, and not the end of the process."""
     try:
         await life
-    except SystemExit as error:
+    except (SystemExit, KeyboardInterrupt) as error:
         raise WrongClass(complaint(error)) from error

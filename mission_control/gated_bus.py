@@ -28,6 +28,7 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.component.messages import Register, Registered
+from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.quality import Quality
@@ -68,6 +69,15 @@ class GatedBus:
         self._heard: dict[HeardThrough, None] = {}
         if is_first:
             self._opened.set()
+
+    @property
+    def on_unreadable(self) -> Callable[[str, Refusal], None]:
+        """Callback for a publication that cannot be read, as of the bus behind the gate."""
+        return self.bus.on_unreadable
+
+    @on_unreadable.setter
+    def on_unreadable(self, tell: Callable[[str, Refusal], None]) -> None:
+        self.bus.on_unreadable = tell
 
     # ------------------------------------------------------------------ the gate
     @property

@@ -14,8 +14,9 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.log_level import LogLevel
 from backbone.component.messages import WrongParameter
+from backbone.errors import complaint
 from backbone.exchange import NotExchanged, SwapClass
-from backbone.exchange_course import UNPROVED, class_path_of, complaint, hand_over
+from backbone.exchange_course import UNPROVED, class_path_of, hand_over
 from backbone.reading_anew import WrongClass
 from backbone.wire import Accepts
 from mission_control.behavior_tree import BehaviorNode

@@ -22,7 +22,7 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.log_level import LogLevel
 from backbone.component.messages import WrongParameter
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
 from backbone.exchange import ExchangeRunning, NotExchanged, SwapClass, Swapped
 from backbone.exchange_course import (
     UNPROVED,
@@ -30,13 +30,12 @@ from backbone.exchange_course import (
     ExchangePhase,
     ExchangeRules,
     class_path_of,
-    complaint,
     hand_over,
     remark_on_file,
 )
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
-from backbone.reading_anew import ReadAnew, WrongClass
+from backbone.reading_anew import WrongClass, read_anew
 from backbone.waiting import set_within
 from resource_pool.driver_slot import DriverSlot, methods_of
 from resource_pool.drivers.interface import DriverSite, HardwareFault, NoOptions, driver_class, driver_path
@@ -166,7 +165,7 @@ class DriverExchanges:
 
     async def _swap(self, asked: SwapClass, slot: DriverSlot) -> Swapped:
         path = driver_path(self._rc.driver_kind, asked.class_path, self._rc.name)
-        anew = await asyncio.to_thread(ReadAnew, path, lambda named: driver_class(named, self._rc.name))
+        anew = await read_anew(path, lambda named: driver_class(named, self._rc.name))
         try:
             going = self._going = self._made(asked, slot, anew.kind)
         except Refusal:

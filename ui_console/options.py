@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from backbone.command_line.options import complete_behavior, complete_mission, finite, hub_endpoint, names_for
+from backbone.command_line.options import complete_behavior, complete_mission, hub_endpoint, names_for
 from ui_console.model.profile import Profile
 
 LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
@@ -22,7 +22,7 @@ def complete_robot(ctx: typer.Context) -> list[str]:
     return names.robots if names is not None else []
 
 
-_seconds = partial(typer.Option, min=0.0, max=LONGEST_WAIT_S, callback=finite)
+_seconds = partial(typer.Option, min=0.0, max=LONGEST_WAIT_S)
 _priority = partial(typer.Option, min=LEAST_PRIORITY, max=MOST_PRIORITY)
 RECORDING = "this recording instead: play it, go to any time, ask why; nothing needs to be up."
 

@@ -40,6 +40,8 @@ class BusBase(ABC):
         self._qualities: dict[tuple[str, Conversation], Quality] = {}
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
         """Callback for an exception that is no refusal."""
+        self.on_unreadable: Callable[[str, Refusal], None] = lambda _key, _refusal: None
+        """Callback for a publication that cannot be read."""
         self.closed = False
         self.asked = self.answered = self.published = self.heard = self.refused = self.unreadable = 0
         self.told = 0

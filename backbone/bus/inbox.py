@@ -157,6 +157,7 @@ class EachSample:
         """Count and log a publication that cannot be read."""
         self._bus.unreadable += 1
         log.warning("unreadable publication on %s: %s", key, refusal.detail)
+        self._bus.on_unreadable(key, refusal)
 
 
 class OverheardSamples:

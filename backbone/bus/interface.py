@@ -15,6 +15,7 @@ from collections.abc import Awaitable, Callable
 from contextvars import ContextVar
 from typing import Annotated, Any, Protocol, TypeVar, overload
 
+from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.quality import Quality
 from backbone.ranges import FEW, Count, Mention, Quoted
@@ -73,9 +74,11 @@ class Bus(Protocol):
 
     Attributes:
         on_bug: Callback for an exception that is no refusal; settable.
+        on_unreadable: Callback, with key and reason, for a publication that a listener did not get; settable.
     """
 
     on_bug: Callable[[BaseException], None]
+    on_unreadable: Callable[[str, Refusal], None]
 
     @property
     def mission(self) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Answer, LifeListener, Listener, Overhearer
 from backbone.keys import Conversation, key
-from backbone.wire import Accepts, Envelope, Message, OversizedMessage, UnwritableMessage, kinds_of, write
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of, schema_of, write
 
 TakeBack = Callable[[], None]
 
@@ -96,6 +96,9 @@ class Listening(NeighborDeclaration):
             self.owner.hear(self.listener, envelope)
         else:
             self.owner.unreadable += 1
+            at = key(self.owner.mission, self.pattern, self.conversation)
+            schema = schema_of(type(envelope.body))
+            self.owner.on_unreadable(at, UnknownMessage(f"{schema} from {envelope.source} is not expected here"))
 
 
 class Overheard(NeighborDeclaration):

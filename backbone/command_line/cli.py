@@ -30,7 +30,6 @@ from backbone.command_line.options import (
     complete_name,
     complete_resource,
     complete_type,
-    finite,
     hub_endpoint,
     json_or_text,
     named_value,
@@ -92,9 +91,7 @@ def check(
     ] = False,
     for_s: Annotated[
         float | None,
-        typer.Option(
-            "--for", min=0.1, max=LONGEST_DRY_RUN_S, callback=finite, help="Mission seconds of the dry run; or 60."
-        ),
+        typer.Option("--for", min=0.1, max=LONGEST_DRY_RUN_S, help="Mission seconds of the dry run; or 60."),
     ] = None,
     trace: Annotated[
         Path | None, typer.Option("--trace", help="Write the dry run's scheduling decisions, JSON lines.")
@@ -128,13 +125,11 @@ def up(
     mission_file: MissionFile,
     headless: Annotated[bool, typer.Option("--headless", help="No live picture; one line a step.")] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Return when all is ready; the mission goes on.")] = False,
-    speed: Annotated[
-        float, typer.Option("--speed", min=0.01, max=100.0, callback=finite, help="Mission seconds a second.")
-    ] = 1.0,
+    speed: Annotated[float, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second.")] = 1.0,
     trace: Annotated[Path | None, typer.Option("--trace", help="Write every scheduling decision, JSON lines.")] = None,
     for_s: Annotated[
         float | None,
-        typer.Option("--for", min=0.0, max=LONGEST_MISSION_S, callback=finite, help="End after these mission seconds."),
+        typer.Option("--for", min=0.0, max=LONGEST_MISSION_S, help="End after these mission seconds."),
     ] = None,
     record_to: Annotated[
         Path | None, typer.Option("--record", metavar="FILE.mcap", help="Record all from the first message on.")
@@ -228,9 +223,7 @@ def resources(
 
 @app.command()
 def load(
-    for_s: Annotated[
-        float, typer.Option("--for", min=0.1, max=3600.0, callback=finite, help="Seconds between the two readings.")
-    ] = 1.0,
+    for_s: Annotated[float, typer.Option("--for", min=0.1, max=3600.0, help="Seconds between the two readings.")] = 1.0,
     as_json: AsJson = False,
     mission: MissionName = None,
     connect: Endpoint = None,

@@ -16,7 +16,7 @@ from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.naming import component_of, did_you_mean
 from backbone.recording.json_schema import TAG
-from backbone.recording.revival import OtherForm, message_from
+from backbone.recording.revival import WRITE_ONE, OtherForm, message_from
 from backbone.wire import plain, schema_of
 
 LEFT_OUT = (Conversation.ALIVE, *COPIED)
@@ -37,10 +37,7 @@ async def inject(where: Where, key: str, text: str, within_s: float) -> ExitCode
         OtherForm: The text is not a message, or its fields or values do not fit the schema.
         Refusal: The component refused it.
     """
-    try:
-        said = json.loads(text)
-    except ValueError as error:
-        raise OtherForm(f"the text is not JSON: {error}") from error
+    said = read_object(text)
     async with connected(where) as (bus, clock):
         address, conversation = _place(key, bus.mission)
         classes = await mission_classes(bus)
@@ -55,6 +52,25 @@ async def inject(where: Where, key: str, text: str, within_s: float) -> ExitCode
         answer = await bus.ask(address, message, anything, within_s=within_s)
     show([json.dumps({TAG: schema_of(type(answer))} | plain(answer))])
     return ExitCode.DONE
+
+
+def read_object(text: str) -> object:
+    """Return what a person wrote as JSON.
+
+    Raises:
+        OtherForm: It is no JSON, too deep, or an object has a name twice.
+    """
+    try:
+        return json.loads(text, object_pairs_hook=_each_name_once)
+    except (ValueError, RecursionError) as error:
+        raise OtherForm(f"it is no JSON: {error}", remedy=WRITE_ONE) from error
+
+
+def _each_name_once(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    said = dict(pairs)
+    if len(said) < len(pairs):
+        raise ValueError("a name stands twice in one object")
+    return said
 
 
 def _place(key: str, mission: str) -> tuple[str, Conversation]:

@@ -11,7 +11,7 @@ from backbone.command_line.unusable_file import FileUnusable
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.clock_offsets import ClockOffsets, Offset
 from backbone.recording.joining import Joined, join
-from backbone.recording.reader import NoRecording, Recording
+from backbone.recording.reader import NoRecording, Recording, open_file
 from backbone.spoken import counted
 
 
@@ -49,7 +49,7 @@ def _join(recordings: Mapping[str, Recording], to: Path) -> Joined:
 
 def _opened(path: Path, stack: ExitStack) -> Recording:
     try:
-        return Recording(stack.enter_context(path.open("rb")))
+        return Recording(stack.enter_context(open_file(path)))
     except OSError as error:
         raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
     except NoRecording as error:

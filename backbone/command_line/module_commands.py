@@ -15,7 +15,6 @@ from backbone.command_line.options import (
     SecretFile,
     chosen,
     complete_exchangeable,
-    finite,
     named_value,
     run,
 )
@@ -44,15 +43,11 @@ def swap(
     ] = None,
     prove_s: Annotated[
         float,
-        typer.Option(
-            "--prove", min=0.0, max=LONGEST_S, callback=finite, help="Mission seconds for which the old one is kept."
-        ),
+        typer.Option("--prove", min=0.0, max=LONGEST_S, help="Mission seconds for which the old one is kept."),
     ] = PROVE_S,
     ready_within_s: Annotated[
         float,
-        typer.Option(
-            "--ready-within", min=0.1, max=LONGEST_S, callback=finite, help="Mission seconds to become ready."
-        ),
+        typer.Option("--ready-within", min=0.1, max=LONGEST_S, help="Mission seconds to become ready."),
     ] = READY_WITHIN_S,
     silent_s: Annotated[
         float,
@@ -60,7 +55,6 @@ def swap(
             "--silent",
             min=0.0,
             max=LONGEST_S,
-            callback=finite,
             help="Modules: mission seconds without an output that the old one has.",
         ),
     ] = SILENT_S,

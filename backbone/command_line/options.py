@@ -21,6 +21,7 @@ from typer.main import get_command_name
 from typer.models import CommandInfo, TyperInfo
 
 from backbone import __version__
+from backbone.command_line.standard_streams import standard_streams
 from backbone.command_line.where import Where
 from backbone.errors import BackboneError
 from backbone.launcher.endings import ExitCode
@@ -65,10 +66,11 @@ def run_table(table: typer.Typer) -> None:
     if named in [["--version"], *([_name_of(each)] for commands in tables for each in commands)]:
         for commands in tables:
             commands[:] = [each for each in commands if [_name_of(each)] == named]
-    try:
-        table()
-    except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
+    with standard_streams():
+        try:
+            table()
+        except KeyboardInterrupt:
+            sys.exit(ExitCode.INTERRUPTED)
 
 
 def _words_before_the_cursor() -> list[str]:
@@ -94,15 +96,17 @@ class _Text:
 
 def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
     for parameter in parameters:
-        if getattr(getattr(parameter, "type_descriptor", None), "annotation", None) is str:
-            parameter.get_runtime_param = _Text
-        parameter.process_value = partial(_processed, parameter.process_value, parameter.required)
+        parameter.process_value = partial(_processed, parameter, parameter.process_value)
 
 
-def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: object) -> Any:
-    """Return the value for the command; an optional value that is absent, or typed beside completions, is unchanged."""
-    is_absent = value is None and not is_required
-    return value if is_absent or ctx.resilient_parsing else process_value(ctx, value)
+def _processed(parameter: Any, process_value: Callable[[Any, Any], Any], ctx: Any, value: object) -> Any:
+    """Return the value as the command gets it; an absent optional value, or one beside completions, stays as it is."""
+    if (value is None and not parameter.required) or ctx.resilient_parsing:
+        return value
+    given = process_value(ctx, value)
+    if isinstance(given, float) and not math.isfinite(given):  # no range refuses NaN, and some have no upper end
+        raise typer.BadParameter(f"{given} is no finite number; see the range in --help", ctx, parameter)
+    return given
 
 
 def _first_paragraph(text: str) -> str:
@@ -252,13 +256,6 @@ ComponentName = Annotated[str, typer.Argument(autocompletion=complete_name, help
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
-def finite(value: float | None) -> float | None:
-    """Refuse NaN, which passes every range check; for options with a range."""
-    if value is not None and not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
-    return value
-
-
 def named_value(given: str) -> tuple[str, object]:
     """Return name and value of NAME=VALUE; for options that set parameters."""
     name, equals, value = given.partition("=")
@@ -271,5 +268,5 @@ def json_or_text(text: str) -> object:
     """Return the value of a JSON text; return any other text unchanged."""
     try:
         return json.loads(text)
-    except json.JSONDecodeError:
+    except (json.JSONDecodeError, RecursionError):
         return text

@@ -20,7 +20,6 @@ from backbone.command_line.options import (
     MissionName,
     SecretFile,
     chosen,
-    finite,
     named_value,
     run,
 )
@@ -28,7 +27,7 @@ from backbone.command_line.options import (
 if TYPE_CHECKING:
     from backbone.command_line.exporting import TableWriter
 
-EARLIEST_S = -86_400.0  # the range of ``ranges.Instant``, which would load msgspec
+EARLIEST_S, LATEST_S = -86_400.0, 1e9  # chosen: thirty years; within ``ranges.Instant``, which would load msgspec
 
 record = typer.Typer(cls=CommandTable, rich_markup_mode=None, help="Record a mission that is up, until Ctrl-C.")
 recording = typer.Typer(
@@ -43,8 +42,8 @@ Keys = Annotated[
     list[str] | None,
     typer.Option("--keys", metavar="GLOB", help="Only keys that match, as 'resource_pool/*/readings'; repeatable."),
 ]
-Since = Annotated[float, typer.Option("--since", min=0.0, help="Not before this mission time, seconds.")]
-Until = Annotated[float | None, typer.Option("--until", min=0.0, help="Not after this mission time, seconds.")]
+Since = Annotated[float, typer.Option("--since", min=0, max=LATEST_S, help="Not before this mission time, seconds.")]
+Until = Annotated[float | None, typer.Option("--until", min=0, max=LATEST_S, help="Not after this time, seconds.")]
 KeyGlobs = Annotated[
     list[str] | None,
     typer.Argument(metavar="KEY…", help="Keys or patterns, as 'resource_pool/*/readings'; default: all."),
@@ -190,7 +189,8 @@ def why(
     file: File,
     name: Annotated[str, typer.Argument(help="An ARC, behavior, console, resource or component.")],
     at_s: Annotated[
-        float | None, typer.Option("--at", min=0.0, help="Mission time, seconds; default: the end of the recording.")
+        float | None,
+        typer.Option("--at", min=0, max=LATEST_S, help="Mission time, seconds; default: the end of the recording."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -267,14 +267,13 @@ def print_mission(file: File) -> None:
 
 def replay(
     file: File,
-    speed: Annotated[
-        float, typer.Option("--speed", min=0.01, max=100.0, callback=finite, help="Mission seconds a second.")
-    ] = 1.0,
+    speed: Annotated[float, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second.")] = 1.0,
     is_stepped: Annotated[
         bool, typer.Option("--step", help="Message by message: a line of input plays the one that is shown.")
     ] = False,
     since_s: Annotated[
-        float | None, typer.Option("--from", min=EARLIEST_S, help="Begin at this mission time; default: at the begin.")
+        float | None,
+        typer.Option("--from", min=EARLIEST_S, max=LATEST_S, help="Begin at this mission time; default: at the begin."),
     ] = None,
     keys: Keys = None,
     without: Annotated[

@@ -44,8 +44,9 @@ from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
 from backbone.recording.host_ear import HostEar
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import Recording, missing_numbers, recover_file
+from backbone.recording.reader import Recording, missing_numbers, open_file
 from backbone.recording.recorder import Recorder
+from backbone.recording.recovering import recover_file
 from backbone.recording.revival import revived
 from backbone.spoken import counted
 
@@ -211,14 +212,15 @@ def _new_files(path: Path, keep: int) -> Iterator[RecordingFiles]:
 async def recover_to(path: Path, to: Path) -> ExitCode:
     """Write all readable messages to a new file, read it back, and print their number."""
     try:
-        count = recover_file(path, to)
+        done = recover_file(path, to)
     except FileExistsError as error:
         raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
     except OSError as error:
-        raise FileUnusable(f"{error.filename or path}: {error.strerror or error}") from error
+        raise FileUnusable(f"{error.filename or to}: {error.strerror or error}") from error
     with opened(to) as made:
-        assert made.contents().messages == count  # noqa: S101  all written messages are readable
-    say(f"{to}: {counted(count, 'message')}")
+        assert made.contents().messages == done.messages  # noqa: S101  what was written can be read
+    without = f", without those of {counted(done.damaged, 'damaged chunk')}" if done.damaged else ""
+    say(f"{to}: {counted(done.messages, 'message')}{without}")
     return ExitCode.DONE
 
 
@@ -335,7 +337,7 @@ def opened(path: Path) -> Iterator[Recording]:
         NoRecording: The file is not a recording, or its recorder was killed.
     """
     try:
-        file = path.open("rb")
+        file = open_file(path)
     except OSError as error:
         raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
     with file:

@@ -39,7 +39,8 @@ from backbone.recording.playback import NoSuchTime
 from backbone.recording.player import Player
 from backbone.recording.reader import Contents, Recorded, Recording
 from backbone.recording.reasons import reasons_at
-from backbone.recording.rerun import launch_of, run_again
+from backbone.recording.rerun import classes_of, launch_of, run_again
+from backbone.recording.revival import with_names
 from backbone.scheduling.events import Record
 from backbone.spoken import counted
 from backbone.waiting import first_to_end
@@ -62,14 +63,15 @@ async def run_without(
         tolerances: See ``compared``.
     """
     with opened(path) as recording:
-        classes = message_classes()
-        launch = launch_of(recording, classes, name)
+        launch = launch_of(recording, message_classes(), name)
         launch = msgspec.structs.replace(
             launch, class_path=class_path or launch.class_path, parameters={**launch.parameters, **parameters}
         )
         say(f"runs {launch.class_path} as {name} on {path}")
-        rerun = await asyncio.to_thread(run_again, recording, classes, launch, load_class(launch.class_path))
-        recorded = recording.messages(source=launch.address)
+        kind = load_class(launch.class_path)
+        classes = classes_of(launch)
+        rerun = await asyncio.to_thread(run_again, recording, classes, launch, kind)
+        recorded = (with_names(classes, one) for one in recording.messages(source=launch.address))
         result = print_comparison(compared(recorded, rerun.said, tolerances), as_json=as_json)
     if rerun.fell is not None:
         say(f"the component failed: {type(rerun.fell).__name__}: {rerun.fell}")

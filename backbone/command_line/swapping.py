@@ -8,9 +8,10 @@ from collections.abc import Iterable
 from backbone.addresses import NAMESERVER, PLACER
 from backbone.bus.interface import Bus
 from backbone.command_line.connection import connected
+from backbone.command_line.unit_modules import REPLY_TIME_S, modules_by_unit
 from backbone.command_line.where import Where
-from backbone.component.messages import AskParameters, AskState, ComponentState, Parameters
-from backbone.errors import LinkError, Refusal
+from backbone.component.messages import AskState, ComponentState
+from backbone.errors import LinkError, OutcomeUnknown, Refusal
 from backbone.exchange import NotExchanged, Silent, SwapClass, SwapModule, Swapped, UnknownModule
 from backbone.launcher.endings import ExitCode, say, show
 from backbone.mission.tables import EXECUTION_UNIT
@@ -21,7 +22,6 @@ from backbone.placer.messages import ListPlacements, Placements
 from backbone.spoken import counted
 from backbone.wire import UnknownMessage
 
-REPLY_TIME_S = 2.0  # chosen: an acceptable wait for a person at a terminal
 READ_WITHIN_S = 60.0  # chosen: an import of a large library on a busy machine, and the answer
 
 
@@ -29,10 +29,10 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
     """Exchange the module, the behavior's class or the resource's driver of this name, and print which one is in use.
 
     Raises:
-        UnknownModule: No exchangeable part of the mission has this name.
-        Silent: The part of this name does not answer; nothing was changed.
-        Refusal: The new class cannot be used; nothing was changed.
-        LinkError: The part did not answer; the outcome is unknown.
+        UnknownModule: Nothing of the mission that can be exchanged has this name.
+        Silent: What has this name does not answer; nothing was changed.
+        Refusal: The new one cannot take the place; nothing was changed.
+        OutcomeUnknown: It did not answer.
     """
     async with connected(where) as (bus, clock):
         at, question = await _question(bus, asked)
@@ -44,6 +44,12 @@ async def swap_class(where: Where, asked: SwapModule) -> ExitCode:
             raise NotExchanged(
                 f"{asked.module} is no module, behavior or resource", remedy="See 'scout-backbone status' for these."
             ) from None
+        except asyncio.CancelledError:
+            say(f"the exchange goes on without this command; 'scout-backbone log --text {asked.module}' shows its end")
+            raise
+        except LinkError as error:
+            told = f"{component_of(at)} ended or hung while it exchanged {asked.module}: {error}"
+            raise OutcomeUnknown(told, remedy=f"See 'scout-backbone why {component_of(at)}', and 'log'.") from error
     counts = "round" if question is asked else "command" if at.startswith(f"{Subsystem.MISSION_CONTROL}/") else "call"
     show([_told(asked, swapped, counts)])
     if swapped.remark:
@@ -66,7 +72,9 @@ async def _question(bus: Bus, asked: SwapModule) -> tuple[str, SwapModule | Swap
     """Return the address to ask for the exchange, and the question."""
     listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
     units = [one.address for one in listed.components if one.type == EXECUTION_UNIT]
-    at, silent = await _modules_of(bus, units)
+    told = await modules_by_unit(bus, units)
+    at = {str(one["name"]): unit for unit, modules in told.items() for one in modules or ()}
+    silent = [unit for unit, modules in told.items() if modules is None]
     if asked.module in at:
         return at[asked.module], asked
     others = {component_of(one.address): one.address for one in listed.components if _may_be_exchanged(one)}
@@ -99,21 +107,3 @@ async def _unknown(bus: Bus, name: str, known: Iterable[str], silent: list[str])
         remedy = "Start it through its owner or by 'scout-backbone start', then swap again."
         return Silent(f"{name} is stopped: {stopped[name]}", remedy=remedy)
     return UnknownModule(f"no module, behavior or resource {name!r} runs{did_you_mean(name, known)}")
-
-
-async def _modules_of(bus: Bus, units: list[str]) -> tuple[dict[str, str], list[str]]:
-    """Return a table from module to the address of its unit, and the units that did not answer."""
-
-    async def ask(unit: str) -> Parameters | None:
-        try:
-            return await bus.ask(unit, AskParameters(), Parameters, within_s=REPLY_TIME_S)
-        except LinkError:
-            return None
-
-    told = dict(zip(units, await asyncio.gather(*map(ask, units)), strict=True))
-    at = dict[str, str]()
-    for unit, answer in told.items():
-        modules = answer.values.get("modules") if answer is not None else None
-        listed = modules if isinstance(modules, list) else []
-        at |= {str(one["name"]): unit for one in listed if isinstance(one, dict)}
-    return at, [unit for unit, answer in told.items() if answer is None]

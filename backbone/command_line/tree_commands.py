@@ -35,7 +35,7 @@ BranchFile = Annotated[Path, typer.Argument(metavar="BRANCH.xml", help="One <beh
 Place = Annotated[int, typer.Argument(min=0, max=MOST_PLACES, help="Number among its siblings, from 1; 0: the last.")]
 Seen = Annotated[
     int | None,
-    typer.Option("--seen", min=0, max=2**53, help="Refuse unless the tree still has this version."),
+    typer.Option("--seen", min=0, max=10**9, help="Refuse unless the tree still has this version."),
 ]
 
 

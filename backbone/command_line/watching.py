@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
-from backbone.addresses import COMPONENT_DATABASE
+from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Overhearing
 from backbone.command_line.connection import connected
 from backbone.command_line.key_facts import TrafficRow, ask_facts, with_facts
@@ -24,11 +24,14 @@ from backbone.command_line.message_lines import (
     short_key,
     traffic_lines,
 )
+from backbone.command_line.unit_modules import modules_by_unit
 from backbone.command_line.where import Where
 from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
+from backbone.mission.tables import EXECUTION_UNIT
+from backbone.nameserver.messages import Components, ListComponents
 from backbone.recording.hearing import Hearing, to_overhear
 from backbone.recording.known_messages import message_classes
 from backbone.recording.reader import heard_now
@@ -115,7 +118,7 @@ async def _show_rates(bus: Bus, heard: Sequence[TrafficRow], wanted: Watched) ->
 
 
 async def mission_classes(bus: Bus, trouble: Callable[[str], None] = say) -> dict[str, type[Message]]:
-    """Return the message classes of the installed packages and of the mission's component types, by schema.
+    """Return the message classes of the installed packages, and of the mission's component types and modules.
 
     A thread imports them, so the event loop of the caller is not blocked.
 
@@ -126,7 +129,11 @@ async def mission_classes(bus: Bus, trouble: Callable[[str], None] = say) -> dic
     modules: set[str] = set()
     try:
         types = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
-        modules = {one.component_type.class_path.partition(":")[0] for one in types.types}
+        listed = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
+        told = await modules_by_unit(bus, [one.address for one in listed.components if one.type == EXECUTION_UNIT])
+        paths = [one.component_type.class_path for one in types.types]
+        paths += [str(one["class_path"]) for found in told.values() for one in found or ()]
+        modules = {path.partition(":")[0] for path in paths}
     except (LinkError, Refusal) as error:
         trouble(f"messages of the mission's own types have no names of fields: {error}")
     return await asyncio.to_thread(message_classes, sorted(modules))

@@ -35,9 +35,10 @@ from backbone.component.messages import (
 )
 from backbone.component.name_claim import claim_name
 from backbone.component.story import StoryBook, complaint
+from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
-from backbone.waiting import first_of
+from backbone.waiting import bug_of, first_of
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
@@ -298,7 +299,7 @@ class Component(Generic[P_co]):
             LinkError: No nameserver answered within ``REGISTER_WITHIN_S``.
             BaseException: The bug that ended the component.
         """
-        self.bus.on_bug = self.fail
+        self.bus.on_bug, self.bus.on_unreadable = self.fail, UnreadableKeys(self).tell
         try:
             if await self._unless_ended(self._claim_name(), "claim"):
                 await self._live_and_report_end()
@@ -357,7 +358,7 @@ class Component(Generic[P_co]):
 
     def _task_ended(self, task: asyncio.Task[None]) -> None:
         self._tasks.pop(task, None)
-        if not task.cancelled() and (bug := task.exception()) is not None:
+        if (bug := bug_of(task)) is not None:
             self._group = None  # the group is ending and must get no new tasks
             self.fail(bug)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import faulthandler
 import logging
+import os
 import re
 import signal
 from collections.abc import Callable, Coroutine, Iterable
@@ -19,11 +20,14 @@ from backbone.component.component import AnyComponent
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
-from backbone.errors import BackboneError, Refusal, code_of, revive
+from backbone.errors import BackboneError, Refusal, code_of, complaint, revive
+from backbone.printable_text import printable
 from backbone.waiting import end_tasks
 
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
-_REFUSED = "%s ended, refused [%s]: %s (remedy: %s)"
+_REFUSED = "process %d: %s ended, refused [%s]: %s (remedy: %s)"
+MOST_CAUSE = 300  # chosen: exception, place and a sentence; it is shown in one line beside other facts
+_CAUSE_LINE = re.compile(r" process (\d+): (\S+) ended(?: by a bug:|, refused \[\S+\]:|: \w+:) (.*)$")
 _REFUSED_LINE = re.compile(r" (\S+) ended, refused \[([^]]+)\]: (.*) \(remedy: (.*)\)$")
 
 
@@ -62,16 +66,17 @@ def run_to_end(launch: Launch, begin: Callable[[], Coroutine[object, None, None]
 
 def exit_code_of(error: BaseException, address: str) -> int:
     """Log why a component ended and return the matching exit code."""
-    log = logging.getLogger(__name__)
+    log, pid = logging.getLogger(__name__), os.getpid()
     match error:
         case Refusal():
-            log.error(_REFUSED, address, code_of(error), error.detail, error.remedy)
+            log.error(_REFUSED, pid, address, code_of(error), error.detail, error.remedy)
             return EXIT_REFUSED
         case BackboneError():
-            log.error("%s ended: %s: %s", address, type(error).__name__, error)
+            log.error("process %d: %s ended: %s: %s", pid, address, type(error).__name__, error)
             return EXIT_NO_HUB
         case _:
-            log.error("%s ended by a bug", address, exc_info=error)
+            bug = printable(complaint(error), MOST_CAUSE)
+            log.error("process %d: %s ended by a bug: %s", pid, address, bug, exc_info=error)
             return EXIT_BUG
 
 
@@ -93,6 +98,20 @@ def refusal_in_log(lines: Iterable[str], address: str) -> Refusal | None:
         if found is not None and found[1] == address:
             refusal = revive(found[2], found[3], found[4], {})
     return refusal
+
+
+def cause_in_log(lines: Iterable[str], address: str, pid: int) -> str:
+    """Return why a component ended last in this process, as ``exit_code_of`` logged it; empty: the log does not say.
+
+    Example:
+        >>> lines = ["12:00 ERROR x: process 7: rc/x ended by a bug: ValueError: no picture"]
+        >>> cause_in_log(lines, "rc/x", 7), cause_in_log(lines, "rc/x", 8)
+        ('ValueError: no picture', '')
+    """
+    causes = [
+        found[3] for found in map(_CAUSE_LINE.search, lines) if found and found.group(1, 2) == (str(pid), address)
+    ]
+    return printable(causes[-1], MOST_CAUSE) if causes else ""
 
 
 async def _live(component_class: type[AnyComponent], launch: Launch) -> None:

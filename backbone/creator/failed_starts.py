@@ -6,21 +6,33 @@ import os
 
 from backbone.component.launch import Launch
 from backbone.component.logs import log_path
-from backbone.component.process import EXIT_REFUSED, refusal_in_log
+from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED, cause_in_log, refusal_in_log
 from backbone.creator.messages import StartFailed
 from backbone.creator.supervision import describe
 from backbone.errors import code_of
 
 LAST_LINES = 20
+_LOGGED = (EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB)
 _LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
 
 
 def last_lines(run_directory: str, name: str) -> list[str]:
     """Return the end of a component's log, at most ``LAST_LINES`` lines; empty if there is none."""
+    return _end_of_log(run_directory, name)[-LAST_LINES:]
+
+
+def cause_of_end(launch: Launch | None, pid: int, returncode: int) -> str:
+    """Return the bug or the refusal that ended a component; empty: another end, or its log does not say."""
+    if launch is None or not launch.run_directory or returncode not in _LOGGED:
+        return ""
+    return cause_in_log(_end_of_log(launch.run_directory, launch.process or launch.name), launch.address, pid)
+
+
+def _end_of_log(run_directory: str, name: str) -> list[str]:
     try:
         with log_path(run_directory, name).open("rb") as file:
             file.seek(max(0, file.seek(0, os.SEEK_END) - _LAST_BYTES))
-            return file.read().decode(errors="replace").splitlines()[-LAST_LINES:]
+            return file.read().decode(errors="replace").splitlines()
     except FileNotFoundError:
         return []
 
@@ -34,7 +46,7 @@ def start_failed(name: str, how: str, launch: Launch | None) -> StartFailed:
         launch: Its launch; None: it is not known here any more.
     """
     lines = log_of(launch)
-    if launch is not None and how == describe(EXIT_REFUSED):  # the log ends with its refusal
+    if launch is not None and how.partition(":")[0] == describe(EXIT_REFUSED):  # the log ends with its refusal
         refusal = refusal_in_log(lines, launch.address)
         if refusal is not None:
             return StartFailed(refusal.detail, remedy=refusal.remedy, name=name, how=how, refused=code_of(refusal))

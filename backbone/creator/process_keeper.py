@@ -34,7 +34,7 @@ from backbone.creator.decisions import (
     SendSignal,
     SupervisionWakesAt,
 )
-from backbone.creator.failed_starts import log_of
+from backbone.creator.failed_starts import cause_of_end, log_of
 from backbone.creator.kept_components import Kept, KeptComponents, Report, as_spawn
 from backbone.creator.messages import (
     READY_WITHIN_S,
@@ -298,7 +298,9 @@ class ProcessKeeper:
         if self._kept:
             forget_heartbeat(next(iter(self._kept.values())).launch.run_directory, pid)
         if not self._shared.has(pid):
-            self._carry_out(self._supervision.exited(pid, returncode, self._now_s()))
+            name = next((one.name for one in self._supervision if one.pid == pid), "")
+            cause = cause_of_end(self._kept.launch_of(name), pid, returncode)
+            self._carry_out(self._supervision.exited(pid, returncode, self._now_s(), cause))
             return
         self._shared.exited(pid, returncode)
 

@@ -25,6 +25,7 @@ from backbone.component.membership import (
 )
 from backbone.creator.alarm import Alarm
 from backbone.creator.decisions import Instruction
+from backbone.creator.failed_starts import cause_of_end
 from backbone.creator.shared_processes import (
     AdmitMember,
     EndMemberAlone,
@@ -120,7 +121,7 @@ class SharedProcessKeeper:
                 case AdmitMember(process=process, pid=pid, name=name, life=life):
                     launch = self._launch_of(name)
                     at = process_address(launch.host, process, pid)
-                    self._talk(pid, self._share_life(self._required_bus(), at, launch, life), f"life of {name}")
+                    self._talk(pid, self._share_life(self._required_bus(), at, launch, pid, life), f"life of {name}")
                 case EndMemberAlone(process=process, pid=pid, name=name, life=life):
                     at = process_address(self._launch_of(name).host, process, pid)
                     self._talk(pid, self._end_member(self._required_bus(), at, life), f"end {name}")
@@ -155,8 +156,8 @@ class SharedProcessKeeper:
             return
         self._carry_out(self._shared.forked(process, pid, self._now_s()))
 
-    async def _share_life(self, bus: Bus, at: str, launch: Launch, life: int) -> None:
-        """Ask the shared process to admit the component, then wait for its end; cancelled when the process ends."""
+    async def _share_life(self, bus: Bus, at: str, launch: Launch, pid: int, life: int) -> None:
+        """Have the shared process admit the component, then wait for its end; cancelled when the process ends."""
         try:
             await ask_until_answered(
                 bus, self._clock, at, BeginMember(launch, life), MemberBegun, each_s=ADMIT_EACH_S, within_s=math.inf
@@ -168,7 +169,8 @@ class SharedProcessKeeper:
         ended = await ask_until_answered(
             bus, self._clock, at, AwaitEnd(life), MemberEnded, each_s=AWAIT_EACH_S, within_s=math.inf
         )
-        self._carry_out(self._shared.member_ended(life, ended.exit_code, self._now_s()))
+        cause = cause_of_end(launch, pid, ended.exit_code)
+        self._carry_out(self._shared.member_ended(life, ended.exit_code, self._now_s(), cause))
 
     async def _end_member(self, bus: Bus, at: str, life: int) -> None:
         try:

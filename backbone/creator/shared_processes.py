@@ -230,11 +230,11 @@ class SharedProcesses:
                 return self._leaves(one, member, MemberNotStarted(member.name, why), now_s)
         return []
 
-    def member_ended(self, life: int, exit_code: int, now_s: float) -> list[ProcessInstruction]:
-        """Record that the member of this life has ended."""
+    def member_ended(self, life: int, exit_code: int, now_s: float, cause: str = "") -> list[ProcessInstruction]:
+        """Record that the member of this life has ended, because of a bug or a refusal if there is a cause."""
         for one, member in self._everybody():
             if member.life == life and member.place is _Place.LIVING:
-                return self._leaves(one, member, MemberGone(member.name, exit_code, describe(exit_code)), now_s)
+                return self._leaves(one, member, MemberGone(member.name, exit_code, describe(exit_code, cause)), now_s)
         return []
 
     def exited(self, pid: int, returncode: int) -> list[ProcessInstruction]:

@@ -198,17 +198,18 @@ class Supervision:
         one.token_rose = one.phase is Phase.FORKING
         return []
 
-    def exited(self, pid: int, returncode: int, now_s: float) -> list[Instruction]:
+    def exited(self, pid: int, returncode: int, now_s: float, cause: str = "") -> list[Instruction]:
         """Record that the whole process tree has ended.
 
         Args:
             pid: Pid of a process that is not shared.
             returncode: Exit code, or the number of the signal that killed it, negative.
+            cause: The bug or the refusal that ended it; empty: unknown.
         """
         one = next((each for each in self if each.pid == pid), None)
         if one is None:
             return []
-        return self._and_wake(self._gone(one, one.failure or describe(returncode), returncode, now_s))
+        return self._and_wake(self._gone(one, one.failure or describe(returncode, cause), returncode, now_s))
 
     def left(self, name: str, returncode: int, how: str, now_s: float) -> list[Instruction]:
         """Record the end of a member of a shared process.
@@ -380,15 +381,15 @@ def _by(end: _End, returncode: int) -> EndedBy:
     return end.stage
 
 
-def describe(returncode: int) -> str:
+def describe(returncode: int, cause: str = "") -> str:
     """Return how a process ended, for people.
 
     Example:
-        >>> describe(1), describe(-9)
-        ('exit code 1', 'killed by SIGKILL')
+        >>> describe(1, "ValueError: no picture"), describe(-9)
+        ('exit code 1: ValueError: no picture', 'killed by SIGKILL')
     """
     if returncode >= 0:
-        return f"exit code {returncode}"
+        return f"exit code {returncode}{cause and ': '}{cause}"
     try:
         return f"killed by {signal.Signals(-returncode).name}"
     except ValueError:

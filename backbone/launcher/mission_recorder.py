@@ -66,7 +66,9 @@ def recorder_of_mission(
     Args:
         text: The mission file.
     """
-    modules = sorted({kind.class_path.partition(":")[0] for kind in description.types})
+    paths = [kind.class_path for kind in description.types]
+    paths += [one["class_path"] for unit in description.units for one in unit.parameters["modules"]]
+    modules = sorted({path.partition(":")[0] for path in paths})
     facts = json.dumps({"mission_xml": text.decode(), "modules": modules}).encode()
     return MissionRecorder(description.name, path, clock, ["--described", "--host-folder", run_directory], facts)
 

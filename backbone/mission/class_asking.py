@@ -79,13 +79,14 @@ def _asked(class_paths: Sequence[str]) -> tuple[dict[str, ClassFacts], str]:
 
 
 def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
-    """Return the lines that the other process printed, one for each question, and why further lines are missing."""
-    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what, *about]
+    """Return the lines that the other process printed, one for each question, and why there are not more."""
+    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what]
+    questions = "\0".join(about).encode()  # no arguments, whose length is limited
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     reason = "the process that imports its module ends without an answer"
     try:
         printed = subprocess.run(  # noqa: S603  # this interpreter, with this program
-            command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=WITHIN_S, check=False
+            command, env=environment, input=questions, capture_output=True, timeout=WITHIN_S, check=False
         ).stdout
     except subprocess.TimeoutExpired as expired:
         printed, reason = expired.stdout or b"", f"its module is not imported within {WITHIN_S:g} s"

@@ -85,4 +85,4 @@ def _answer(what: str, about: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    _answer(sys.argv[1], sys.argv[2:])
+    _answer(sys.argv[1], sys.stdin.buffer.read().decode().split("\0"))

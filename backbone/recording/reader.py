@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, Any
 
 import msgspec
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
-from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
-from mcap.stream_reader import CRCValidationError, StreamReader
+from mcap.records import Channel, Message, Schema
+from mcap.stream_reader import CRCValidationError
 from mcap.summary import Summary
-from mcap.writer import CompressionType, Writer
 from zstandard import ZstdError
 
 from backbone.errors import Refusal
 from backbone.recording.hearing import is_meant
 from backbone.recording.translation import Translated
-from backbone.recording.writer import ABOUT, CHUNK_BYTES, NS, PROFILE
+from backbone.recording.writer import ABOUT, NS, PROFILE
 
 MOST_RECORD_BYTES = 64 * 1024 * 1024  # chosen: eight times the largest message; a damaged length asks for terabytes
-_DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
+DAMAGED = (McapError, CRCValidationError, ZstdError, ValueError, LookupError, OverflowError, MemoryError, struct.error)
 _END = struct.Struct("<BQQQI8x")  # MCAP specification, op 0x02 and the magic: the end of every whole file
 
 
@@ -116,10 +116,10 @@ class Recording:
 
     def __init__(self, file: IO[bytes]) -> None:
         try:
-            _check_index(file)
+            check_index(file)
             self._reader = SeekingReader(file, validate_crcs=True, record_size_limit=MOST_RECORD_BYTES)
             profile, summary = self._reader.get_header().profile, self._reader.get_summary()
-        except (*_DAMAGED, OSError) as error:
+        except (*DAMAGED, OSError) as error:
             raise NoRecording(f"no whole recording: {error}") from error
         if profile != PROFILE:
             raise NotOfMessages(f"the file is of profile {profile!r}, a recording of {PROFILE!r}")
@@ -198,8 +198,19 @@ class Recording:
                 recorded = _recorded(channel, message)
                 if (not patterns or is_meant(recorded.key, patterns)) and source in ("", recorded.source):
                     yield schema, channel, message, recorded
-        except _DAMAGED as error:
+        except DAMAGED as error:
             raise NoRecording(f"the recording is damaged: {error}") from error
+
+
+def open_file(path: Path) -> IO[bytes]:
+    """Open the file of a recording for reading.
+
+    Raises:
+        OSError: It cannot be read; or it is a pipe or a device, which would be waited for, and has no end to begin at.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise OSError(errno.ESPIPE, "it is no regular file", str(path))
+    return path.open("rb")
 
 
 def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
@@ -216,72 +227,16 @@ def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
     return {source: count for source, count in missing.items() if count}
 
 
-def recover(damaged: IO[bytes], to: IO[bytes]) -> int:
-    """Write a complete recording with all messages before the damage; return their number.
-
-    Raises:
-        NoRecording: Even the begin is missing; ``NotOfMessages``: the file is a copy for other tools.
-    """
-    writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-    writer.start(profile=PROFILE, library=PROFILE)
-    schemas: dict[int, int] = {0: 0}
-    channels: dict[int, int] = {}
-    count, has_begun = 0, False
-    reader = StreamReader(cast("Any", damaged), validate_crcs=True, record_size_limit=MOST_RECORD_BYTES)
-    try:
-        for record in reader.records:
-            has_begun = True
-            match record:
-                case Header(profile=""):  # any other may be damaged
-                    raise NotOfMessages(f"the file is of profile '', a recording of {PROFILE!r}")
-                case Schema() if record.id not in schemas:
-                    schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
-                case Channel() if record.id not in channels:
-                    channels[record.id] = writer.register_channel(
-                        record.topic, record.message_encoding, schemas[record.schema_id], record.metadata
-                    )
-                case Message():
-                    writer.add_message(
-                        channels[record.channel_id],
-                        record.log_time,
-                        record.data,
-                        record.publish_time,
-                        record.sequence,
-                    )
-                    count += 1
-                case Metadata():
-                    writer.add_metadata(record.name, record.metadata)
-                case Attachment():
-                    writer.add_attachment(
-                        record.create_time, record.log_time, record.name, record.media_type, record.data
-                    )
-    except _DAMAGED as error:
-        if not has_begun:
-            raise NoRecording(f"no recording: {error}") from error
-    writer.finish()  # type: ignore[no-untyped-call]
-    return count
-
-
-def recover_file(path: Path, to: Path) -> int:
-    """Write all readable messages of a recording to a new file; return their number.
-
-    Raises:
-        NoRecording: The file is not a recording.
-        FileExistsError: The new file exists.
-        OSError: A file cannot be opened.
-    """
-    with path.open("rb") as damaged, to.open("xb") as made:
-        return recover(damaged, made)
-
-
-def _check_index(file: IO[bytes]) -> None:
-    """Return if the index is undamaged, else raise; the library checks only the messages.
+def check_index(file: IO[bytes]) -> None:
+    """Return if the index is as it was written; the library checks only the messages.
 
     Raises:
         ValueError: The index is damaged, or the file has no end.
     """
     end = file.seek(0, os.SEEK_END) - _END.size
-    file.seek(max(0, end))
+    if end < 0:
+        raise ValueError("it is too short")
+    file.seek(end)
     footer = file.read(_END.size)
     _operation, _length, begin, _offsets, checksum = _END.unpack(footer)
     if not 0 < begin <= end:

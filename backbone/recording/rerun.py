@@ -25,6 +25,7 @@ from backbone.keys import Conversation, address_of
 from backbone.keys import key as key_of
 from backbone.naming import Subsystem, component_of, did_you_mean
 from backbone.recording.hearing import Hearing, to_overhear
+from backbone.recording.known_messages import message_classes
 from backbone.recording.presence import Presence
 from backbone.recording.reader import Recorded, Recording, heard_now
 from backbone.recording.recorded_mission import NotAnswered, asked_of
@@ -106,6 +107,13 @@ def _incarnation(recording: Recording, name: str) -> str:
     stops = (one for one in recording.messages((f"*/{name}/{Conversation.ASK}",)) if one.schema == schema_of(Stop))
     found = next(stops, None)
     return str(found.body["incarnation"]) if found is not None else ""
+
+
+def classes_of(launch: Launch) -> Known:
+    """Return the message classes, by schema, with those that the component and its modules declare; imports them."""
+    given = launch.parameters.get("modules", ())  # of an execution unit
+    paths = [one["class_path"] for one in given if isinstance(one, dict) and "class_path" in one]
+    return message_classes(path.partition(":")[0] for path in (launch.class_path, *paths))
 
 
 def run_again(recording: Recording, classes: Known, launch: Launch, component: ComponentType) -> Rerun:

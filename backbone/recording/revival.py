@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import msgspec
@@ -12,7 +13,7 @@ from backbone.errors import Refusal
 from backbone.naming import did_you_mean
 from backbone.recording.json_schema import TAG, fields_of
 from backbone.recording.reader import Recorded
-from backbone.wire import Message, schema_of
+from backbone.wire import Message, plain, schema_of
 
 WRITE_ONE = 'Write an object like {"schema": "Halt", "epoch": 3}; "watch KEY --json" shows messages with their fields.'
 Kind = TypeVar("Kind", bound=Message)
@@ -37,7 +38,7 @@ def revived(kind: type[Kind], body: dict[str, Any] | list[Any]) -> Kind:
     try:
         listed = body if isinstance(body, list) else _listed_struct(kind, body)
         return msgspec.json.decode(msgspec.json.encode(listed), type=kind)
-    except (msgspec.DecodeError, LookupError, TypeError, AttributeError) as error:
+    except (msgspec.DecodeError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise OtherForm(f"{schema_of(kind)}: {error}") from error
 
 
@@ -50,6 +51,12 @@ def message_as_sent(classes: Mapping[str, type[Message]], message: Recorded) -> 
         return revived(kind, message.body)
     except OtherForm:
         return None
+
+
+def with_names(classes: Mapping[str, type[Message]], message: Recorded) -> Recorded:
+    """Return the message with the names of its fields, if its class is known here and the recorder did not know it."""
+    said = message_as_sent(classes, message) if isinstance(message.body, list) else None
+    return message if said is None else replace(message, body=plain(said))
 
 
 def message_from(classes: Mapping[str, type[Message]], said: object) -> Message:
@@ -74,7 +81,10 @@ def message_from(classes: Mapping[str, type[Message]], said: object) -> Message:
         known = ", ".join(sorted(fields)) or "no fields"
         told = f"{schema_of(kind)} has no field {unknown!r}{did_you_mean(unknown, fields)}; it has {known}"
         raise OtherForm(told, remedy=WRITE_ONE)
-    return revived(kind, said)
+    try:
+        return revived(kind, said)
+    except OtherForm as error:
+        raise OtherForm(error.detail, remedy=WRITE_ONE) from error
 
 
 def _listed(kind: inspect.Type, value: Any) -> Any:

@@ -21,7 +21,8 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
-from backbone.exchange_course import ExchangeCourse, ExchangePhase, ExchangeRules, complaint
+from backbone.errors import complaint
+from backbone.exchange_course import ExchangeCourse, ExchangePhase, ExchangeRules
 from mission_control.modules.module import Module
 from mission_control.modules.ports import type_name
 

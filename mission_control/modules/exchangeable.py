@@ -93,8 +93,8 @@ def kinds_made(module: Module | type[Module], member: Member) -> dict[str, objec
     return {key: kinds[port.name] for key, port in member.keyed_outputs}
 
 
-def judge_of(kinds: Mapping[str, object], new: type[Module], member: Member) -> Callable[[object], None]:
-    """Return a function that raises if what the new module's ``update`` returned are no outputs.
+def judge_of(kinds: Mapping[str, object], kind: type[Module], member: Member) -> Callable[[object], None]:
+    """Return a function that raises if what the ``update`` of a module of this class returned are no outputs.
 
     Args:
         kinds: Key → class of its values, as the modules that take them have it.
@@ -102,13 +102,14 @@ def judge_of(kinds: Mapping[str, object], new: type[Module], member: Member) -> 
     wanted = [(port.name, key, kinds[key]) for key, port in member.keyed_outputs]
 
     def judge(outputs: object) -> None:
-        if not isinstance(outputs, new.Outputs):
-            raise WrongModule(f"update returned {type_name(type(outputs))}, not its Outputs", remedy="Return them.")
-        for name, key, kind in wanted:
+        if not isinstance(outputs, kind.Outputs):
+            told = f"update of {member.name} returned {type_name(type(outputs))}, not its Outputs"
+            raise WrongModule(told, remedy="Return them.")
+        for name, key, of in wanted:
             value = getattr(outputs, name)
-            if value is not None and not _is_of(value, kind):
+            if value is not None and not _is_of(value, of):
                 raise WrongModule(
-                    f"update returned {type_name(type(value))} as {key}, not {type_name(kind)}",
+                    f"update of {member.name} returned {type_name(type(value))} as {key}, not {type_name(of)}",
                     remedy="Return the declared class, made in update; classes of values stay those that run.",
                 )
 

@@ -21,6 +21,7 @@ import msgspec
 from backbone.errors import Refusal
 from backbone.exchange_course import ExchangePhase
 from mission_control.modules.exchange import Exchange, handed_over
+from mission_control.modules.exchangeable import judge_of, kinds_made
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module
 from mission_control.modules.ports import Port
@@ -110,8 +111,9 @@ class _Seat:
     module: Module
     inputs: list[_Input]
     outputs: list[tuple[str, str]]
+    judge: Callable[[object], None]
+    """Raises if what ``update`` returned are no outputs: others would get it as it is."""
     times: ModuleTimes = field(default_factory=ModuleTimes)
-    judge: Callable[[object], None] | None = None
 
     def taken(self) -> dict[str, object] | None:
         """Return the inputs that are there, which are seen from now on; None: the module does not run."""
@@ -127,8 +129,7 @@ class _Seat:
 
     def values(self, outputs: object) -> dict[str, object]:
         """Return key → value of what is in the outputs."""
-        if self.judge is not None:
-            self.judge(outputs)
+        self.judge(outputs)
         return {key: value for name, key in self.outputs if (value := getattr(outputs, name)) is not None}
 
 
@@ -211,7 +212,7 @@ class ExecutionUnit:
         outputs = [(port.name, key) for key, port in member.keyed_outputs]
         for _name, key in outputs:
             self._slot(key)
-        return _Seat(member.name, module, inputs, outputs)
+        return _Seat(member.name, module, inputs, outputs, judge_of(kinds_made(module, member), type(module), member))
 
     def _slot(self, key: str) -> _Slot:
         return self._slots.setdefault(key, _Slot())
@@ -264,7 +265,12 @@ class ExecutionUnit:
         if given is None:
             return None
         began_s = self._stopwatch()
-        outputs = seat.module.update(seat.module.Inputs(**given))
+        try:
+            outputs = seat.module.update(seat.module.Inputs(**given))
+        except (Exception, SystemExit, KeyboardInterrupt):
+            raise
+        except BaseException as error:  # CancelledError: a task ends by it without a bug, and the unit would be still
+            raise RuntimeError(f"update of {seat.name} raised {type(error).__name__}") from error
         seat.times = seat.times.with_run(self._stopwatch() - began_s)
         return seat.values(outputs)
 
@@ -297,7 +303,7 @@ class ExecutionUnit:
         if pair.exchange.phase is ExchangePhase.RETURNED:
             self._seats = pair.seats
             return
-        pair.new.judge, pair.new.times = None, pair.old.times
+        pair.new.times = pair.old.times
         self._seats = [pair.new if seat is pair.old else seat for seat in self._seats]
         self._fresh = self._fresh_inputs()
 

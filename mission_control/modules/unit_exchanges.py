@@ -5,18 +5,20 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import msgspec
 
 from backbone.component.component import Component
 from backbone.component.log_level import LogLevel
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
 from backbone.exchange import ExchangeRunning, SwapModule, Swapped, UnknownModule
-from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, complaint, remark_on_file
+from backbone.exchange_course import UNPROVED, ExchangePhase, ExchangeRules, remark_on_file
 from backbone.naming import did_you_mean
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
-from backbone.reading_anew import ReadAnew
+from backbone.reading_anew import HANGS, READ_WITHIN_S, read_anew
+from backbone.waiting import in_thread_within
 from mission_control.modules.choice import SourceChoice
 from mission_control.modules.exchange import Exchange
 from mission_control.modules.exchangeable import graph_with, judge_of, kinds_made
@@ -94,9 +96,7 @@ class UnitExchanges:
             self._running = ""
 
     async def _swap(self, asked: SwapModule) -> Swapped:
-        anew = await asyncio.to_thread(
-            ReadAnew, asked.class_path, load_module_class, WrongModule
-        )  # rounds go on while it imports
+        anew = await read_anew(asked.class_path, load_module_class, WrongModule)  # rounds go on while it imports
         try:
             candidate = await self._candidate(asked, anew.kind)
             wanted, changed = self._wanted(candidate)
@@ -124,7 +124,12 @@ class UnitExchanges:
             {name: key for name, key in before.inputs.items() if name in {one.name for one in ports.inputs}},
             {name: key for name, key in before.outputs.items() if name in {one.name for one in ports.outputs}},
         )
-        return _Candidate(asked, before, self._modules[asked.module], order, await asyncio.to_thread(_made, order))
+        try:
+            new = await in_thread_within(partial(_made, order), READ_WITHIN_S)
+        except TimeoutError:
+            told = f"{order.class_path} is not made within {READ_WITHIN_S:g} s"
+            raise WrongModule(told, remedy=HANGS) from None
+        return _Candidate(asked, before, self._modules[asked.module], order, new)
 
     def _wanted(self, candidate: _Candidate) -> tuple[WantedExchange, asyncio.Event]:
         """Return the exchange, and an event that each change of its phase sets."""

@@ -23,7 +23,9 @@ ARGUMENTS = {"check": [MISSION_XML, "--dry-run"], "up": [MISSION_XML]}
 def numeric_options() -> Iterator[tuple[str, str, str, bool]]:
     """Yield program, command, option and whether it is whole, for each numeric option."""
     for program, app in APPS.items():
-        for command in app.registered_commands:
+        groups = [(group.name, group.typer_instance) for group in app.registered_groups if group.typer_instance]
+        tables = [("", app), *((f"{name} ", table) for name, table in groups)]
+        for group, command in [(group, command) for group, table in tables for command in table.registered_commands]:
             assert command.callback is not None
             hints = get_type_hints(command.callback, include_extras=True)
             for name, hint in hints.items():
@@ -31,7 +33,7 @@ def numeric_options() -> Iterator[tuple[str, str, str, bool]]:
                 option = next((each for each in get_args(hint) if isinstance(each, OptionInfo)), None)
                 if kinds and option is not None and not option.hidden:
                     flag = (option.param_decls or (f"--{name.replace('_', '-')}",))[0]
-                    yield program, command.name or command.callback.__name__, flag, int in kinds
+                    yield program, group + (command.name or command.callback.__name__), flag, int in kinds
 
 
 def _kinds(hint: Any) -> Iterator[Any]:
@@ -55,7 +57,7 @@ def test_a_number_out_of_its_range_is_wrong_usage(
     if is_whole and value in ("1e12", "-1e12"):
         value = str(int(float(value)))
     with pytest.raises(SystemExit) as ended:
-        COMMANDS[program].main([command, *ARGUMENTS.get(command, []), option, value], prog_name=program)
+        COMMANDS[program].main([*command.split(), *ARGUMENTS.get(command, []), option, value], prog_name=program)
     told = capsys.readouterr()
     assert ended.value.code == 2, told
     assert option.lstrip("-") in told.err or "experiment.condition" in told.err

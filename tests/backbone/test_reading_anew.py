@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from backbone.reading_anew import ReadAnew, ValuesChanged, WrongClass
+from backbone.reading_anew import ReadAnew, ValuesChanged, WrongClass, read_anew
 from mission_control.modules.orders import load_module_class
 
 PATH = "read_anew_package.inside:One"
@@ -93,3 +94,17 @@ def test_a_class_of_values_that_is_declared_differently_is_refused(file: Path, o
 def test_what_has_no_file_is_refused() -> None:
     with pytest.raises(WrongClass, match="no file that can be read anew"):
         ReadAnew("sys:One", load_module_class)
+
+
+def test_a_file_whose_import_never_ends_is_refused_and_found_as_before(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("backbone.reading_anew.READ_WITHIN_S", 0.2)
+    before = ReadAnew(PATH, load_module_class).kind
+    file.write_text(SOURCE + "import sys, threading\nsys.never_set = threading.Event()\nsys.never_set.wait()\n")
+    with pytest.raises(WrongClass, match=r"has not ended within 0\.2 s"):
+        asyncio.run(read_anew(PATH, load_module_class))
+    assert sys.modules["read_anew_package.inside"].One is before
+    file.write_text(SOURCE.replace("EDITION = 1", "EDITION = 2"))
+    assert asyncio.run(read_anew(PATH, load_module_class)).kind is not before
+    sys.never_set.set()  # type: ignore[attr-defined]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 
 import pytest
 
 from backbone.bus.clock import VirtualClock, run_virtual
-from backbone.waiting import first_to_end
+from backbone.waiting import first_to_end, in_thread_within
 
 
 def test_the_first_to_end_decides_what_is_raised_and_the_others_are_ended():
@@ -30,3 +31,13 @@ def test_the_first_to_end_decides_what_is_raised_and_the_others_are_ended():
         assert len(asyncio.all_tasks()) == 1
 
     run_virtual(scene())
+
+
+async def test_work_in_a_thread_is_awaited_no_longer_than_it_may_take() -> None:
+    assert await in_thread_within(lambda: "done", 60.0) == "done"
+    with pytest.raises(KeyError):
+        await in_thread_within(lambda: {}["no"], 60.0)
+    goes_on = threading.Event()
+    with pytest.raises(TimeoutError):
+        await in_thread_within(goes_on.wait, 0.05)
+    goes_on.set()

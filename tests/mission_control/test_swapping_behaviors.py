@@ -63,6 +63,7 @@ BROKEN = {
     "when it says whether it is ready": (ACT, f"    def is_ready(self):\n        raise OSError('dim')\n\n{ACT}", "dim"),
     "when it acts": ("self.turns += 1", "raise ValueError('planted')", "planted"),
     "by an exit": ("self.turns += 1", "raise SystemExit(3)", "SystemExit"),
+    "by an interruption": ("self.turns += 1", "raise KeyboardInterrupt", "KeyboardInterrupt"),
     "by its own report": (
         "self.turns += 1",
         "self.finish('failure' and __import__('mission_control.messages').messages.BehaviorStatus.FAILURE)",

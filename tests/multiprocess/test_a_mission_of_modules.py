@@ -124,3 +124,14 @@ def test_load_shows_the_processor_time_of_modules_and_processes() -> None:
         assert processes["launcher"]["processor_s"] > processes["waves"]["processor_s"] > 0.0
         drawn = mission.command("scout-backbone", "load", "--for", "0.1", "--mission", mission.name)
         assert "smoothing" in drawn.stdout
+
+
+def test_messages_that_a_module_declares_are_shown_with_the_names_of_their_fields(tmp_path: Path) -> None:
+    with mission_up(mission_xml=EXAMPLES / "pair.xml") as mission:
+        which = ["--mission", mission.name]
+        watched = mission.command("scout-backbone", "watch", "*/waves/*", "--most", "1", "--for", "20", *which)
+        assert '"height_m":' in watched.stdout, watched.stderr
+        file = str(tmp_path / "waves.mcap")
+        mission.command("scout-backbone", "record", "--to", file, "--for", "1", *which)
+    printed = mission.command("scout-backbone", "recording", "print", file, "--keys", "*/outputs", "--most", "1")
+    assert '"height_m":' in printed.stdout, printed.stderr

@@ -23,6 +23,7 @@ from backbone.component.messages import AskStatistics, Statistics
 from backbone.errors import Refusal
 from backbone.exchange import SwapModule, Swapped
 from backbone.keys import Conversation
+from mission_control.laboratory.module_kit.real_mission import BIN
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
@@ -190,6 +191,26 @@ async def test_a_person_exchanges_a_module_and_a_new_start_has_the_new_class(
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
         await talk.until_answered_by("second")
+
+
+async def test_an_interrupted_command_says_that_the_exchange_goes_on_and_it_does(mission: RunningMission) -> None:
+    async with talk_with(mission):
+        words = ["swap", "answerer", f"{FILE}:Answerer", "--prove", "8", "--mission", mission.name]
+        pipe = asyncio.subprocess.PIPE
+        swapping = await asyncio.create_subprocess_exec(
+            str(BIN / "scout-backbone"), *words, env=mission.environment, stdout=pipe, stderr=pipe
+        )
+        until = asyncio.get_running_loop().time() + WITHIN_S
+        while "has to prove itself" not in mission.component("answering")["feedback"]:
+            assert asyncio.get_running_loop().time() < until, mission.story()
+            await asyncio.sleep(0.1)
+        swapping.send_signal(signal.SIGINT)
+        _out, told = await swapping.communicate()
+        assert swapping.returncode == 130
+        assert "goes on without this command" in told.decode()
+        while "goes on with the state" not in mission.component("answering")["feedback"]:
+            assert asyncio.get_running_loop().time() < until + 8, mission.story()
+            await asyncio.sleep(0.1)
 
 
 @pytest.mark.alone  # a machine that is full loses messages at 30 Hz without any swap, too

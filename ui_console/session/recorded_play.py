@@ -23,7 +23,7 @@ from backbone.recording.known_messages import message_classes
 from backbone.recording.markers import markers_in
 from backbone.recording.playback import Playback
 from backbone.recording.player import Player
-from backbone.recording.reader import Recording
+from backbone.recording.reader import Recording, open_file
 from backbone.waiting import end_tasks, first_to_end
 
 NEAR_S = 2.0  # chosen: a step ahead is played, so that nothing between is left out; mission seconds
@@ -49,7 +49,7 @@ def opener(path: Path) -> Callable[[], IO[bytes]]:
 
     def opened() -> IO[bytes]:
         try:
-            return path.open("rb")
+            return open_file(path)
         except OSError as error:
             raise FileUnusable(f"{path} cannot be read: {error.strerror}") from error
 

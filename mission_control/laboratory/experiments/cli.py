@@ -10,7 +10,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from backbone.command_line.options import CommandTable, finite
+from backbone.command_line.options import CommandTable
 from backbone.errors import Refusal, code_of
 from backbone.launcher.endings import ExitCode
 
@@ -126,7 +126,7 @@ def surveillance(
 def load(
     policy: Annotated[Policy, typer.Option("--policy", help="How to ask.")] = Policy.PAPER,
     channels: Annotated[int, typer.Option("--channels", min=1, max=4, help="Video frequencies.")] = 1,
-    driven: Annotated[float, typer.Option("--driven", min=0.0, max=1.0, callback=finite, help="Share of time")] = 1.0,
+    driven: Annotated[float, typer.Option("--driven", min=0.0, max=1.0, help="Share of time")] = 1.0,
     trials: Trials = 100,
     seed: Seed = 1,
     jobs: Jobs = 0,
@@ -145,9 +145,7 @@ def load(
 def servoing(
     trials: Annotated[int, typer.Option("--trials", min=1, max=MOST_TRIALS, help="Starts.")] = 100,
     seed: Seed = 1,
-    noise: Annotated[
-        float, typer.Option("--noise", min=0, max=10, callback=finite, help="Of the pictures: 0 none, 1 papers'.")
-    ] = 1.0,
+    noise: Annotated[float, typer.Option("--noise", min=0, max=10, help="Of the pictures: 0 none, 1 papers'.")] = 1.0,
     jobs: Jobs = 0,
     as_json: AsJson = False,
 ) -> None:

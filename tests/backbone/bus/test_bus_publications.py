@@ -4,6 +4,7 @@ from typing import Any
 
 from bus_laws import ASK_S, ASKER, SERVER, THIRD, Echo, Echoed, Heard, Net, News, Other, Runner, pair, until_known
 
+from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.wire import Envelope, Message
 
@@ -110,7 +111,8 @@ def test_latest_ends_with_the_newest_of_a_burst(on_bus: Runner) -> None:
 def test_a_publication_of_an_unexpected_schema_is_counted_and_skipped(on_bus: Runner) -> None:
     async def law(net: Net) -> None:
         source, listener = net.join(SERVER), net.join(ASKER)
-        heard = Heard()
+        heard, told = Heard(), dict[str, Refusal]()
+        listener.on_unreadable = told.__setitem__
         listener.subscribe(SERVER, Conversation.EVENTS, News, heard)
         await until_known(listener, source)
         source.publish(SERVER, Conversation.EVENTS, Other())
@@ -118,6 +120,9 @@ def test_a_publication_of_an_unexpected_schema_is_counted_and_skipped(on_bus: Ru
         await heard.until_count(1)
         assert heard.numbers() == [1]
         assert listener.statistics().unreadable == 1
+        [(key, why)] = told.items()
+        assert key.endswith(f"{SERVER}/events")
+        assert "Other" in why.detail
 
     on_bus(law)
 

@@ -97,6 +97,24 @@ def test_a_bug_in_a_task_ends_it_and_drains_once() -> None:
     live(law())
 
 
+def test_a_cancellation_that_nobody_asked_for_is_a_bug_and_one_that_somebody_asked_for_is_none() -> None:
+    async def cut_off() -> None:
+        raise asyncio.CancelledError
+
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        stage.walker.start_task(asyncio.sleep(60.0), "asked").cancel()
+        await stage.clock.sleep_s(0.1)
+        assert stage.walker.state is LifeState.READY
+        stage.walker.start_task(cut_off(), "cut off")
+        with pytest.raises(RuntimeError, match="walker:cut off raised CancelledError"):
+            await life
+        assert stage.states[-1].state is LifeState.FAILED
+
+    live(law())
+
+
 def test_the_first_of_two_bugs_is_the_one_raised() -> None:
     async def law() -> None:
         stage = Stage(stumble="drain", hold="serve")

@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import pytest
 from in_process_zygote import InProcessZygote
 
@@ -22,6 +23,7 @@ from backbone.creator.failed_starts import LAST_LINES, last_lines
 from backbone.creator.messages import AlreadyHere, EndedBy, NotHere, ProcessFell, RestartPolicy, StartFailed
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.silence import LOOK_EVERY_S
+from backbone.keys import Conversation
 from backbone.naming import Subsystem
 
 FIRST_PID = 1001  # of an InProcessZygote
@@ -324,3 +326,22 @@ def test_the_end_of_a_log_is_shown_without_reading_all_of_it(tmp_path: Path) -> 
     path.parent.mkdir()
     path.write_text("\n".join(f"line {number}" for number in range(100_000)))
     assert last_lines(str(tmp_path), "scout1") == [f"line {number}" for number in range(100_000 - LAST_LINES, 100_000)]
+
+
+def test_who_falls_says_the_bug_that_its_log_ends_with(on_bench: Callable, tmp_path: Path) -> None:
+    async def body(bench: Bench) -> None:
+        started = msgspec.structs.replace(launch("Failing", "failing"), run_directory=str(tmp_path))
+        path = log_path(str(tmp_path), "failing")
+        path.parent.mkdir()
+        told = "12:00 ERROR x: process {}: resource_pool/failing ended by a bug: {}"
+        bug, older = told.format(FIRST_PID, "ValueError: no picture (pair.py, line 7)"), told.format(7, "KeyError: 'a'")
+        path.write_text("\n".join([bug, older, "Traceback (most recent call last):", *["  a frame"] * LAST_LINES, ""]))
+        await bench.keeper.start(started, POLICY, 5.0)
+        bench.bus.publish("resource_pool/failing", Conversation.COMMAND, Stop("now"))
+        await VirtualClock().sleep_s(0.05)
+        [state] = bench.keeper.processes()
+        assert state.last_end == "exit code 1: ValueError: no picture (pair.py, line 7)"
+        [fell] = bench.fell
+        assert fell.how == state.last_end
+
+    on_bench(body)

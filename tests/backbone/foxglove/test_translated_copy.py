@@ -25,7 +25,8 @@ from backbone.foxglove.translated_copy import write_copy
 from backbone.foxglove.well_known import installed, shown_as
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import NotOfMessages, Recording, recover
+from backbone.recording.reader import NotOfMessages, Recording
+from backbone.recording.recovering import recover
 from backbone.recording.writer import RecordingWriter
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 from resource_pool.localization import FloorPlan, FloorShape, Pose, ShapeKind

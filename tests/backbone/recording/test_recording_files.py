@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
@@ -10,12 +12,14 @@ import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.reader import SeekingReader
 
 from backbone.bus.interface import Copies, Told
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.recording.hearing import is_meant
 from backbone.recording.known_messages import message_classes
-from backbone.recording.reader import NoRecording, Recorded, Recording, recover, recover_file
+from backbone.recording.reader import NoRecording, Recorded, Recording, open_file
+from backbone.recording.recovering import recover, recover_file
 from backbone.recording.revival import revived
 from backbone.recording.writer import RecordingWriter
 from backbone.wire import Envelope, Message, write
@@ -85,12 +89,13 @@ def test_of_a_recording_cut_anywhere_all_that_came_before_the_cut_is_recovered(
     cut = data.draw(st.integers(0, len(whole)))
     made = io.BytesIO()
     try:
-        count = recover(io.BytesIO(whole[:cut]), made)
+        count, damaged = recover(io.BytesIO(whole[:cut]), made)
     except NoRecording:
         assert cut < 64, "only a file without even a header is none"
         return
     found = read(made.getvalue())
     assert [one.sequence for one in found] == [*range(count)], "no gap, none twice"
+    assert damaged == 0
     if cut == len(whole):
         assert count == flushed
 
@@ -122,13 +127,42 @@ def test_an_unfinished_recording_names_the_remedy_and_recovers(tmp_path: Path) -
     broken.write_bytes(data)
     with broken.open("rb") as file, pytest.raises(NoRecording):
         Recording(file)
-    assert recover_file(broken, whole) == 3
+    assert recover_file(broken, whole).messages == 3
     with whole.open("rb") as file:
         recording = Recording(file)
         assert recording.mission_xml() == "<mission/>"
         assert recording.contents().about == ABOUT
     with pytest.raises(FileExistsError):
         recover_file(broken, whole)
+
+
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_a_damaged_chunk_costs_its_own_messages_alone(at: int) -> None:
+    data, _ = recorded([0, 1] * 3, frozenset({1, 3}))
+    chunks = [one.chunk_start_offset for one in SeekingReader(io.BytesIO(data)).get_summary().chunk_indexes]  # type: ignore[union-attr]
+    broken, made = bytearray(data), io.BytesIO()
+    broken[chunks[at] + 100] ^= 1
+    assert recover(io.BytesIO(broken), made) == (4, 1)
+    assert [one.sequence for one in read(made.getvalue())] == [n for n in range(6) if n // 2 != at]
+
+
+@pytest.mark.parametrize(
+    "use", [open_file, lambda path: recover_file(path, path.with_name("whole"))], ids=["open", "recover"]
+)
+def test_a_pipe_is_refused_and_not_waited_for(use: Callable[[Path], object], tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.mcap"
+    os.mkfifo(pipe)
+    with pytest.raises(OSError, match="no regular file"):
+        use(pipe)
+    assert not pipe.with_name("whole").exists()
+
+
+def test_what_cannot_be_recovered_leaves_no_file(tmp_path: Path) -> None:
+    broken, whole = tmp_path / "broken.mcap", tmp_path / "whole.mcap"
+    broken.write_bytes(b"RIFF" * 100)
+    with pytest.raises(NoRecording):
+        recover_file(broken, whole)
+    assert not whole.exists()
 
 
 def test_keys_and_times_choose_messages() -> None:

@@ -10,10 +10,13 @@ import pytest
 from recorded_missions import CLASSES, record_mission
 
 from backbone.component.class_path import load_class
+from backbone.component.launch import Launch
 from backbone.mission.reader import read_mission
+from backbone.naming import Subsystem
 from backbone.recording.comparison import KeyComparison, compared
-from backbone.recording.reader import Recording
-from backbone.recording.rerun import NoSuchComponent, launch_of, run_again
+from backbone.recording.reader import Recorded, Recording
+from backbone.recording.rerun import NoSuchComponent, classes_of, launch_of, run_again
+from backbone.recording.revival import with_names
 
 MISSION_XML = Path(__file__).parents[3] / "mission.xml"
 LASTED_S = 25.0
@@ -79,3 +82,20 @@ def test_a_component_that_falls_is_told(recording: Recording):
 def test_of_nobody_there_is_no_launch(recording: Recording):
     with pytest.raises(NoSuchComponent, match="watch-scout1"):
         launch_of(recording, CLASSES, "watch-scot1")
+
+
+def test_the_messages_of_a_units_modules_and_of_its_exchanges_are_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "own_modules.py").write_text(
+        "from backbone.wire import Message\nclass OwnDepth(Message, frozen=True):\n    depth_m: float\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    parameters = {"modules": [{"name": "depth", "class_path": "own_modules:Depth"}]}
+    unit = "mission_control.modules.unit_component:UnitComponent"
+    launch = Launch("local", Subsystem.MISSION_CONTROL, "u", "execution_unit", unit, "local", "", 0.0, 1.0, parameters)
+    classes = classes_of(launch)
+    assert {"OwnDepth/1", "SwapModule/1"} <= classes.keys()
+    nameless = Recorded("scout/m/u", "u", "OwnDepth/1", 1.0, 1.0, 1.0, 1, "", ["OwnDepth/1", 0.5])
+    assert with_names(classes, nameless).body == {"depth_m": 0.5}
+    assert with_names({}, nameless) is nameless

@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_modules import Number
 
-from backbone.exchange_course import ExchangePhase, ExchangeRules, complaint
+from backbone.errors import complaint
+from backbone.exchange_course import ExchangePhase, ExchangeRules
 from mission_control.modules.exchange import Exchange, Turned, handed_over
 from mission_control.modules.exchangeable import judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
@@ -238,13 +239,14 @@ def test_two_that_fail_in_the_same_round_are_the_bug_of_the_old_one() -> None:
         exchange.round(0.1, broken, broken)
 
 
-def test_a_module_that_ends_the_process_only_ends_its_exchange() -> None:
+@pytest.mark.parametrize("ending", [SystemExit(3), KeyboardInterrupt()], ids=repr)
+def test_a_module_that_ends_the_process_only_ends_its_exchange(ending: BaseException) -> None:
     def leaving() -> Turned:
-        raise SystemExit(3)
+        raise ending
 
     exchange = begun()
     assert exchange.round(0.0, lambda: {"a": 1}, leaving) == {"a": 1}
-    assert exchange.cause.startswith("SystemExit: 3")
+    assert exchange.cause.startswith(type(ending).__name__)
 
 
 # ---------------------------------------------------------------------- state

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
@@ -17,6 +18,7 @@ from sample_modules import Counter, Doubler, Follower, Number, Sum, Summing
 from mission_control.modules.execution_unit import ExecutionUnit, ModuleTimes, Produced
 from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module, default_name
+from mission_control.modules.orders import WrongModule
 from mission_control.modules.ports import LATEST, ports_of, type_name
 from mission_control.modules.unit_schedule import OnInput, Trigger
 from mission_control.modules.units_together import UnitsTogether
@@ -195,3 +197,36 @@ def test_what_a_module_costs_is_counted_for_itself() -> None:
 
 def test_a_class_of_ports_is_read_once() -> None:
     assert ports_of(Pair.Inputs) is ports_of(Pair.Inputs)
+
+
+class Faulty(Module):
+    """Returns what it is given, or raises it."""
+
+    class Outputs(Module.Outputs):
+        number: Number
+
+    def __init__(self, returned: object) -> None:
+        super().__init__()
+        self.returned = returned
+
+    def update(self, inputs: Module.Inputs) -> Any:
+        if isinstance(self.returned, BaseException):
+            raise self.returned
+        return self.returned
+
+
+@pytest.mark.parametrize(
+    ("returned", "told"),
+    [
+        (None, "update of faulty returned builtins:NoneType, not its Outputs"),
+        ({"number": Number(1.0)}, "not its Outputs"),
+        (Faulty.Outputs("text"), "update of faulty returned builtins:str as number, not"),  # type: ignore[arg-type]
+        (Faulty.Outputs(Trigger(1.0)), "Trigger as number, not"),  # type: ignore[arg-type]
+        (asyncio.CancelledError(), "update of faulty raised CancelledError"),
+    ],
+)
+def test_what_is_no_output_goes_to_nobody_and_is_a_bug_with_the_name_of_its_module(returned: object, told: str) -> None:
+    graph = Graph({"one": [Member("faulty", Faulty.ports())]}, {})
+    unit = ExecutionUnit("one", graph, {"faulty": Faulty(returned)}, Trigger(1.0), stopwatch=lambda: 0.0)
+    with pytest.raises((RuntimeError, WrongModule), match=told):
+        unit.run(0.0)

@@ -257,3 +257,12 @@ def test_two_algorithms_stand_side_by_side_as_the_explanation_of_the_vision_show
     )
     [vision] = read(tmp_path, mission(shown, given=given)).units
     assert vision.parameters["published"] == ["judged", "motion", "motion-by-difference"]
+
+
+@pytest.mark.thorough
+def test_a_thousand_modules_are_described(tmp_path: Path) -> None:
+    renamed = '<input name="number" key="k{}"/><output name="twice" key="k{}"/>'
+    rest = [module(f"m{n}", "sample_modules:Doubler", renamed.format(n - 1, n)) for n in range(1, 1000)]
+    first = module("m0", "sample_modules:Doubler", '<output name="twice" key="k0"/>')
+    [described] = read(tmp_path, mission(unit("one", first, *rest))).units
+    assert len(described.parameters["modules"]) == 1000

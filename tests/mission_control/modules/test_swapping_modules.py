@@ -247,6 +247,7 @@ def test_a_class_that_cannot_be_made_is_refused_and_nothing_changes(
         ("return None", "not its Outputs"),
         ("return self.Outputs(Level(1.0))", "Level as count, not"),
         ("import sys; sys.exit(3)", "SystemExit: 3"),
+        ("raise KeyboardInterrupt", "KeyboardInterrupt"),
         ("return self.Outputs(None)", "not ready within"),
     ],
 )

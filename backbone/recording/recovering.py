@@ -1,0 +1,133 @@
+"""Recovering: a whole recording of what is readable of one that is damaged, or whose recorder was killed.
+
+Rules of this file: a damaged chunk costs its own messages alone, and is counted. Of a file that is cut, or damaged
+between two chunks, all before that place is kept.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import IO, Any, NamedTuple, cast
+
+from mcap.reader import SeekingReader
+from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import CompressionType, Writer
+
+from backbone.recording.reader import DAMAGED, MOST_RECORD_BYTES, NoRecording, NotOfMessages, check_index, open_file
+from backbone.recording.writer import CHUNK_BYTES, PROFILE
+
+
+class Recovered(NamedTuple):
+    """What was written, and what was not.
+
+    Attributes:
+        messages: Number of messages in the new recording.
+        damaged: Number of chunks, of some 250 kB, whose messages cannot be read.
+    """
+
+    messages: int
+    damaged: int
+
+
+class _WholeRecording:
+    """A recording that is being written from records of another one."""
+
+    def __init__(self, to: IO[bytes]) -> None:
+        self._writer = Writer(to, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer.start(profile=PROFILE, library=PROFILE)
+        self._schemas: dict[int, int] = {0: 0}
+        self._channels: dict[int, int] = {}
+        self.messages = 0
+
+    def take(self, record: McapRecord) -> None:
+        """Write the record; one that is written already, or of no use, is not."""
+        match record:
+            case Header(profile=""):  # any other may be damaged
+                raise NotOfMessages(f"the file is of profile '', a recording of {PROFILE!r}")
+            case Schema() if record.id not in self._schemas:
+                self._schemas[record.id] = self._writer.register_schema(record.name, record.encoding, record.data)
+            case Channel() if record.id not in self._channels:
+                about = (record.topic, record.message_encoding, self._schemas[record.schema_id], record.metadata)
+                self._channels[record.id] = self._writer.register_channel(*about)
+            case Message():
+                at = (record.log_time, record.data, record.publish_time, record.sequence)
+                self._writer.add_message(self._channels[record.channel_id], *at)
+                self.messages += 1
+            case Metadata():
+                self._writer.add_metadata(record.name, record.metadata)
+            case Attachment():
+                about_file = (record.name, record.media_type, record.data)
+                self._writer.add_attachment(record.create_time, record.log_time, *about_file)
+
+    def finish(self) -> None:
+        """Write the index."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+
+def recover(damaged: IO[bytes], to: IO[bytes]) -> Recovered:
+    """Write a whole recording with all messages that can be read; return how many.
+
+    Raises:
+        NoRecording: Not even the begin is there; ``NotOfMessages``: it is a copy for other tools.
+    """
+    whole, lost, has_begun = _WholeRecording(to), 0, False
+    names = _names_in_index(damaged)
+    reader = StreamReader(
+        cast("Any", damaged), emit_chunks=True, validate_crcs=True, record_size_limit=MOST_RECORD_BYTES
+    )
+    try:
+        for record in reader.records:
+            has_begun = True
+            if isinstance(record, Chunk):
+                lost += not _took_chunk(whole, record, names)
+            else:
+                whole.take(record)
+    except DAMAGED as error:
+        if not has_begun:
+            raise NoRecording(f"no recording: {str(error) or 'it is too short'}") from error
+    whole.finish()
+    return Recovered(whole.messages, lost)
+
+
+def recover_file(path: Path, to: Path) -> Recovered:
+    """Write what is readable of a recording to a new file, which is there only if this succeeds.
+
+    Raises:
+        NoRecording: It is none.
+        FileExistsError: The new file exists.
+        OSError: One of them cannot be opened, or there is no room for the new one.
+    """
+    with open_file(path) as damaged, to.open("xb") as made:
+        try:
+            return recover(damaged, made)
+        except BaseException:
+            to.unlink()
+            raise
+
+
+def _took_chunk(whole: _WholeRecording, chunk: Chunk, names: list[McapRecord]) -> bool:
+    """Take the records of a chunk; return whether all of them could be read."""
+    try:
+        records = breakup_chunk(chunk, validate_crc=True)
+    except DAMAGED:
+        records, took = names, False  # a later chunk may need the names that this one gave
+    else:
+        took = True
+    for record in records:
+        try:
+            whole.take(record)
+        except LookupError:  # its channel stood in a damaged chunk, and there is no index
+            took = False
+    return took
+
+
+def _names_in_index(file: IO[bytes]) -> list[McapRecord]:
+    """Return the schemas and channels that the index has; none if it is damaged or not there."""
+    try:
+        check_index(file)
+        summary = SeekingReader(file, record_size_limit=MOST_RECORD_BYTES).get_summary()
+    except (*DAMAGED, OSError):
+        summary = None
+    file.seek(0)
+    return [] if summary is None else [*summary.schemas.values(), *summary.channels.values()]

@@ -1,0 +1,42 @@
+"""What a person writes to be injected is read as it stands, or refused with how to write it."""
+
+from __future__ import annotations
+
+import pytest
+
+from backbone.command_line.injecting import read_object
+from backbone.command_line.options import json_or_text
+from backbone.component.messages import SetParameter
+from backbone.recording.revival import WRITE_ONE, OtherForm, message_from
+from backbone.wire import schema_of
+
+CLASSES = {schema_of(SetParameter): SetParameter}
+DEEP = "[" * 10_000 + "]" * 10_000
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "no JSON"),
+        ("{'schema': 1}", "no JSON"),
+        (DEEP, "no JSON"),
+        ('{"schema": "AskState", "schema": "Stop"}', "twice"),
+        ('{"schema": "SetParameter", "deep": {"a": 1, "a": 2}}', "twice"),
+    ],
+    ids=["nothing", "Python", "deep", "twice", "twice within"],
+)
+def test_what_is_no_json_is_refused_with_how_to_write_it(text: str, told: str) -> None:
+    with pytest.raises(OtherForm, match=told) as refused:
+        read_object(text)
+    assert refused.value.remedy == WRITE_ONE
+
+
+@pytest.mark.parametrize("said", [{}, {"name": 5}, {"name": "x", "value": None, "user": "a" * 10_000}], ids=str)
+def test_a_message_with_other_values_is_refused_with_how_to_write_it(said: dict[str, object]) -> None:
+    with pytest.raises(OtherForm, match="SetParameter/") as refused:
+        message_from(CLASSES, {"schema": "SetParameter"} | said)
+    assert refused.value.remedy == WRITE_ONE
+
+
+def test_a_value_that_is_too_deep_to_be_json_is_a_text() -> None:
+    assert json_or_text(DEEP) == DEEP
