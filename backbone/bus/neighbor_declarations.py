@@ -10,7 +10,17 @@ from collections.abc import Callable
 from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Answer, LifeListener, Listener, Overhearer
 from backbone.keys import Conversation, key
-from backbone.wire import Accepts, Envelope, Message, UnknownMessage, kinds_of, schema_of, write
+from backbone.wire import (
+    Accepts,
+    Envelope,
+    Message,
+    OversizedMessage,
+    UnknownMessage,
+    UnwritableMessage,
+    kinds_of,
+    schema_of,
+    write,
+)
 
 TakeBack = Callable[[], None]
 

@@ -96,6 +96,8 @@ class _Text:
 
 def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
     for parameter in parameters:
+        if getattr(getattr(parameter, "type_descriptor", None), "annotation", None) is str:
+            parameter.get_runtime_param = _Text
         parameter.process_value = partial(_processed, parameter, parameter.process_value)
 
 
