@@ -9,6 +9,8 @@ from typing import Any
 
 async def set_within(event: asyncio.Event, within_s: float | None) -> bool:
     """Return True once the event is set, False if it is not within this machine time; None: however long it takes."""
+    if within_s is None:
+        return await event.wait()
     try:
         async with asyncio.timeout(within_s):
             return await event.wait()

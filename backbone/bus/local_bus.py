@@ -93,14 +93,15 @@ class Neighbor(Declaring):
         answered = self.open_question()
         self.asked += 1
         asked = self.envelope(question)
+        too_late = asyncio.get_running_loop().call_later(within_s, settle, answered, TimeoutError())
         try:
-            async with asyncio.timeout(within_s):
-                await asyncio.sleep(0)
-                self.network.carry_question(address, asked, lambda outcome: settle(answered, outcome))
-                envelope = await answered
+            await asyncio.sleep(0)
+            self.network.carry_question(address, asked, lambda outcome: settle(answered, outcome))
+            envelope = await answered
         except TimeoutError:
             raise ReplyTimeout(f"{address} did not answer {type(question).__name__} within {within_s:g} s") from None
         finally:
+            too_late.cancel()
             self.end_question(answered)
         if envelope is None:
             raise NoResponder(f"{address} died before it answered {type(question).__name__}")
