@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from typing import TypeVar
 
 Order = TypeVar("Order")
@@ -58,8 +60,24 @@ def results_of(
         yield from map(work, orders)
         return
     # Spawned, not forked: a fork of a process with threads of its own may hang.
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, initializer=_keep_to_one_core) as pool:
         try:
-            yield from pool.map(work, orders, chunksize=chunk)
+            yield from pool.map(partial(_worked, work), orders, chunksize=chunk)
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _keep_to_one_core() -> None:
+    """Let OpenCV and OpenBLAS, which are imported later, start no threads: the other cores have work of their own."""
+    for threads in ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")
+
+
+def _worked(work: Callable[[Order], Result], order: Order) -> Result:
+    """Do the work; what the first of it imported and keeps, the garbage collector never looks through again."""
+    result = work(order)
+    if not gc.get_freeze_count():
+        gc.collect()
+        gc.freeze()
+    return result
