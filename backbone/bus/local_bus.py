@@ -10,6 +10,7 @@ uses the same delivery between neighbors.
 from __future__ import annotations
 
 import asyncio
+import functools
 from collections import Counter, defaultdict
 from collections.abc import Callable
 
@@ -37,6 +38,8 @@ from backbone.wire import (
     UnknownMessage,
     schema_of,
 )
+
+ADDRESSES_KEPT = 4096  # chosen: more than a mission of 100 robots has
 
 Answered = Callable[[Envelope[Message] | None], None]
 """Callback with the answer to a question, or None if the component died over it."""
@@ -324,6 +327,7 @@ def _outcome(answering: asyncio.Task[Envelope[Message] | None]) -> Envelope[Mess
     return None if answering.cancelled() or answering.exception() is not None else answering.result()
 
 
+@functools.lru_cache(maxsize=ADDRESSES_KEPT)
 def _check(mission: str, address: str) -> None:
     """Refuse the names that the bus between processes refuses in keys."""
     key(mission, address, Conversation.ASK)

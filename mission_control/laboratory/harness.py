@@ -15,6 +15,8 @@ Result = TypeVar("Result")
 
 BATCH = 5  # chosen: seconds of work, so that the last process is not long alone, and cached pictures are used again
 
+OBJECTS_AT_ONCE = 20_000  # chosen: some megabytes of garbage; Python's own 700 are for programs that have less
+
 Progress = Callable[[int, int], None]
 """Callback with the number of finished trials and of all trials."""
 
@@ -75,9 +77,13 @@ def _keep_to_one_core() -> None:
 
 
 def _worked(work: Callable[[Order], Result], order: Order) -> Result:
-    """Do the work; what the first of it imported and keeps, the garbage collector never looks through again."""
+    """Do the work; after the first, the garbage collector has little to do.
+
+    What was imported by then and is kept it never looks through again, and it looks for garbage less often.
+    """
     result = work(order)
     if not gc.get_freeze_count():
         gc.collect()
         gc.freeze()
+        gc.set_threshold(OBJECTS_AT_ONCE)
     return result
