@@ -14,7 +14,9 @@ T = TypeVar("T")
 
 
 async def set_within(event: asyncio.Event, within_s: float | None) -> bool:
-    """Return True once the event is set, False if it is not set within this machine time; None: no limit."""
+    """Return True once the event is set, False if it is not within this machine time; None: however long it takes."""
+    if within_s is None:
+        return await event.wait()
     try:
         async with asyncio.timeout(within_s):
             return await event.wait()

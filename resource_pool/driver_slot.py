@@ -11,14 +11,17 @@ Rules of this file:
 from __future__ import annotations
 
 import asyncio
+import functools
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any
 
 from backbone.errors import Refusal
 from backbone.exchange_course import UNPROVED
 from resource_pool.drivers.interface import HardwareFault
 
 HANGS_S = 0.2  # chosen: the old driver still has as long until the RC itself gives a call up; machine seconds
+SLOTS_KEPT = 64  # chosen: more than the kinds of drivers in one process
 
 
 class DriverSlot:
@@ -86,8 +89,8 @@ class DriverSlot:
         self._quiet.clear()
         try:
             given = [self._while_works(driver, one) for one in arguments]
-            async with asyncio.timeout(HANGS_S if self.is_tried else None):
-                done: object = await getattr(driver, name)(*given, **named)
+            call: Awaitable[object] = getattr(driver, name)(*given, **named)
+            done = await (_within(HANGS_S, call) if self.is_tried else call)
             self.calls += 1
             return done
         except UNPROVED as error:
@@ -115,16 +118,25 @@ class DriverSlot:
         return heard
 
 
+async def _within(within_s: float, call: Awaitable[object]) -> object:
+    async with asyncio.timeout(within_s):
+        return await call
+
+
 def slot_for(driver: object) -> DriverSlot:
     """Return a slot with this driver, which has its methods."""
+    slot: DriverSlot = _slot_class(type(driver))(driver)  # type: ignore[arg-type]  # mypy: classes have no hash
+    return slot
+
+
+@functools.lru_cache(maxsize=SLOTS_KEPT)
+def _slot_class(driver: type[Any]) -> type[DriverSlot]:
     methods = {
         name: _waiting(name) if inspect.iscoroutinefunction(method) else _at_once(name)
-        for name, method in inspect.getmembers(type(driver), callable)
+        for name, method in inspect.getmembers(driver, callable)
         if not name.startswith("_") and not isinstance(method, type)
     }
-    kind = type("DriverSlot", (DriverSlot,), methods)
-    slot: DriverSlot = kind(driver)
-    return slot
+    return type("DriverSlot", (DriverSlot,), methods)
 
 
 def methods_of(driver: object) -> set[str]:

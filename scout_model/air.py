@@ -34,6 +34,7 @@ WAVES = 48  # chosen: enough that a run's share of fades is Rayleigh's within a 
 
 RADIO_SNR_AT_1_M_DB = 46.0  # chosen: as the video's; packets then reach across any room, but not across a street
 LIGHT_M_PER_S = 299_792_458.0
+_WORD = 2**32 - 1
 
 _DEPTH = -math.log(1.0 - FADED_SHARE)  # power, of the mean, below which Rayleigh's fading is for this share of time
 _DOPPLER_HZ = (math.exp(_DEPTH) - 1.0) / (math.sqrt(2 * math.pi * _DEPTH) * FADE_S)  # Jakes: duration of a fade
@@ -117,3 +118,16 @@ class Fading:
 def key_of(name: str) -> int:
     """Return a number for a name, the same in every process."""
     return zlib.crc32(name.encode())
+
+
+def words_of(number: int) -> list[int]:
+    """Return the 32-bit words that NumPy makes of a number in a seed; from those it makes a generator sooner.
+
+    Example:
+        >>> words_of(5), words_of(2**32 + 7)
+        ([5], [7, 1])
+    """
+    words = [number & _WORD]
+    while number := number >> 32:
+        words.append(number & _WORD)
+    return words

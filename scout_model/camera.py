@@ -96,12 +96,15 @@ class Camera:
             case _:
                 raise ValueError(f"no backend {backend!r}; there are 'gl' and 'paint'")
         self._movers = _Movers(self._model)
+        # MuJoCo's arrays stay where they are; each look-up of one in its data makes a new array of it.
+        self._eyes_m = self._data.cam_xpos
         self._shade = _Shade(self._model)
         self._memo: OrderedDict[bytes, NDArray[np.uint8]] = OrderedDict()
         self._memo_pictures = memo_pictures
         self.drawn = 0
         """How many pictures were drawn, not found in the memo."""
-        self._shown: NDArray[np.float64] | None = None
+        self._shown = b""
+        self._pictures: dict[int, NDArray[np.uint8]] = {}  # those of this state
         self._length = mujoco.mj_stateSize(self._model, STATE)
         state = np.empty(self._length)
         mujoco.mj_getState(self._model, self._data, state, STATE)
@@ -128,9 +131,10 @@ class Camera:
             raise StateMismatch(f"a state of shape {state.shape}, this world's have {self._length} numbers")
         # Adding zero makes the negative zero, whose bits differ, an ordinary one.
         rounded = np.round(state, _STATE_DECIMALS) + 0.0
-        if self._shown is not None and np.array_equal(rounded, self._shown):
+        if (shown := rounded.tobytes()) == self._shown:
             return
-        self._shown = rounded
+        self._shown = shown
+        self._pictures.clear()
         mujoco.mj_setState(self._model, self._data, rounded, STATE)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
@@ -143,6 +147,14 @@ class Camera:
             UnknownBody: No robot with a camera has this name.
         """
         camera = self._camera_of(robot)
+        picture = self._pictures.get(camera)
+        if picture is None:
+            picture = self._remembered(camera)
+            if self._memo_pictures:
+                self._pictures[camera] = picture
+        return picture
+
+    def _remembered(self, camera: int) -> NDArray[np.uint8]:
         seen = self._movers.seen(self._data, camera, self._shade.is_dark)
         picture = self._memo.get(seen)
         if picture is not None:
@@ -162,8 +174,8 @@ class Camera:
         Raises:
             UnknownBody: No robot with a camera has this name.
         """
-        x_m, y_m, z_m = self._data.cam_xpos[self._camera_of(robot)]
-        return float(x_m), float(y_m), float(z_m)
+        x_m, y_m, z_m = self._eyes_m[self._camera_of(robot)].tolist()
+        return x_m, y_m, z_m
 
     def _camera_of(self, robot: str) -> int:
         if robot not in self._cameras:

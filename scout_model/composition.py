@@ -8,12 +8,23 @@ sites that tell a camera where it is dark.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from importlib import resources
 
+import msgspec
 import mujoco
 import numpy as np
 
-from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, RobotPlace, Target, WorldDescription
+from scout_model.description import (
+    AirDescription,
+    DarkPlace,
+    Furniture,
+    Landmark,
+    Ramp,
+    RobotPlace,
+    Target,
+    WorldDescription,
+)
 from scout_model.description_checks import check
 from scout_model.dimensions import (
     BLOB_DIAMETER_M,
@@ -38,6 +49,7 @@ from scout_model.robot import robot_class
 from scout_model.room_file import add_room
 from scout_model.targets import CARRIER, part_poses
 
+_TEXTS_KEPT = 4  # chosen: one experiment or a few by turns; some ten kilobytes each
 _WALL_THICKNESS_M = 0.1  # chosen: a Scout in flight does not pass through within one step
 _MARK_THICKNESS_M = 0.002  # chosen: enough to keep mark and surface apart in the depth buffer across the room
 _SHADE_THICKNESS_M = 0.004  # chosen: as much above a mark as that is above its surface
@@ -47,6 +59,10 @@ _MARKS, _THINGS = 1, 2  # geom groups, see room.xml
 _BOX, _CYLINDER, _SPHERE = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_SPHERE
 
 
+_composed: dict[str, str] = {}
+"""Description and bodies → MJCF, of the last few worlds."""
+
+
 def compose(description: WorldDescription) -> str:
     """Return the world as MJCF; the same description always gives the same text.
 
@@ -54,6 +70,20 @@ def compose(description: WorldDescription) -> str:
         InvalidWorld: A name or network id is used twice, a number makes no sense, or a Scout stands outside.
     """
     check(description)
+    # The model shows neither the air nor when a target departs after the beginning.
+    targets = [msgspec.structs.replace(target, begin_s=min(0.0, target.begin_s)) for target in description.targets]
+    shown = msgspec.structs.replace(description, targets=targets, air=AirDescription())
+    bodies = {place.kind: _body_mjcf(place) for place in description.robots}
+    key = repr((shown, bodies))
+    text = _composed.get(key)
+    if text is None:
+        text = _composed[key] = _compose(shown, bodies)
+        if len(_composed) > _TEXTS_KEPT:
+            _composed.pop(next(iter(_composed)), None)
+    return text
+
+
+def _compose(description: WorldDescription, bodies: Mapping[str, str]) -> str:
     spec = mujoco.MjSpec.from_string(_asset("room.xml"))
     if description.mjcf:
         add_room(spec, description.mjcf)
@@ -70,7 +100,7 @@ def compose(description: WorldDescription) -> str:
     for landmark in description.landmarks:
         _add_landmark(spec, landmark)
     for place in description.robots:
-        _add_robot(spec, place)
+        _add_robot(spec, place, bodies[place.kind])
     for target in description.targets:
         _add_target(spec, target)
     try:
@@ -272,10 +302,17 @@ def _add_landmark(spec: mujoco.MjSpec, landmark: Landmark) -> None:
         _part(body, name, _CYLINDER, [0.0, right_m, up_m], size_m, 0.05, _MARKS, quat=facing)
 
 
-def _add_robot(spec: mujoco.MjSpec, place: RobotPlace) -> None:
+def _body_mjcf(place: RobotPlace) -> str:
+    try:
+        return robot_class(place.kind).body_mjcf()
+    except ValueError as error:
+        raise InvalidWorld(f"{place.name}, a {place.kind}, has no body: {error}") from error
+
+
+def _add_robot(spec: mujoco.MjSpec, place: RobotPlace, body_mjcf: str) -> None:
     frame = spec.worldbody.add_frame(pos=[place.x_m, place.y_m, 0.0], quat=_turned(place.heading_rad))
     try:
-        body = mujoco.MjSpec.from_string(robot_class(place.kind).body_mjcf())
+        body = mujoco.MjSpec.from_string(body_mjcf)
         spec.attach(body, prefix=f"{place.name}/", frame=frame)
     except ValueError as error:
         raise InvalidWorld(f"the body of {place.name}, a {place.kind}, cannot be built: {error}") from error

@@ -65,7 +65,9 @@ class Painter:
         self._polygons = [
             polygon + first_corner[number] for number, mesh in enumerate(meshes) for polygon in mesh.polygons
         ]
-        self._a_corner = np.array([polygon[0] for polygon in self._polygons])
+        self._begins = np.cumsum([0, *(len(polygon) for polygon in self._polygons)])[:-1]
+        self._corners_in_turn = np.concatenate(self._polygons)
+        self._a_corner = self._corners_in_turn[self._begins]
         self._polygons_of_geom = [np.flatnonzero(self._geom_of_polygon == geom) for geom in range(len(geoms))]
         self._background = [geom for group in (_ROOM, _MARKS) for geom in self._of_room(group)]
         self._room_geoms = self._geoms[self._background]
@@ -83,16 +85,19 @@ class Painter:
         # From the model at each picture: what is in a dark place gets darker.
         colors = 255 * self._model.geom_rgba[self._geoms, :3] @ _LUMA
         levels = np.clip(colors[self._geom_of_polygon] * self._brightness(data, normals), 0, 255)
-        is_seen = np.einsum("ni,ni->n", normals, eye_m - corners[self._a_corner]) > 0
+        is_ahead = view.is_ahead[self._corners_in_turn]
+        is_whole = np.logical_and.reduceat(is_ahead, self._begins)
+        faces = np.einsum("ni,ni->n", normals, eye_m - corners[self._a_corner]) > 0
+        is_seen = faces & np.logical_or.reduceat(is_ahead, self._begins)
         canvas = self._background_as_before(data, camera)
         is_new = canvas is None
         if canvas is None:
             canvas = np.zeros((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), np.uint8)
 
         def paint(geom: int) -> None:
-            for polygon in self._polygons_of_geom[geom]:
-                if is_seen[polygon]:
-                    view.fill(canvas, self._polygons[polygon], float(levels[polygon]))
+            of_geom = self._polygons_of_geom[geom]
+            for polygon in of_geom[is_seen[of_geom]].tolist():
+                view.fill(canvas, self._polygons[polygon], float(levels[polygon]), is_whole=bool(is_whole[polygon]))
 
         if is_new:
             for geom in self._background:
@@ -180,26 +185,24 @@ class _View:
         self._focal_px = PICTURE_HEIGHT_PX / 2 / math.tan(math.radians(vertical_view_deg) / 2)
         self._corners: _Floats = (corners - eye_m) @ axes
         self._corners[:, 2] *= -1
-        self._is_ahead = self._corners[:, 2] >= _NEAR_M
+        self.is_ahead = self._corners[:, 2] >= _NEAR_M
         right, up, ahead = self._corners.T
         # A line is drawn up to a pixel wider than it is.
         across, upwards = ((size / 2 + 2) / self._focal_px * ahead for size in (PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX))
-        self._is_out = np.stack([~self._is_ahead, right > across, right < -across, up > upwards, up < -upwards])
-        self._pixels = self._project(np.where(self._is_ahead[:, np.newaxis], self._corners, 1.0))
+        self._is_out = np.stack([~self.is_ahead, right > across, right < -across, up > upwards, up < -upwards])
+        self._pixels = self._project(np.where(self.is_ahead[:, np.newaxis], self._corners, 1.0))
 
     def is_beside(self, corners: NDArray[np.intp]) -> bool:
         """Return whether all these corners are behind the camera or beyond one and the same edge of the picture."""
         return bool(self._is_out[:, corners].all(axis=1).any())
 
-    def fill(self, canvas: NDArray[np.uint8], polygon: NDArray[np.intp], level: float) -> None:
-        """Paint the polygon, as far as it lies before the camera, with this grey level."""
-        is_ahead = self._is_ahead[polygon]
-        if is_ahead.all():
-            pixels = self._pixels[polygon]
-        elif is_ahead.any():
-            pixels = self._project(_clip_near(self._corners[polygon]))
-        else:
-            return
+    def fill(self, canvas: NDArray[np.uint8], polygon: NDArray[np.intp], level: float, *, is_whole: bool) -> None:
+        """Paint the polygon, as far as it lies before the camera, with this grey level.
+
+        Args:
+            is_whole: All of its corners are ahead; else some are.
+        """
+        pixels = self._pixels[polygon] if is_whole else self._project(_clip_near(self._corners[polygon]))
         # Edges without anti-aliasing, as the OpenGL pictures have them.
         cv2.fillConvexPoly(canvas, pixels, level, cv2.LINE_8, _SUBPIXEL_BITS)
 

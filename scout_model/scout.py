@@ -15,10 +15,10 @@ Source: IROS 2001, section 2: the on-board processors do communications and actu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from importlib import resources
-from typing import assert_never
+from typing import NamedTuple, assert_never
 
 from scout_model.battery import Battery, Consumption
 from scout_model.dimensions import (
@@ -63,8 +63,7 @@ class Spring(StrEnum):
     REWINDING = "rewinding"
 
 
-@dataclass(frozen=True, slots=True)
-class Actuation:
+class Actuation(NamedTuple):
     """Commands to the actuators until the next tick.
 
     Attributes:
@@ -288,7 +287,7 @@ class Scout(Firmware):
         """Advance to this time and return what the actuators shall do."""
         if self.battery.is_empty(now_s):
             self._safe(now_s)
-            self._actuation = replace(self._actuation, left_rad_s=0.0, right_rad_s=0.0)
+            self._actuation = self._actuation._replace(left_rad_s=0.0, right_rad_s=0.0)
         else:
             self._actuation = self.tick(now_s)
             if (draws := (self._load, bool(self._frequency))) != self._draws:

@@ -59,13 +59,17 @@ class Route:
         self._there = _Path(target.path)
         self._back = _Path(target.path[::-1])
         self._lap_s = self._there.length_m / target.speed_m_s + target.rest_s
+        self._path, self._pose = self._there, self._there.along(0.0)  # of the last question; a resting target repeats
 
     def where(self, time_s: float) -> TargetState:
         """Return the target's pose at this world time; see ``where``."""
         target = self._target
         lap, lap_elapsed_s = divmod(max(0.0, time_s - target.begin_s), self._lap_s)
         path = self._back if target.there_and_back and lap % 2 == 1 else self._there
-        return path.along(min(path.length_m, lap_elapsed_s * target.speed_m_s))
+        walked_m = min(path.length_m, lap_elapsed_s * target.speed_m_s)
+        if path is not self._path or walked_m != self._pose.walked_m:
+            self._path, self._pose = path, path.along(walked_m)
+        return self._pose
 
 
 def where(target: Target, time_s: float) -> TargetState:

@@ -15,18 +15,17 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scout_model.air import REFERENCE_M, Fading, counted_distance_m, fade_level, key_of, snr_db
+from scout_model.air import REFERENCE_M, Fading, counted_distance_m, fade_level, key_of, snr_db, words_of
 from scout_model.description import AirDescription
 from scout_model.dimensions import FRAMES_PER_S, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
-
-Picture = NDArray[np.uint8]
+from scout_model.grain import Grain, Picture
 
 SETTLING_S = 0.25  # chosen: with the 0.3 s a mission gives a frequency to connect, the first picture used is still
 SNOW_LEVELS = 70.0  # chosen: standard deviation in grey levels; black and white specks all over
@@ -115,10 +114,12 @@ class _Dice:
         self.partial = rng.random()
         self._rng = rng
 
-    def window(self, levels: float) -> NDArray[np.int16]:
+    def window(self, levels: float) -> Grain:
         """Return noise of about this standard deviation, in steps of 1 dB: few banks serve all strengths."""
         bank = _bank(round(20 * math.log10(max(levels, FAINTEST_LEVELS))))
-        return bank[self._top : self._top + PICTURE_HEIGHT_PX, self._left : self._left + PICTURE_WIDTH_PX]
+        rows = slice(self._top, self._top + PICTURE_HEIGHT_PX)
+        columns = slice(self._left, self._left + PICTURE_WIDTH_PX)
+        return Grain(bank.brighter[rows, columns], bank.darker[rows, columns])
 
     def tears(self, expected: float) -> int:
         """Return how many lines there are; to be called once, as the last die of the frame."""
@@ -135,6 +136,7 @@ class Receiver:
     def __init__(self, seed: int, frequency: str, air: AirDescription | None = None) -> None:
         self._air = AirDescription() if air is None else air
         self._key = (abs(seed), key_of(frequency))
+        self._words = [word for number in self._key for word in words_of(number)]
         self._fading: dict[str, Fading] = {}
         self._echoes: dict[str, Fading] = {}
         self._settling_frames = round(SETTLING_S * FRAMES_PER_S * self._air.settling)
@@ -167,13 +169,14 @@ class Receiver:
             reception = Reception(self._snow(dice), 0, FrameKind.SNOW)
         elif len(signals) == 1 or self._air.interference == 0:
             nearest = min(signals, key=lambda signal: signal.distance_m)
-            reception = replace(self._receive_one(nearest, frame, self._tuned_frame, dice), transmitters=len(signals))
+            picture, kind = self._receive_one(nearest, frame, self._tuned_frame, dice)
+            reception = Reception(picture, len(signals), kind)
         else:
             reception = Reception(self._garbage(signals, frame, dice), len(signals), FrameKind.GARBAGE)
         self._last = reception.picture.copy()  # who gets the picture may paint on it
         return reception
 
-    def _receive_one(self, signal: Signal, frame: int, tuned_frame: int, dice: _Dice) -> Reception:
+    def _receive_one(self, signal: Signal, frame: int, tuned_frame: int, dice: _Dice) -> tuple[Picture, FrameKind]:
         air = self._air
         away_m = counted_distance_m(signal.distance_m, air.weak_signal)
         strength_db = snr_db(away_m)
@@ -199,10 +202,11 @@ class Receiver:
             picture, kind = _rolling(picture, unlocked, self._random(_Effect.SETTLING, frame)), FrameKind.SETTLING
         if picture is signal.picture:
             picture = picture.copy()
-        return Reception(picture, 1, kind)
+        return picture, kind
 
     def _random(self, effect: _Effect, frame: int) -> np.random.Generator:
-        return np.random.default_rng((*self._key, frame, effect))
+        words = [*self._words, *words_of(frame), effect]
+        return np.random.default_rng(np.array(words, np.uint32))
 
     def _fade(self, robot: str, away_m: float, frame: int) -> tuple[float, float]:
         """Return the signal's power, as a part of its mean, and how deep the frame is in a fade, 0 to 1."""
@@ -229,13 +233,13 @@ class Receiver:
         levels = self._air.noise * self._air.white_noise * 255.0 / 10 ** (strength_db / 20)
         if levels < FAINTEST_LEVELS:
             return picture
-        return _add(picture, dice.window(min(levels, SNOW_LEVELS)))
+        return dice.window(min(levels, SNOW_LEVELS)).on(picture)
 
     def _snow(self, dice: _Dice) -> Picture:
         gray = np.full((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), 128, np.uint8)
         if self._air.snow == 0:
             return gray
-        return _add(gray, dice.window(SNOW_LEVELS * self._air.snow))
+        return dice.window(SNOW_LEVELS * self._air.snow).on(gray)
 
     def _partial(self, picture: Picture, dice: _Dice, rng: np.random.Generator) -> Picture:
         """Return the picture whose lower rows are an older one's, black, or noise."""
@@ -248,7 +252,7 @@ class Receiver:
                 partial[first_row:] = 0
             case _:
                 gray = np.full_like(picture, 128)
-                partial[first_row:] = _add(gray, dice.window(SNOW_LEVELS))[first_row:]
+                partial[first_row:] = dice.window(SNOW_LEVELS).on(gray)[first_row:]
         return partial
 
     def _garbage(self, signals: Sequence[Signal], frame: int, dice: _Dice) -> Picture:
@@ -264,7 +268,7 @@ class Receiver:
         for row in np.flatnonzero(spoiled).tolist():
             shift_px = int(shifts_px[row])
             mixed[row] = endless[sources[row]][row, shift_px : shift_px + PICTURE_WIDTH_PX]
-        return _add(mixed, dice.window(SNOW_LEVELS / 2 * self._air.interference))
+        return dice.window(SNOW_LEVELS / 2 * self._air.interference).on(mixed)
 
 
 def _check(signal: Signal) -> None:
@@ -288,21 +292,16 @@ def _grain() -> NDArray[np.float32]:
 
 
 @functools.lru_cache(64)
-def _bank(level_db: int) -> NDArray[np.int16]:
-    return np.asarray(np.rint(math.pow(10, level_db / 20) * _grain()), np.int16)
-
-
-def _add(picture: Picture, noise: NDArray[np.int16]) -> Picture:
-    return np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U), np.uint8)
+def _bank(level_db: int) -> Grain:
+    return Grain.of(math.pow(10, level_db / 20) * _grain())
 
 
 def _with_ghost(picture: Picture, strength: float) -> Picture:
     """Return the picture and its echo, together as bright as before."""
     ghosted = picture.copy()
     share = strength / (1.0 + strength)
-    ghosted[:, GHOST_SHIFT_PX:] = cv2.addWeighted(
-        picture[:, GHOST_SHIFT_PX:], 1.0 - share, picture[:, :-GHOST_SHIFT_PX], share, 0.0
-    )
+    late, early = picture[:, GHOST_SHIFT_PX:], picture[:, :-GHOST_SHIFT_PX]
+    cv2.addWeighted(late, 1.0 - share, early, share, 0.0, dst=ghosted[:, GHOST_SHIFT_PX:])
     return ghosted
 
 
@@ -328,8 +327,9 @@ def _slipping(picture: Picture, depth: float, rng: np.random.Generator) -> Pictu
     step_px = _SLIP_PX[0] + (_SLIP_PX[1] - _SLIP_PX[0]) * depth
     slipped = _shifted(picture, np.cumsum(rng.normal(0.0, step_px, PICTURE_HEIGHT_PX)))
     bands = PICTURE_HEIGHT_PX // _CLAMP_ROWS
-    offsets = (rng.uniform(*_OFF_LEVELS, bands) * rng.choice((-1, 1), bands)).astype(np.int16)
-    return _add(slipped, np.repeat(offsets, _CLAMP_ROWS * PICTURE_WIDTH_PX).reshape(picture.shape))
+    offsets = np.trunc(rng.uniform(*_OFF_LEVELS, bands) * rng.choice((-1, 1), bands))
+    lost = Grain.of(np.repeat(offsets, _CLAMP_ROWS)[:, np.newaxis])
+    return Grain(*(np.repeat(part, PICTURE_WIDTH_PX, axis=1) for part in (lost.brighter, lost.darker))).on(slipped)
 
 
 def _rolling(picture: Picture, unlocked: float, rng: np.random.Generator) -> Picture:
@@ -343,7 +343,10 @@ def _shifted(picture: Picture, shifts_px: NDArray[np.float64]) -> Picture:
     """Return the picture with each row turned to the right by its own shift."""
     endless = np.concatenate([picture, picture], axis=1)
     lefts = np.mod(-np.rint(shifts_px), PICTURE_WIDTH_PX).astype(np.intp)
-    windows = np.lib.stride_tricks.sliding_window_view(endless, PICTURE_WIDTH_PX, axis=1)
+    # As NumPy's sliding_window_view, which takes longer than the copy.
+    height, width = endless.shape
+    shape, strides = (height, width - PICTURE_WIDTH_PX + 1, PICTURE_WIDTH_PX), (*endless.strides, 1)
+    windows: NDArray[np.uint8] = np.ndarray(shape, np.uint8, endless, strides=strides)
     return windows[np.arange(len(lefts)), lefts]
 
 

@@ -11,7 +11,7 @@ for bit, until something touches it or its actuators shall do something.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -50,6 +50,7 @@ class _Body:
         free: First of the seven numbers of its position.
         positions: Its part of the positions.
         velocities: Its part of the velocities.
+        controls: What drives its actuators now.
     """
 
     kind: str
@@ -59,6 +60,7 @@ class _Body:
     free: int
     positions: slice
     velocities: slice
+    controls: dict[str, float] = field(default_factory=dict)
 
 
 class World:
@@ -74,6 +76,11 @@ class World:
         # From the text, not from the composed model: the world steps the very model its viewers draw.
         self._model = mujoco.MjModel.from_xml_string(self.mjcf)
         self._data = mujoco.MjData(self._model)
+        # MuJoCo's arrays stay where they are; each look-up of one in its data makes a new array of it.
+        self._velocities, self._controls = self._data.qvel, self._data.ctrl
+        self._mocap_positions, self._mocap_quaternions = self._data.mocap_pos, self._data.mocap_quat
+        self._tree_asleep = self._data.tree_asleep
+        self._state_length = mujoco.mj_stateSize(self._model, STATE)
         self.frame = 0
         """Frames stepped so far."""
         self._step = 0
@@ -168,7 +175,7 @@ class World:
 
     def state(self) -> NDArray[np.float64]:
         """Return all positions in the world as one vector that only a camera of this world can read."""
-        state = np.empty(mujoco.mj_stateSize(self._model, STATE))
+        state = np.empty(self._state_length)
         mujoco.mj_getState(self._model, self._data, state, STATE)
         return state
 
@@ -300,22 +307,24 @@ class World:
         )
 
     def _is_all_asleep(self) -> bool:
-        return bool((self._data.tree_asleep >= 0).all()) and not self._data.qvel.any()
+        return min(self._tree_asleep.tolist(), default=0) >= 0 and not np.count_nonzero(self._velocities)
 
     def _drive(self, robot: _Body) -> bool:
         """Apply the robot program's outputs to the actuators; return whether any is not 0, which wakes the body."""
-        controls, data = robot.program.controls(self.time_s), self._data
-        for actuator, control in controls.items():
-            number = robot.actuators.get(actuator)
-            if number is None:
-                raise InvalidWorld(f"{robot.kind} drives {actuator!r}, which its body has not")
-            data.ctrl[number] = control
+        controls = robot.program.controls(self.time_s)
+        if controls != robot.controls:
+            for actuator, control in controls.items():
+                number = robot.actuators.get(actuator)
+                if number is None:
+                    raise InvalidWorld(f"{robot.kind} drives {actuator!r}, which its body has not")
+                self._controls[number] = control
+            robot.controls.update(controls)
         is_driven = any(controls.values())
         if is_driven:
             # Controls do not wake a sleeping body, but any bit in its velocity does: the zero that has one.
             first = robot.velocities.start
-            if data.qvel[first] == 0.0:
-                data.qvel[first] = -0.0
+            if self._velocities[first] == 0.0:
+                self._velocities[first] = -0.0
         return is_driven
 
     def _free_joint(self, robot: str) -> NDArray[np.float64]:
@@ -331,16 +340,16 @@ class World:
 
     def _place_targets(self) -> None:
         time_s = self._step * STEP_S
-        positions, quaternions = self._data.mocap_pos, self._data.mocap_quat
         for name, target in self._targets.items():
             pose = self._whereabouts[name](time_s)
-            if pose == self._placed.get(name):
+            placed = self._placed.get(name)
+            if pose is placed or pose == placed:
                 continue
             self._placed[name] = pose
             for part in parts(target, pose):
                 mocap = self._mocap[part.body]
-                positions[mocap] = part.position_m
-                quaternions[mocap] = part.quaternion
+                self._mocap_positions[mocap] = part.position_m
+                self._mocap_quaternions[mocap] = part.quaternion
 
     def _hold_carried(self) -> None:
         if not self._carried:

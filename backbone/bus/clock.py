@@ -114,8 +114,9 @@ class _JumpingSelector(selectors.BaseSelector):
         self.now_s = 0.0
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        ready = self._real.select(0)
-        if ready or timeout == 0:
+        if timeout == 0:  # callbacks are ready; sockets are looked at before time goes on
+            return []
+        if ready := self._real.select(0):
             return ready
         if timeout is None:
             raise NothingLeftToHappen(f"all tasks wait for ever at t={self.now_s:.6f} s")
@@ -159,8 +160,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         A timer less than the loop's resolution away is due at once, and no time passes. A task that waits for the rest
         of a nanosecond would wait for ever, so this method rounds such a rest up to a time that passes.
         """
-        if self.time() < when < self.time() + RESOLUTION_S:
-            when = self.time() + 2 * RESOLUTION_S
+        now_s = self._jumping.now_s
+        if now_s < when < now_s + RESOLUTION_S:
+            when = now_s + 2 * RESOLUTION_S
         return super().call_at(when, callback, *args, context=context)
 
     def run_in_executor(

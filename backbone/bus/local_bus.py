@@ -10,6 +10,7 @@ uses the same delivery between neighbors.
 from __future__ import annotations
 
 import asyncio
+import functools
 from collections import Counter, defaultdict
 from collections.abc import Callable
 
@@ -37,6 +38,8 @@ from backbone.wire import (
     UnknownMessage,
     schema_of,
 )
+
+ADDRESSES_KEPT = 4096  # chosen: more than a mission of 100 robots has
 
 Answered = Callable[[Envelope[Message] | None], None]
 """Callback with the answer to a question, or None if the component died before it answered."""
@@ -93,14 +96,15 @@ class Neighbor(Declaring):
         answered = self.open_question()
         self.asked += 1
         asked = self.envelope(question)
+        too_late = asyncio.get_running_loop().call_later(within_s, settle, answered, TimeoutError())
         try:
-            async with asyncio.timeout(within_s):
-                await asyncio.sleep(0)
-                self.network.carry_question(address, asked, lambda outcome: settle(answered, outcome))
-                envelope = await answered
+            await asyncio.sleep(0)
+            self.network.carry_question(address, asked, lambda outcome: settle(answered, outcome))
+            envelope = await answered
         except TimeoutError:
             raise ReplyTimeout(f"{address} did not answer {type(question).__name__} within {within_s:g} s") from None
         finally:
+            too_late.cancel()
             self.end_question(answered)
         if envelope is None:
             raise NoResponder(f"{address} died before it answered {type(question).__name__}")
@@ -323,6 +327,7 @@ def _outcome(answering: asyncio.Task[Envelope[Message] | None]) -> Envelope[Mess
     return None if answering.cancelled() or answering.exception() is not None else answering.result()
 
 
+@functools.lru_cache(maxsize=ADDRESSES_KEPT)
 def _check(mission: str, address: str) -> None:
     """Refuse the names that the bus between processes refuses in keys."""
     key(mission, address, Conversation.ASK)

@@ -108,10 +108,12 @@ class Component(Generic[P_co]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         self.launch, self.bus, self.clock = launch, bus, clock
+        self.address = launch.address
+        """``<subsystem>/<name>``."""
         self.pid = os.getpid()
         """Pid of its process. A simulation, where many components share one process, sets other numbers."""
         self.parameters: P_co = cast(P_co, _convert(launch.parameters, self.parameters_type))
-        self.story = StoryBook(launch.address, clock)
+        self.story = StoryBook(self.address, clock)
         self.feedback = ""
         self._state, self._since_s = LifeState.CONNECTING, clock.now_s()
         self._end = asyncio.Event()
@@ -197,11 +199,6 @@ class Component(Generic[P_co]):
     def name(self) -> str:
         """Name of the component, unique in the mission."""
         return self.launch.name
-
-    @property
-    def address(self) -> str:
-        """``<subsystem>/<name>``."""
-        return self.launch.address
 
     @property
     def state(self) -> LifeState:

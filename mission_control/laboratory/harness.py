@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from typing import TypeVar
 
 Order = TypeVar("Order")
 Result = TypeVar("Result")
 
 BATCH = 5  # chosen: seconds of work, so that the last process is not long alone, and cached pictures are used again
+
+OBJECTS_AT_ONCE = 20_000  # chosen: some megabytes of garbage; Python's own 700 are for programs that have less
 
 Progress = Callable[[int, int], None]
 """Callback with the number of finished trials and of all trials."""
@@ -58,8 +62,28 @@ def results_of(
         yield from map(work, orders)
         return
     # Spawned, not forked: a fork of a process with threads of its own may hang.
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, context, initializer=_keep_to_one_core) as pool:
         try:
-            yield from pool.map(work, orders, chunksize=chunk)
+            yield from pool.map(partial(_worked, work), orders, chunksize=chunk)
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _keep_to_one_core() -> None:
+    """Let OpenCV and OpenBLAS, which are imported later, start no threads: the other cores have work of their own."""
+    for threads in ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")
+
+
+def _worked(work: Callable[[Order], Result], order: Order) -> Result:
+    """Do the work; after the first, the garbage collector has little to do.
+
+    What was imported by then and is kept it never looks through again, and it looks for garbage less often.
+    """
+    result = work(order)
+    if not gc.get_freeze_count():
+        gc.collect()
+        gc.freeze()
+        gc.set_threshold(OBJECTS_AT_ONCE)
+    return result

@@ -141,7 +141,7 @@ def torn_rows(changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         >>> torn_rows(np.array([[True, True, True], [True, False, False]]))
         array([ True, False])
     """
-    return np.asarray(changed.mean(axis=1) > ROW_SHARE, np.bool_)
+    return np.asarray(changed.sum(axis=1) / changed.shape[1] > ROW_SHARE, np.bool_)
 
 
 def edges_moved(average: NDArray[np.float32], picture: NDArray[np.float32]) -> float:
@@ -174,8 +174,10 @@ def largest_blob(changed: NDArray[np.bool_], *, drop_streaks: bool = True) -> Bl
     Returns:
         The region in pixels of the full picture.
     """
-    count, _labels, found, _centres = cv2.connectedComponentsWithStats(changed.astype(np.uint8), connectivity=8)
     best: Blob | None = None
+    if np.count_nonzero(changed) < LEAST_AREA_PX:
+        return best
+    count, _labels, found, _centres = cv2.connectedComponentsWithStats(changed.view(np.uint8), connectivity=8)
     for x, y, width, height, area in found[1:count].tolist():
         is_streak = drop_streaks and height <= STREAK_HEIGHT_PX and width >= STREAK_RATIO * height
         if area >= LEAST_AREA_PX and not is_streak and (best is None or 4 * area > best.area_px):

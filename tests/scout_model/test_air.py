@@ -21,6 +21,7 @@ from scout_model.air import (
     fade_level,
     key_of,
     snr_db,
+    words_of,
 )
 from scout_model.description import AirDescription
 
@@ -82,3 +83,9 @@ def test_a_robot_at_the_antenna_has_a_distance() -> None:
 def test_names_have_the_same_number_in_every_process() -> None:
     assert key_of("video1") == 0xB178448E
     assert key_of("video1") != key_of("video2")
+
+
+@given(st.lists(st.integers(0, 2**70), min_size=1, max_size=5))
+def test_from_the_words_of_a_seed_numpy_draws_what_it_draws_from_its_numbers(numbers: list[int]) -> None:
+    words = np.array([word for number in numbers for word in words_of(number)], np.uint32)
+    assert np.random.default_rng(words).random() == np.random.default_rng(numbers).random()

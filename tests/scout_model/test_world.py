@@ -3,12 +3,13 @@ import math
 import subprocess
 import sys
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
 
 from scout_model import dimensions, radio_link
-from scout_model.description import Furniture, RobotPlace, Target, WorldDescription
+from scout_model.description import CLEAN_AIR, Furniture, RobotPlace, Target, WorldDescription
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.scout import Spring
 from scout_model.world import World
@@ -248,3 +249,14 @@ def test_a_description_that_makes_no_sense_is_refused(description: WorldDescript
 def test_the_world_needs_neither_opencv_nor_opengl() -> None:
     program = "import sys, scout_model.world; assert not {'cv2', 'OpenGL.GL', 'OpenGL.EGL'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+
+def test_worlds_that_differ_in_air_and_later_departures_alone_have_one_model_and_other_rooms_another() -> None:
+    target = Target("p", "pioneer", [(1.0, 3.0), (8.0, 3.0)], speed_m_s=0.5, begin_s=2.0)
+    described = msgspec.structs.replace(EMPTY, targets=[target])
+    other_air = msgspec.structs.replace(described, air=CLEAN_AIR)
+    later = msgspec.structs.replace(described, targets=[msgspec.structs.replace(target, begin_s=9.0)])
+    under_way = msgspec.structs.replace(described, targets=[msgspec.structs.replace(target, begin_s=-2.0)])
+    mjcf = World(described).mjcf
+    assert World(other_air).mjcf == World(later).mjcf == mjcf
+    assert len({mjcf, World(under_way).mjcf, World(msgspec.structs.replace(described, seed=1)).mjcf}) == 3

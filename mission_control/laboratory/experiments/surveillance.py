@@ -183,7 +183,9 @@ def run_surveillance(
         for place, condition in enumerate(conditions)
         for number in range(trials)
     ]
-    results = run_all(run_order, orders, jobs=jobs, progress=progress)
+    turns = sorted(range(len(orders)), key=lambda place: _room(orders[place]))
+    done = run_all(run_order, [orders[place] for place in turns], jobs=jobs, progress=progress)
+    results = [trial for _, trial in sorted(zip(turns, done, strict=True), key=lambda placed: placed[0])]
     rows = [
         _row(condition, results[place * trials : (place + 1) * trials]) for place, condition in enumerate(conditions)
     ]
@@ -193,6 +195,12 @@ def run_surveillance(
 def run_order(order: TrialOrder) -> Trial:
     """Run one trial."""
     return run_trial(order.condition, order.seed, order.number, trace=Path(order.trace) if order.trace else None)
+
+
+def _room(order: TrialOrder) -> tuple[int, int, int, str]:
+    """Return what is the same for trials with the same room: side by side, they share its model and its pictures."""
+    condition = order.condition
+    return order.number, condition.active, condition.extra, condition.target
 
 
 def _row(condition: Condition, trials: Sequence[Trial]) -> ConditionRow:

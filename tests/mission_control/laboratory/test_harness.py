@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 
 import pytest
@@ -17,6 +18,19 @@ def picky(number: int) -> int:
     if number == 7:
         raise ArithmeticError("seven")
     return number
+
+
+def threads_and_frozen(_number: int) -> tuple[str | None, str | None, int]:
+    environment = os.environ
+    return environment.get("OPENCV_FOR_THREADS_NUM"), environment.get("OPENBLAS_NUM_THREADS"), gc.get_freeze_count()
+
+
+@pytest.mark.processes
+def test_other_processes_keep_to_one_core_and_look_through_what_lasts_once() -> None:
+    found = run_all(threads_and_frozen, range(20), jobs=2)
+    assert {(opencv, openblas) for opencv, openblas, _ in found} == {("1", "1")}
+    assert found[0][2] == 0
+    assert found[1][2] > 0
 
 
 @pytest.mark.processes

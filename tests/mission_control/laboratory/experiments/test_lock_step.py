@@ -12,7 +12,7 @@ from trace_checker import check
 
 from mission_control.laboratory.experiments.conditions import ALWAYS, EVERYTHING, PAPERS, PUBLISHED, QUARTER, Condition
 from mission_control.laboratory.experiments.intervals import wilson
-from mission_control.laboratory.experiments.surveillance import TrialOrder, run_order, run_surveillance
+from mission_control.laboratory.experiments.surveillance import TrialOrder, digest_of, run_order, run_surveillance
 from mission_control.laboratory.experiments.trial import Trial, run_trial
 from mission_control.laboratory.harness import run_all
 
@@ -109,6 +109,8 @@ def test_a_small_table_is_what_its_trials_say() -> None:
         assert row["rate"] == row["detected"] / row["trials"]
         assert 0 <= row["interval95"][0] <= row["rate"] <= row["interval95"][1] <= 1
     json.dumps(plain)
+    for row in outcome.rows:
+        assert row.digest == digest_of([run_trial(row.condition, 1, number).digest for number in range(2)])
 
 
 GOALS = {

@@ -1,0 +1,36 @@
+"""Grain: noise in whole grey levels, made once and added to many pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Picture = NDArray[np.uint8]
+"""Grey levels 0 to 255, shape (height, width)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grain:
+    """Noise in whole grey levels, its two signs apart: of pictures of one type OpenCV adds many pixels at a time.
+
+    Attributes:
+        brighter: What it adds, 0 where it darkens.
+        darker: What it takes away, 0 where it brightens.
+    """
+
+    brighter: Picture
+    darker: Picture
+
+    @classmethod
+    def of(cls, levels: NDArray[np.float64] | NDArray[np.float32]) -> Grain:
+        """Return it for these levels, of any size and sign; more than a picture's range has no further effect."""
+        whole = np.clip(np.rint(levels), -255, 255)
+        return cls(np.maximum(whole, 0).astype(np.uint8), np.maximum(-whole, 0).astype(np.uint8))
+
+    def on(self, picture: Picture) -> Picture:
+        """Return the picture with this noise, within 0 to 255."""
+        brightened = cv2.add(picture, self.brighter)
+        return np.asarray(cv2.subtract(brightened, self.darker, dst=brightened), np.uint8)
