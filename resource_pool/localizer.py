@@ -74,7 +74,7 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
         width_m: Extent of the room along x, meters; 0: that of the world.
         depth_m: Extent of the room along y, meters; 0: that of the world.
         floor_plan: PNG or JPEG picture of the whole floor, for maps. The mission file names a file, relative to itself;
-            this attribute holds the file's content in base64.
+            the localizer gets the file's content in base64.
         room: The world of the mission file.
     """
 

@@ -25,7 +25,7 @@ app = typer.Typer(
 MOST_TRIALS = 1_000_000  # chosen: days of work
 LARGEST_SEED = 2**32 - 1  # the limit of numpy
 MOST_JOBS = 1024  # chosen: more cores than any tested machine
-PIPE_WIDTH = 200  # chosen: no table is wider, so files and pipes get whole tables
+PIPE_WIDTH = 200  # chosen: wider than every table, so that files and pipes get whole tables
 
 
 class Policy(StrEnum):
