@@ -1,7 +1,8 @@
 """The exchange of an RC's driver while the RC works.
 
-Rules of this file: * The RC, its holds and their epochs do not take part: only the driver in its slot changes, between
-two calls.
+Rules of this file:
+
+* The RC, its holds and their epochs do not take part: only the driver in its slot changes, between two calls.
 * If both drivers set ``opens_beside``, or have nothing to open, the new one is opened beside the old one. Otherwise the
   old one is closed first, and calls wait until a device is open again.
 * If the new driver fails during its trial, the old driver comes back and repeats the failed call.

@@ -11,7 +11,7 @@ Rules of this file:
   is the next release unless the ARC stated another.
 * An ARC's packets go only to the robots for which it loaded packets; if it has several robots, they take turns.
 * If a packet moves a robot and was made before the robot's last stop, it is not sent, whether it already waits or
-*     arrives later.
+  arrives later.
 
 Pure; times are mission seconds.
 

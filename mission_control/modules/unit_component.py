@@ -1,7 +1,7 @@
 """The component that runs one execution unit on the bus: a thin loop around ``ExecutionUnit``; see ``unit_thread``.
 
 * another unit, or any component → this unit: values of its inputs, published under the addresses that its parameters
-*     name.
+  name.
 * operator → this unit: the exchange of a module (``exchange``).
 * this unit → all: the outputs that its parameters name, published under ``output_address`` (conversation ``outputs``).
 

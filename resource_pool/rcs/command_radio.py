@@ -9,7 +9,7 @@ Rules of this file:
 * The last packet to each robot of an ARC is its safe packet. The radio repeats a failed safe packet until it is sent.
 * A reply is published unchanged. Three lost replies in a row make one warning, the next reply makes one notice.
 * If the radio fails while it serves its streams, this RC ends. Its creator restarts it, and the new process opens the
-*     device again.
+  device again.
 
 Source: IROS 2001, section 4.3; RAM 2002, "Sharable Resources".
 """

@@ -6,7 +6,7 @@ It behaves as measured on the real bus (decision 0003):
 is given up: these messages are lost, its questions end without an answer, and tokens disappear at both of its ends.
 * The death of a process or of the hub is detected at once.
 * A link that was given up is re-established a moment after its fault ends; tokens and services then return by
-*     themselves.
+  themselves.
 * Neighbors in one process reach each other without a link.
 """
 

@@ -3,11 +3,10 @@
 Rules of this file:
 
 * A link keeps the order of messages, as a TCP connection does: messages after a late message arrive after it. A doubled
-*     message
-  arrives twice in a row.
+  message arrives twice in a row.
 * A question and its answer have separate faults. The requester cannot know which of them was lost.
 * A component that is cut off neither receives nor sends messages; when the cut ends, all waiting messages are
-*     delivered.
+  delivered.
 * Messages to and from the placer always arrive, because the placer is simulated and no law concerns it.
 * The appearance and withdrawal of liveliness tokens may be late, but are never lost, because a hub keeps tokens.
 """
