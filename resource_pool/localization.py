@@ -27,7 +27,7 @@ class UnknownPlace(Refusal):
     """The localizer does not know the body."""
 
     code = "localizer.unknown_body"
-    remedy = "Use the name of a robot whose place at the beginning the mission file says, or of something in the room."
+    remedy = "Use the name of a robot with a start place in the mission file, or of another body in the room."
 
 
 class PoseSource(StrEnum):

@@ -96,7 +96,7 @@ class EmergencyStopped(Refusal):
     """
 
     code = "robot.emergency_stop"
-    remedy = "See that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
+    remedy = "Check that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
 
 
 class GivenBeforeStop(EmergencyStopped):

@@ -39,7 +39,7 @@ class InvalidRoom(InvalidWorld):
     """The MJCF of the user's room cannot be used."""
 
     code = "world.room"
-    remedy = "Mend the room's MJCF file; 'python -m mujoco.viewer --mjcf=FILE' shows what MuJoCo makes of it."
+    remedy = "Correct the room's MJCF file; 'python -m mujoco.viewer --mjcf=FILE' shows the room in MuJoCo."
 
 
 class MalformedPacket(ScoutModelError, ValueError):

@@ -91,7 +91,7 @@ def monitor(
     connect: words.Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
+    """Watch holders, waiting requests, reasons and events; claim no robot, but stop robots in an emergency."""
     if recording is not None:
         names_mission = mission is not None or connect is not None
         _watch_recording(recording, user or _user(), names_mission=names_mission, for_programs=as_json or once)
@@ -114,7 +114,7 @@ def look(
     connect: words.Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Look into a behavior: the pictures and values that it goes by, live; it makes them only while you look."""
+    """Watch a behavior's intermediate pictures and values live; it makes them only while you watch."""
     where = chosen(mission, connect, secret_file)
     if save is not None and not view:
         raise _usage("--save needs a view")

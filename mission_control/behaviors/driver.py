@@ -39,7 +39,7 @@ class Lost(Refusal):
     """The localizer's estimate of the robot's place or heading is too uncertain for driving."""
 
     code = "behavior.lost"
-    remedy = "Show the robot a landmark, or take it over and look where it is."
+    remedy = "Bring a landmark into the robot's view, or take the robot over and check where it is."
 
 
 class NeedsArc(Refusal):

@@ -117,7 +117,7 @@ class GraphRefused(Refusal):
     """
 
     code = "module.graph"
-    remedy = "Mend each fault as it says."
+    remedy = "Correct each fault as its remedy says."
 
     def __init__(self, faults: Sequence[WiringFault]) -> None:
         lines = (f"{type(one).__name__}: {one.detail}. {one.remedy}" for one in faults)
@@ -229,7 +229,7 @@ def _of_outputs(
             yield SecondProducer((member.name,), port.name, detail, "Give its output another key")
         elif first is not member or producers[key][1] is not port:
             detail = f"{member.name} produces {key}, and so does {first.name}"
-            remedy = "Give one of them another key; who takes the values names the key that it wants"
+            remedy = "Give one of them another key; each module that takes values names the wanted key"
             yield SecondProducer((member.name, first.name), port.name, detail, remedy)
 
 

@@ -49,7 +49,7 @@ class ModuleProcessFell(Refusal):
     """The process of a module ended, or was not ready in time."""
 
     code = "module.process"
-    remedy = "See what it printed."
+    remedy = "Read the output that the process printed."
 
 
 class _Unit(UnitComponent):

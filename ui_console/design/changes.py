@@ -41,7 +41,7 @@ class MustAsk(DesignRefused):
     """
 
     code = "design.must_ask"
-    remedy = "Answer what it asks."
+    remedy = "Answer the questions of the addition."
 
     def __init__(self, offer: Offer) -> None:
         super().__init__(f"{offer.label} asks for: {', '.join(one.name for one in offer.asks)}")

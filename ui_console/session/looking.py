@@ -37,7 +37,7 @@ class NoViews(Refusal):
     """The component is not a behavior, so it has no debug views."""
 
     code = "views.no_behavior"
-    remedy = "Look into a behavior; 'scout-backbone components' lists them all."
+    remedy = "Name a behavior; 'scout-backbone components' lists all behaviors."
 
 
 async def find_behavior(bus: Bus, name: str) -> str:

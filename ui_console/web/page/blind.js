@@ -51,8 +51,8 @@ export class Blindness {
     set(
       this.why,
       is === "fresh"
-        ? `The server has not heard the mission for ${since(this.hubAgeMs)}. What you see is older than that.`
-        : `Nothing was heard for ${since(this.link.ageMs)} (${this.link.why}). What you see is as old as that.`,
+        ? `The server has received nothing from the mission for ${since(this.hubAgeMs)}. The content is older.`
+        : `This page has received nothing for ${since(this.link.ageMs)} (${this.link.why}). The content is that old.`,
     );
   }
 }
