@@ -47,7 +47,7 @@ COMMAND_TIMEOUT_S = 0.5  # chosen: a robot without commands must neither move no
 # Battery
 IDLE_W = 0.3  # chosen: two small processors and a radio receiver
 TRANSMITTER_W = 1.0  # chosen: camera and analog transmitter
-MOTORS_W = 1.5  # chosen: two small geared motors under full load
+MOTORS_W = 1.5  # chosen: two small geared motors, stalled
 BATTERY_J = 7 * 24 * 3600 * (IDLE_W + TRANSMITTER_W + MOTORS_W)  # chosen: a week of all that; outlasts every experiment
 
 # Targets
