@@ -1,1 +1,1 @@
-"""Behaviors, their tree, and what they see."""
+"""Behaviors, the behavior tree, and computer vision."""

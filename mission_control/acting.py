@@ -1,6 +1,7 @@
 """Acting: the task in which a behavior commands its robot during a grant.
 
-Rule of this file: it never outlives the grant, and begins again after what passes: a cut link, an operator's stop.
+Rule of this file: the task ends with the grant. After a temporary obstacle (a cut link, an operator's stop) it begins
+again.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 class Actor(Protocol):
-    """The behavior, as its acting needs it."""
+    """The interface of the behavior that ``Acting`` needs."""
 
     gate: GatedBus
     clock: Clock
@@ -49,7 +50,8 @@ class Acting:
         hooks: Its hooks; the same behavior.
 
     Attributes:
-        resumes_again: True: ``resumed`` is called before the next act, because it could not command the robot before.
+        resumes_again: True: ``resumed`` is called again before the next ``act``, because the robot could not be
+            commanded meanwhile.
     """
 
     def __init__(self, actor: Actor, hooks: BehaviorHooks) -> None:
@@ -63,16 +65,16 @@ class Acting:
         return self._task is not None and not self._task.done()
 
     def begin(self, arc: ArcClient) -> None:
-        """Act with the grant of this ARC."""
+        """Start ``act`` under the grant of this ARC."""
         self._task = self._actor.begin_task(self._act(arc), "act")
 
     async def stop(self) -> None:
-        """Return when it acts no more."""
+        """Cancel the task and wait until it has ended."""
         task, self._task = self._task, None
         await end_task(task)
 
     def drop(self) -> None:
-        """Let it act no more, without waiting for this."""
+        """Cancel the task without waiting for its end."""
         task, self._task = self._task, None
         cancel(task)
 
@@ -98,7 +100,7 @@ class Acting:
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
 
     async def _wait_until_it_may_move(self, arc: ArcClient, stopped: EmergencyStopped) -> None:
-        """Report the stop, and return when it is lifted or its state is unknown."""
+        """Report the stop, and wait until it is lifted or its state is unknown."""
         held = self._actor.feedback
         self._actor.report(stopped.detail)
         try:
@@ -111,6 +113,6 @@ class Acting:
 
 
 def cancel(task: asyncio.Task[None] | None) -> None:
-    """Cancel a task, unless it is the one that asks for this."""
+    """Cancel a task, unless it is the present task."""
     if task is not None and task is not asyncio.current_task():
         task.cancel()

@@ -1,4 +1,4 @@
-"""Behavior: base class of every decision process that is no console.
+"""Behavior: base class of every decision process except consoles.
 
 A behavior claims at most one ARC, is notified of the begin and end of grants, starts its children through the placer
 and reports its progress to its parent. Derive and override the hooks you need (``behavior_hooks``). Begin with a copy
@@ -60,14 +60,14 @@ DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before
 
 
 class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Parameters that the tree gives every behavior; derive and add the behavior's own parameters, with defaults.
+    """Parameters from the tree for every behavior; derive and add the behavior's own parameters, with defaults.
 
     Attributes:
-        path: Names and priorities from the mission's root to this node; empty: started by hand.
-        arc: The ARC it claims, if any.
-        children: Nodes it starts.
-        is_last: True: it is the root of the last branch, which runs at the end of the mission.
-        keeper: Address of the console that ordered it; empty: it is a node of the mission's tree.
+        path: Names and priorities from the mission's root to this node; empty: the behavior was started manually.
+        arc: The ARC that the behavior claims, if any.
+        children: Nodes that the behavior starts.
+        is_last: True: the behavior is the root of the last branch, which runs at the end of the mission.
+        keeper: Address of the console that ordered the behavior; empty: the behavior is a node of the mission's tree.
     """
 
     path: list[PathStep] = []
@@ -82,7 +82,7 @@ def load_behavior(class_path: str) -> type[Behavior[BehaviorParameters]]:
 
     Raises:
         WrongClassPath: No component class has this path.
-        WrongClass: It is no behavior.
+        WrongClass: The class is not a behavior.
     """
     found = load_class(class_path)
     if not issubclass(found, Behavior):
@@ -109,17 +109,17 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     children_allowed: ClassVar[tuple[int, int] | None] = None
     may_claim: ClassVar[bool] = True
     hands_over: ClassVar[frozenset[str]] = frozenset()
-    """Attributes with which another class in its place goes on, if that names the same; see ``behavior_exchange``."""
+    """Attributes that a replacing class takes over if it declares them, too; see ``behavior_exchange``."""
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         self.gate = bus if isinstance(bus, GatedBus) else GatedBus(bus)
-        """Its bus; shut while another class is in charge in its place."""
+        """Its bus; the gate is shut while another class is in charge."""
         self.exchanges = BehaviorExchanges(self, load_behavior)
-        """The classes that were in charge; of the component."""
+        """The implementations of the component, and their exchanges."""
         super().__init__(launch, self.gate, clock)
         self.status, self.payload = BehaviorStatus.RUNNING, dict[str, object]()
         self.own_arc = OwnArc(self, self)
-        """Its claim of its ARC, and the grants."""
+        """The claim of its ARC, and the grants."""
         self.views = DebugViews(self.gate, clock)
         """Its debug views: pictures and values that cost nothing unless a console looks."""
         self.child_nodes = {node.name: node for node in self.parameters.children}
@@ -128,7 +128,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.has_begun = False
         self.tree_version, self._left = 0, set[str]()
         self.own_reports = OwnReports(self)
-        """What it tells its parent, or the console that ordered it."""
+        """Its reports to its parent, or to the console that ordered it."""
 
     # ------------------------------------------------------------------ hooks with a default of their own
     def need(self) -> ArcNeed | None:
@@ -140,7 +140,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         return Children(children, together=self.children_together)
 
     async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:  # noqa: ARG002
-        """Decide as the rules do; see ``BehaviorHooks``."""
+        """Return the decision of the rules; see ``BehaviorHooks``."""
         return self._children.rules.decision(child)
 
     async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
@@ -175,7 +175,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     @property
     def suspended_because(self) -> str:
-        """Why it is not at work, see ``BehaviorState``."""
+        """Why the behavior is not at work; see ``BehaviorState``."""
         if self.status.is_final:
             return ""
         if self.parameters.keeper and not self.has_begun:
@@ -183,7 +183,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         return self.own_arc.suspended_because if self.arc is not None else self._children.rules.suspended_because
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
-        """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
+        """Finish: release the ARC, end the children, report to the parent. Later calls change nothing."""
         if self.status.is_final or not status.is_final or not self.exchanges.may_finish(self, status, payload or {}):
             return
         self.status, self.payload = status, dict(payload or {})
@@ -201,36 +201,36 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     @property
     def is_ordered(self) -> bool:
-        """True: a console ordered it."""
+        """True: a console ordered this behavior."""
         return bool(self.parameters.keeper)
 
     # ------------------------------------------------------------------ in charge, or beside the one in charge
     async def run(self) -> None:
-        """Live, with every class that takes the place of this one; see ``Component.run``."""
+        """Run this class and every class that replaces it; see ``Component.run``."""
         life = super().run()
         await (self.exchanges.run(life) if self.gate.is_first else life)
 
     def end(self, reason: str) -> None:
         """End the component in good order."""
         present = self.exchanges.present
-        if self.gate.is_first and present is not self:  # its process ends it
+        if self.gate.is_first and present is not self:  # the process ends the component
             present.end(reason)
         else:
             super().end(reason)
 
     def fail(self, bug: BaseException) -> None:
-        """End because of a bug; the component ends if no other class is there."""
+        """End because of a bug; the component ends if no other implementation is left."""
         super().fail(bug)
         self.exchanges.failed(self, bug)
 
     def go_on_from(self, other: Self) -> None:
-        """Go on where another implementation is: its exchanges, story, progress, grants and place in the tree."""
+        """Take over the state of another implementation: exchanges, story, progress, grants and place in the tree."""
         self.exchanges, self.story, self.payload = other.exchanges, other.story, other.payload
         self.tree_version, self.pid = other.tree_version, other.pid
         self.own_arc.go_on_from(other.own_arc)
 
     def take_charge(self) -> None:
-        """Command from now on, and keep the ARC."""
+        """Send commands from now on, and keep the ARC."""
         if self.gate.is_open:
             return
         self.gate.open()
@@ -238,7 +238,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.changed()
 
     def stand_by(self) -> None:
-        """Command no more; keep the state, and hear of grants."""
+        """Send no more commands; keep the state and continue to receive notices of grants."""
         self.gate.shut()
         self.own_arc.stand_by()
 
@@ -250,7 +250,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
-        """Watch the parent: a behavior, or the console of an order; the first step of a path is no behavior."""
+        """Watch the parent: a behavior, or the ordering console. The first step of a path is not a behavior."""
         self.own_reports.connect(self.parameters.keeper)
 
     async def serve(self) -> None:
@@ -270,7 +270,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self._children.begin()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer the ARC, the children, who asks about it or looks at debug views, and ``TakeBranch``."""
+        """Answer the ARC, the children, questions about progress and debug views, and ``TakeBranch``."""
         match asked.body:
             case ChildReport(child=child) as report:
                 if child not in self.child_nodes or child != component_of(asked.source):
@@ -298,17 +298,17 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     async def drain(self) -> None:
         """Give the ARC back.
 
-        The children continue. Only an order to stop this behavior ends them, which the placer does. After a signal from
-        outside, the next life of this behavior adopts them.
+        The children continue. Only an order to stop this behavior ends them; the placer carries it out. If a signal
+        ended this process, the next process of this behavior adopts the children.
         """
         try:
             async with asyncio.timeout(DRAIN_TIME_S):
                 await self.own_arc.release()
-        except TimeoutError:  # the ARC watches its owner's token and ends with it
+        except TimeoutError:  # the ARC watches its owner's token and ends by itself
             log.warning("%s leaves before its ARC has ended", self.name)
 
     def absences(self) -> list[Absence]:
-        """Return the missing children and ARC, and the children that it has given up."""
+        """Return the missing children and ARC, and the children that are given up."""
         of_children = self._children.absences(has_finished=self.status.is_final)
         arc = self.own_arc.absence()
         return of_children if arc is None or self.status.is_final else [arc, *of_children]
@@ -330,7 +330,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     # ------------------------------------------------------------------ the tree
     async def _take(self, taken: TakeBranch) -> BranchTaken:
-        """Take the place in the changed tree; a message that comes again waits for the same ends."""
+        """Apply the changed branch of the tree; a repeated message waits for the same children to end."""
         if taken.version >= self.tree_version:
             anew = taken.anew if taken.version > self.tree_version else []
             self.tree_version = taken.version
@@ -348,14 +348,15 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     # ------------------------------------------------------------------ the children and the parent
     def rules_applied(self) -> None:
-        """Report what the rules of the children have made of an event; see ``ParentOfChildren``."""
+        """Report the result of the children's rules after an event; see ``ParentOfChildren``."""
         self.children_arranged()
         self.suspension_changed()
 
     async def _wind_up(self) -> None:
-        """Give the ARC back, end the children, and repeat the report until the parent notes it.
+        """Release the ARC, end the children, and repeat the report until the parent acknowledges it.
 
-        A behavior that a console ordered keeps its ARC, so that no lower ARC has the robot before the operator.
+        A behavior that a console ordered keeps its ARC, so that no ARC of lower priority gets the robot before the
+        operator.
         """
         await self.own_arc.acting.stop()
         if self.own_reports.keeper is not None:
@@ -366,7 +367,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         await self.own_reports.conclude()
 
     async def _end_with_keeper(self, keeper: KeeperReports) -> None:
-        """Give the robot back when the console that ordered this is over, then ask the placer to end this behavior."""
+        """When the ordering console has ended, release the robot and ask the placer to end this behavior."""
         why_over = await keeper.run()
         self.status = BehaviorStatus.FAILURE
         self.publish_event(self.name, f"ends with its order: {why_over}", LogLevel.NOTICE)
@@ -375,7 +376,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         await end_by_placer(self.bus, self.clock, self.name, f"its order is over: {why_over}")
 
     def suspension_changed(self) -> None:
-        """Report it, if the reason of its suspension is another one; see ``OwnerOfArc``."""
+        """Report the reason of the suspension if it has changed; see ``OwnerOfArc``."""
         self.own_reports.suspension_changed()
 
     def begin_task(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:

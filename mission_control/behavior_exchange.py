@@ -1,14 +1,14 @@
-"""The exchange of a behavior's class while the behavior runs: two implementations in one component.
+"""The exchange of a behavior's class at run time: two implementations in one component.
 
 Rules of this file:
 
-* One of the two is in charge: the gates of their buses are never both open. While the new one warms, that is the old
-  one; while it proves itself, the new one.
-* Both hear everything, and of each grant. So the other one can take charge between two commands, without a new request:
-  name, path, ARC and epochs stay those of the component.
-* The new one takes charge when no command of the old one is under way. The old one hands over the attributes that both
-  classes name in ``hands_over``.
-* Any failure of the new one gives the charge back at once; then it ends as if it were killed.
+* Exactly one implementation is in charge: the gates of their buses are never both open. While the new one warms up, the
+old one is in charge; while the new one is on trial, the new one is.
+* Both receive all messages and all notices of grants. So the other one can take charge between two commands without a
+new request: name, path, ARC and epochs belong to the component and do not change.
+* The new one takes charge while no command of the old one is in progress. It gets the old one's values of the
+attributes that both classes name in ``hands_over``.
+* If the new one fails in any way, the old one takes charge again at once, and the new one ends as if it were killed.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ class _BehaviorExchange:
 
 
 class BehaviorExchanges:
-    """The implementations of one behavior, of which one is in charge.
+    """The implementations of one behavior; one of them is in charge.
 
     Args:
-        first: With which the component begins.
-        load: Returns a class.
+        first: The first implementation.
+        load: Returns the class of a class path.
     """
 
     def __init__(self, first: Implementation, load: Load) -> None:
@@ -80,7 +80,7 @@ class BehaviorExchanges:
 
     # ------------------------------------------------------------------ the life of the component
     async def run(self, life: Coroutine[object, None, None]) -> None:
-        """Return when the implementation in charge has ended; raise the bug that ended it."""
+        """Run until the implementation in charge has ended; raise the bug that ended it."""
         first = self.present
         first.gate.route, first.gate.bus.on_bug = self.answer, self._bug
         self._begin(first, life)
@@ -103,13 +103,13 @@ class BehaviorExchanges:
     def _ended(self, one: Implementation, life: asyncio.Task[None]) -> None:
         if not life.cancelled():
             bug = life.exception()
-            if bug is not None or one is not self.present:  # the one in charge ends the component
+            if bug is not None or one is not self.present:  # the implementation in charge ends the component
                 self.failed(one, bug or RuntimeError("it ended"))
         self._news.set()
 
     # ------------------------------------------------------------------ questions
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer through the implementation in charge; the other one hears of grants and of its place in the tree."""
+        """Answer through the implementation in charge; the other one also gets notices of grants and of the tree."""
         if isinstance(asked.body, SwapClass):
             return await self.swap(asked.body)
         beside = self._beside
@@ -145,7 +145,7 @@ class BehaviorExchanges:
 
     # ------------------------------------------------------------------ what the implementations say
     def failed(self, one: Implementation, bug: BaseException) -> None:
-        """Note that an implementation ends because of this bug."""
+        """Record that an implementation ends because of this bug."""
         going = self._exchange
         if going is None:
             return
@@ -159,7 +159,7 @@ class BehaviorExchanges:
             going.course.fail(now_s, "the old one ended")
 
     def may_finish(self, one: Implementation, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
-        """Return whether it may finish; a new one that finishes with a failure has not proved itself."""
+        """Return whether an implementation may finish; a new one that finishes with a failure has failed its trial."""
         going = self._exchange
         if going is None or going.course.is_over:
             return True
@@ -175,14 +175,14 @@ class BehaviorExchanges:
 
     # ------------------------------------------------------------------ the exchange
     async def swap(self, asked: SwapClass) -> Swapped:
-        """Exchange the class; return when the new one has proved itself, or the old one has come back.
+        """Exchange the class; return when the new one has passed its trial, or the old one is back.
 
         Raises:
-            ExchangeRunning: Another exchange of this behavior is not over.
-            NotExchanged: This behavior cannot be exchanged as it is now.
-            WrongClass: The class cannot be read or made, or is no behavior that could take the place.
-            WrongParameter: It has no such parameters.
-            ValuesChanged: Its file declares values otherwise.
+            ExchangeRunning: Another exchange of this behavior is still running.
+            NotExchanged: This behavior cannot be exchanged in its present state.
+            WrongClass: The class cannot be imported or created, or is not a suitable behavior.
+            WrongParameter: The class has no such parameters.
+            ValuesChanged: The new file declares classes of values differently.
         """
         if self._is_busy:
             raise ExchangeRunning(f"{self.present.launch.name} is being exchanged")
@@ -226,7 +226,7 @@ class BehaviorExchanges:
                 await clock.sleep_s(min(LOOK_EVERY_S * clock.rate, left_s))
 
     async def _take_over(self, going: _BehaviorExchange) -> None:
-        """Give the new one the charge, between two commands."""
+        """Put the new implementation in charge, between two commands."""
         old, new, course = going.old, going.new, going.course
         old.gate.shut()
         await old.gate.wait_quiet()
@@ -237,9 +237,9 @@ class BehaviorExchanges:
         course.switch(now_s)
 
     def _changed(self) -> None:
-        """Let the implementation that does the work be in charge, and only this one."""
+        """Put exactly the implementation in charge that the course of the exchange names."""
         going = self._exchange
-        assert going is not None  # noqa: S101  it is its course that has changed
+        assert going is not None  # noqa: S101  the course of this exchange has changed
         works, beside = (going.new, going.old) if going.course.new_works else (going.old, going.new)
         beside.stand_by()
         self.present = works
@@ -276,7 +276,7 @@ class BehaviorExchanges:
 
 
 async def _survived(life: Coroutine[object, None, None]) -> None:
-    """Live; an exit that the class asks for is its failure, and not the end of the process."""
+    """Run; if the class calls for an exit, that is its failure, and the process continues."""
     try:
         await life
     except (SystemExit, KeyboardInterrupt) as error:

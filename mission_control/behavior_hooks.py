@@ -1,4 +1,4 @@
-"""Hooks of a behavior: everything that a behavior of one's own may override.
+"""Hooks of a behavior: all methods that your own behavior may override.
 
 Each hook documents when it is called, its purpose, and what it must not do.
 """
@@ -14,7 +14,7 @@ from resource_pool.arc_client import Frame
 
 
 class BehaviorHooks:
-    """Hooks of a behavior: events to it, and its own decisions."""
+    """Hooks of a behavior: event handlers and decisions."""
 
     async def start(self) -> None:
         """Prepare.
@@ -27,7 +27,8 @@ class BehaviorHooks:
         """Return the ARC to claim.
 
         When: after ``start``, and after a change of its ARC in the tree. What: by default the ARC of the tree; a
-        behavior that computes better run times returns the same need with these. Not: ask for another kind of ARC.
+        behavior that computes better run times returns the same need with its run times. Not: ask for another kind of
+        ARC.
         """
         return None
 
@@ -35,7 +36,7 @@ class BehaviorHooks:
         """Continue with the granted RCs.
 
         When: at the begin of each grant; commands pass and pictures arrive from now on.
-        What: inform algorithms of the elapsed time. Not: drive in a loop; that is ``act``.
+        What: inform algorithms of the elapsed time. Not: drive in a loop; ``act`` is for that.
 
         Args:
             rcs: Role → name of the granted RCs.
@@ -63,15 +64,15 @@ class BehaviorHooks:
         """
 
     def is_ready(self) -> bool:
-        """Return whether it can take the place of another class.
+        """Return whether this implementation can replace the one in charge.
 
-        When: again and again while it runs beside that class (``scout-backbone swap``), after ``start``. What: True as
-        soon as it has seen enough, for instance pictures. Not: wait.
+        When: repeatedly after ``start``, while it runs beside the other class (``scout-backbone swap``). What: True as
+        soon as it has enough data, such as pictures. Not: wait.
         """
         return True
 
     def not_now(self) -> float:
-        """Return the time that is needed beyond the end of the slice.
+        """Return the time that the behavior needs beyond the end of the slice.
 
         When: shortly before the end of the minimum run time and of each extension, if the maximum run time is longer
         and the behavior overrides this hook.
@@ -79,14 +80,14 @@ class BehaviorHooks:
         wait for it; rely on it, because a higher behavior or a person still preempts.
 
         Returns:
-            Seconds still needed beyond the end of the slice; 0: it may end.
+            Seconds needed beyond the end of the slice; 0: the slice may end.
         """
         return 0.0
 
     async def suspended(self, reason: str, by: str) -> None:
         """Handle the end of a grant.
 
-        When: after every loss of the RCs, also without an announcement. What: keep the state, report it.
+        When: after every loss of the RCs, even an unannounced one. What: keep the state, report it.
         Not: send commands; no picture arrives until ``resumed``.
 
         Args:
@@ -105,7 +106,7 @@ class BehaviorHooks:
         """Return the rules by which children are started and judged.
 
         When: once, before ``start``; the parameters are known. What: by default, all run together or, with
-        ``children_together`` False, one after the other; see ``composites`` for others. Not: begin anything.
+        ``children_together`` False, one after the other; see ``composites`` for others. Not: start children or tasks.
 
         Args:
             children: Their names, in the order of the mission file.
@@ -115,7 +116,7 @@ class BehaviorHooks:
     async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:
         """Decide what follows the end of a child.
 
-        When: a child reported success or failure, was refused at its start, or fell too often.
+        When: a child reported success or failure, was refused at its start, or crashed too often.
         What: return the decision; by default that of ``rules``: a failure aborts, a success continues. Not: start or
         stop children here.
         """
@@ -128,7 +129,7 @@ class BehaviorHooks:
         """
 
     def children_changed(self) -> None:
-        """Take notice of other children.
+        """Adapt to a change of the children.
 
         When: after a change of the tree at or below this behavior, before children of it start or stop; the parameters
         have the new nodes. What: subscribe to new ones. Not: start or stop children here.

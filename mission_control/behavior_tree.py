@@ -16,7 +16,7 @@ from backbone.placer.messages import Start
 
 
 class ArcNeed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The ARC a behavior claims.
+    """The ARC that a behavior claims.
 
     Attributes:
         kind: Component type of the ARC.
@@ -38,13 +38,13 @@ class ArcNeed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class BehaviorNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A node of the tree, with its branch.
+    """A node of the tree, with the nodes below it.
 
     Attributes:
         name: Name of the node and of its component.
         priority: Among its siblings; larger is higher.
         arc: The ARC that it claims, if any.
-        process: Name of its shared process; empty: a process of its own.
+        process: Name of its shared process; empty: it has its own process.
     """
 
     type: str
@@ -56,7 +56,7 @@ class BehaviorNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     process: str = ""
 
     def order(self, parent_path: Sequence[PathStep]) -> Start:
-        """Return the order that starts this node under a parent with that path."""
+        """Return the order that starts this node under a parent with this path."""
         plain: dict[str, object] = msgspec.to_builtins(self)
         return behavior_order(plain, parent_path)
 
@@ -76,7 +76,7 @@ def draw(
 
     Args:
         nodes: The roots.
-        remarks: Name of a node → remark behind it.
+        remarks: Name of a node → remark after the node.
         in_file_order: Siblings keep the order of the mission file; priorities do not matter.
 
     Example:

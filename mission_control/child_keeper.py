@@ -1,4 +1,4 @@
-"""ChildKeeper: keeps the children of a behavior running through the placer, and adopts those of an earlier life."""
+"""ChildKeeper: keeps a behavior's children running through the placer; adopts children of an earlier process."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus
 log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: parents and placer answer in milliseconds
-START_TIME_S = 30.0  # chosen: as for ARCs, a child's host may be busy
-ADOPT_WITHIN_S = 10.0  # chosen: a child that is being restarted answers within this
-START_PATIENCE_S = 60.0  # chosen: a link cut of 30 s, and the tries that began in it; health names it meanwhile
-AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
+START_TIME_S = 30.0  # chosen: as for ARCs, because a child's host may be busy
+ADOPT_WITHIN_S = 10.0  # chosen: a child that is being restarted answers within this time
+START_PATIENCE_S = 60.0  # chosen: a link cut of 30 s, and the attempts that began in it; health reports it meanwhile
+AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back after one or two of these intervals; machine seconds
 
 
 class Parent(Protocol):
-    """The behavior, as the keeper of its children needs it."""
+    """The interface of the behavior that the keeper of its children needs."""
 
     bus: Bus
     clock: Clock
     story: StoryBook
     child_nodes: dict[str, BehaviorNode]
-    """Name of a child → its node, as they are now."""
+    """Name of a child → its present node."""
 
     @property
     def name(self) -> str:
@@ -47,7 +47,7 @@ class Parent(Protocol):
 
     @property
     def path(self) -> Sequence[PathStep]:
-        """Names and priorities from the mission's root to it, as they are now."""
+        """Present names and priorities from the mission's root to the behavior."""
 
     def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
         """Run work as a task, unless the behavior is ending."""
@@ -68,12 +68,13 @@ class ChildKeeper:
         reported: Callable[[str, BehaviorStatus, Mapping[str, object], str], None],
         left: Callable[[str], None],
     ) -> None:
-        """Keep no child yet.
+        """Create a keeper without children.
 
         Args:
             parent: The behavior.
-            reported: A child's status, payload, and why it is suspended: it finished, cannot run, or is adopted.
-            left: An order stopped a child.
+            reported: Called with a child's status, payload and reason of suspension when it finished, cannot run or was
+                adopted.
+            left: Called when an order stopped a child.
         """
         self._parent, self._reported, self._left = parent, reported, left
         self._bus, self._clock, self._nodes = parent.bus, parent.clock, parent.child_nodes
@@ -92,9 +93,9 @@ class ChildKeeper:
             self._kept[name] = keeping
 
     async def _keep_child(self, name: str) -> None:
-        """Keep the child running until an order stops it; adopt a child of an earlier life of this behavior."""
+        """Keep the child running until an order stops it; adopt a child of an earlier process of this behavior."""
         node = self._nodes.get(name)
-        if node is None:  # it left the tree before its start
+        if node is None:  # the child left the tree before its start
             return
         wish, at = Wish(name), address(Subsystem.MISSION_CONTROL, name)
         self._wishes[name], latest = wish, node
@@ -142,16 +143,16 @@ class ChildKeeper:
                 each_s=REPLY_TIME_S,
                 within_s=ADOPT_WITHIN_S,
             )
-        except (LinkError, Refusal) as error:  # it is restarting and then runs from its beginning
+        except (LinkError, Refusal) as error:  # the child is restarting, and then runs from its beginning
             log.info("child %s does not report its progress: %s", name, error)
             return
         self._reported(name, state.status, state.payload, state.suspended_because)
 
     async def stop_those_of_an_earlier_life(self, started: Callable[[str], bool]) -> None:
-        """Stop running children of an earlier life of the owner that this life does not start.
+        """Stop running children of an earlier process of the owner that this process does not start.
 
         Args:
-            started: Name of a child → whether this life has started it.
+            started: Name of a child → whether this process has started it.
         """
         try:
             placed = await ask_until_answered(
@@ -172,7 +173,7 @@ class ChildKeeper:
         await asyncio.gather(*(self.stop(name) for name in mine if not started(name)))
 
     async def stop(self, name: str) -> None:
-        """Return when the placer has ended the child, or does not have it."""
+        """Return when the placer has ended the child, or does not know it."""
         await end_task(self._kept.pop(name, None))
         self._wishes.pop(name, None)
         await end_by_placer(self._bus, self._clock, name, f"{self._parent.name} ends it")
@@ -192,7 +193,7 @@ class ChildKeeper:
 
 
 async def end_by_placer(bus: Bus, clock: Clock, name: str, reason: str) -> None:
-    """Return when the placer has ended the component of this name, or does not have it."""
+    """Return when the placer has ended the component of this name, or does not know it."""
     while True:
         try:
             await bus.ask(PLACER, StopComponent(name, reason), Ended, within_s=START_TIME_S)

@@ -5,11 +5,12 @@ Events of children and the passing of time go in, instructions come out; the cal
 Rules of this file:
 
 * A child is *open* until it has finished and the parent has decided to leave it, or until another component ended it.
-* After each event the rules compare the children that shall run now (``wanted``) with those that run.
-* A child is stopped before it is started again; none is started after the parent has finished; the parent finishes at
-  most once, and by then everything that was started is stopped.
-* The children may change at any time. A new one counts as in the file from the beginning and not run yet, one that is
-  gone as never in it. A change interrupts no child that stays: one that was put before a running one comes after it.
+* After each event the rules compare the children that should run now (``wanted``) with the running ones.
+* A child is stopped before it is started again; no child is started after the parent has finished. The parent finishes
+at most once, after all started children are stopped.
+* The children may change at any time. A new child counts as if it had been in the file from the beginning and had not
+run yet; a removed child, as if it had never been in the file. A change does not interrupt a child that stays: if a new
+child is put before a running one, it runs after it.
 
 Source: SMC 2000, "Mission Control": behaviors spawn children; a finished child returns its status
 to its parent, which decides what comes next.
@@ -51,7 +52,7 @@ class StopChild:
 
 @dataclass(frozen=True, slots=True)
 class FinishParent:
-    """The children have finished: the parent has this final status."""
+    """The children have finished; the parent has this final status."""
 
     status: BehaviorStatus
     payload: Mapping[str, object] = field(default_factory=dict)
@@ -76,7 +77,7 @@ class Suspension:
 
 
 class Children:
-    """The rules of a parent that lets its behavior decide on each finished child.
+    """The rules of a parent whose behavior decides on each finished child.
 
     Args:
         names: Names of the children, in the order of the mission file.
@@ -84,7 +85,7 @@ class Children:
     """
 
     expects_failures: ClassVar[bool] = False
-    """True: a child that failed is part of the plan, and no alarm; only a root that failed is one."""
+    """True: a failed child is part of the plan and raises no alarm; only a failed root does."""
     in_file_order: ClassVar[bool] = False
     """True: the drawing of the branch shows the children in the order of the mission file."""
 
@@ -104,11 +105,11 @@ class Children:
         return Decision.NEXT if self.status[name] is BehaviorStatus.SUCCESS else Decision.ABORT
 
     def wanted(self, now_s: float) -> list[str]:  # noqa: ARG002  for derived classes
-        """Return the open children that shall run now, in order."""
+        """Return the open children that should run now, in order."""
         return self._open if self._together else self._open[:1]
 
     def verdict(self, now_s: float) -> FinishParent | None:  # noqa: ARG002  for derived classes
-        """Return how the parent finishes now; None: it goes on."""
+        """Return the status with which the parent finishes now; None: it continues."""
         if self._open:
             return None
         failed = self._with_status(BehaviorStatus.FAILURE)
@@ -118,7 +119,7 @@ class Children:
 
     @property
     def wakes_at_s(self) -> float:
-        """Mission time at which ``time_passed`` shall be called; infinite: never."""
+        """Mission time at which the caller must call ``time_passed``; infinite: never."""
         return math.inf
 
     # ------------------------------------------------------------------ events
@@ -132,7 +133,7 @@ class Children:
 
         Args:
             names: Names of all children from now on, in the order of the mission file.
-            anew: Those of them that begin again as new ones.
+            anew: Names of children that begin again as new ones.
         """
         gone = [name for name in self._names if name not in names or name in anew]
         new = [name for name in names if name not in self._names or name in anew]
@@ -150,7 +151,7 @@ class Children:
         return [*stops, *self._settle(now_s)] if self._has_begun else []
 
     def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> bool:
-        """Record a report; return True if the child has newly finished and the parent must decide."""
+        """Record a report; return True if the child has just finished and the parent must decide."""
         if name not in self._running or self.has_finished or self.status[name].is_final:
             return False
         self.status[name], self.payload[name] = status, payload
@@ -192,7 +193,7 @@ class Children:
         return self._arrange(now_s) if self._open else []
 
     def left(self, name: str, now_s: float) -> list[Instruction]:
-        """Return the instructions after another component ended a child, which counts as if there were none such."""
+        """Return the instructions after another component ended a child; the child no longer counts."""
         if self.has_finished or name not in self._running:
             return []
         self._running.remove(name)
@@ -212,7 +213,7 @@ class Children:
     # ------------------------------------------------------------------ for people
     @property
     def suspended_because(self) -> str:
-        """Why no started child is at work; empty: one is, or none is started."""
+        """Why no started child is at work; empty: a child is at work, or none is started."""
         waiting = [name for name in self._running if name in self.suspensions]
         if not waiting or len(waiting) < len(self._running):
             return ""
@@ -220,7 +221,7 @@ class Children:
 
     @property
     def sentence(self) -> str:
-        """Which children run, and why; empty: nothing to say."""
+        """Text about the running children and the reason; empty: no text."""
         return ""
 
     def remarks(self) -> dict[str, str]:
@@ -248,7 +249,7 @@ class Children:
 
     # ------------------------------------------------------------------ within
     def _settle(self, now_s: float) -> list[Instruction]:
-        """Arrange; a behavior that has no children waits for none."""
+        """Arrange the children; without children there are no instructions."""
         return self._arrange(now_s) if self._names else []
 
     def _remark(self, name: str) -> str:
@@ -261,7 +262,7 @@ class Children:
         return [name for name in self._names if self.status.get(name) is status]
 
     def _arrange(self, now_s: float) -> list[Instruction]:
-        """Finish if the verdict is in; else stop and start what makes wish and fact equal."""
+        """If there is a verdict, finish. Otherwise stop and start children so that the wanted ones run."""
         if self.has_finished:
             return []
         verdict = self.verdict(now_s)

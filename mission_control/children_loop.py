@@ -1,8 +1,8 @@
-"""ChildrenLoop: carries out what the rules for a behavior's children order.
+"""ChildrenLoop: carries out the instructions of the rules for a behavior's children.
 
-Rule of this file: an order waits for those before it in the same answer of the rules, and for those before it about the
-same child; the end of the parent waits for all. So no child starts before it has stopped, and a child whose stop takes
-long, because its host does not answer, holds up no other answer.
+Rule of this file: an order waits for earlier orders of the same answer and for earlier orders about the same child; the
+end of the parent waits for all orders. So no child is started before it has stopped. If a stop takes long because a
+host does not answer, other answers of the rules are not delayed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mission_control.messages import BehaviorStatus
 
 @dataclass(frozen=True, slots=True)
 class ChildOrder:
-    """An instruction, and the orders about the same child that go before it."""
+    """An instruction, and the earlier orders about the same child."""
 
     instruction: Instruction
     after: Sequence[asyncio.Event]
@@ -29,7 +29,7 @@ class ChildOrder:
 
 
 class ParentOfChildren(Parent, Protocol):
-    """The behavior, as the loop of its children needs it; see ``BehaviorHooks`` for its decisions."""
+    """The interface of the behavior that the loop of its children needs; see ``BehaviorHooks`` for its decisions."""
 
     async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, object]) -> Decision:
         """Decide what follows the end of a child."""
@@ -38,15 +38,15 @@ class ParentOfChildren(Parent, Protocol):
         """Conclude after the end of all children."""
 
     def rules_applied(self) -> None:
-        """Note that the rules have handled an event."""
+        """Called after the rules have handled an event."""
 
 
 class ChildrenLoop:
-    """Feeds the events of children, and the time, to the rules, and carries out the answers.
+    """Passes the events of children and the time to the rules, and carries out the answers.
 
     Args:
         parent: The behavior.
-        rules: What follows an event.
+        rules: The rules that decide.
     """
 
     def __init__(self, parent: ParentOfChildren, rules: Children) -> None:
@@ -62,7 +62,7 @@ class ChildrenLoop:
 
     # ------------------------------------------------------------------ for the behavior
     def begin(self) -> None:
-        """Start the children that run first; end those of an earlier life that do not."""
+        """Start the children that run first; end children of an earlier process that are not wanted."""
         self._carry_out(self.rules.begin(self._now_s()))
         if self._nodes:
             self._parent.begin_task(
@@ -85,11 +85,11 @@ class ChildrenLoop:
         self._carry_out(self.rules.time_passed(self._now_s()))
 
     async def rearranged(self, gone: Collection[str], anew: Collection[str]) -> None:
-        """Apply the rules to the nodes as they are now; return when no child that is gone runs any more.
+        """Apply the rules to the present nodes; return when no removed child runs any more.
 
         Args:
-            gone: Names that are not among the nodes any more.
-            anew: Names of nodes that end and begin anew.
+            gone: Names of the removed nodes.
+            anew: Names of nodes that end and begin again.
         """
         for name in (*gone, *anew):
             if self._given_up.pop(name, None) is not None:
@@ -100,7 +100,7 @@ class ChildrenLoop:
                 await self._last_orders[name].wait()
 
     async def end(self) -> None:
-        """Return when all started children have ended; no other is started."""
+        """End all started children and wait for that; start no other child."""
         stops = [each.name for each in self.rules.end() if isinstance(each, StopChild)]
         self._arm()
         await asyncio.gather(*map(self._keeper.stop, stops))
@@ -110,7 +110,7 @@ class ChildrenLoop:
         return [*([] if has_finished else self._keeper.absences()), *self._given_up.values()]
 
     def give_up(self, name: str, payload: Mapping[str, object]) -> None:
-        """Report a behavior that could not work as a lasting absence; one that finished and failed is no absence."""
+        """Report a behavior that could not work as a lasting absence; a behavior that ran and failed is not absent."""
         if "code" in payload:
             remedy = (
                 f"see 'scout-backbone story {name}', mend the cause, then stop {self._parent.name} and start it again"
@@ -165,7 +165,7 @@ class ChildrenLoop:
                 assert_never(instruction)
 
     def _arm(self) -> None:
-        """Wake at the time that the rules name; once for each such time."""
+        """Set a timer for the time that the rules name; one timer for each such time."""
         at_s = self.rules.wakes_at_s
         if at_s in (self._wakes_at_s, self._woke_at_s):
             return
@@ -181,6 +181,6 @@ class ChildrenLoop:
         self._carry_out(self.rules.time_passed(self._now_s(at_s)))
 
     def _now_s(self, at_least_s: float = -math.inf) -> float:
-        """Return a time that never runs backwards; a sleep may end a rounding error early."""
+        """Return a time that never runs backwards, because a sleep may end early by a rounding error."""
         self._latest_s = max(self._latest_s, at_least_s, self._clock.now_s())
         return self._latest_s

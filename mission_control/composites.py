@@ -1,12 +1,12 @@
-"""Composites: the rules of parents that the mission file composes, as events in and instructions out. Pure.
+"""Composites: the rules of parents that the mission file composes; events go in, instructions come out. Pure.
 
 Names and meanings are those of BehaviorTree.CPP 4, with three differences:
 
-* There are no ticks. A child is a process of its own that reports; every rule is applied at an event.
-* A child may be suspended at any time, because its ARC has no grant. By default it stands still, and nothing else
-  changes. ``while_suspended`` declares otherwise, where that makes sense.
-* A child that another component ended (an operator, say) counts as if the file had no such child. BehaviorTree.CPP
-  calls this *skipped*.
+* There are no ticks. A child is a process of its own that sends reports; every rule is applied at an event.
+* A child may be suspended at any time, because its ARC has no grant. By default the parent waits for it.
+``while_suspended`` sets another reaction where that makes sense.
+* If another component (an operator, say) ended a child, the rules treat it as if the file had no such child.
+BehaviorTree.CPP calls this *skipped*.
 
 Each rule reads its settings when it is applied, so that the owner may change them at any time.
 """
@@ -22,21 +22,21 @@ from mission_control.children import Children, Decision, FinishParent, Instructi
 from mission_control.messages import BehaviorStatus
 
 ENDLESS = -1
-"""As a number of cycles or attempts: without end; as a threshold: all children."""
+"""As a number of cycles or attempts: endless; as a threshold: all children."""
 
 
 class WhileSuspended(StrEnum):
-    """What a suspended child means to its parent."""
+    """Reaction of a parent to a suspended child."""
 
-    WAIT = "wait"  # it stands still: no time runs, and the parent waits for it
+    WAIT = "wait"  # the parent waits for the child, and its time does not run
     COUNT = "count"  # its time runs on
-    NEXT = "next"  # it is not available now: the next alternative stands in for it until it is at work again
-    FAIL = "fail"  # it is ended and counts as failed
-    SKIP = "skip"  # it counts as if there were none such, until it is at work again
+    NEXT = "next"  # the next alternative replaces the child until the child is at work again
+    FAIL = "fail"  # the child is ended and counts as failed
+    SKIP = "skip"  # the child is not counted until it is at work again
 
 
 class Composite(Children):
-    """A parent that decides by rule alone. Without children it has finished at once.
+    """A parent that decides by rules alone. Without children it finishes at once.
 
     With ``WhileSuspended.FAIL``, a child that was suspended for ``patience_s`` without a break counts as failed. At one
     instant, reports of children come before the end of the patience.
@@ -57,16 +57,16 @@ class Composite(Children):
         self.while_suspended, self.patience_s = while_suspended, patience_s
 
     def _settle(self, now_s: float) -> list[Instruction]:
-        """Arrange, also without children: then the parent has nothing to wait for."""
+        """Arrange the children, also if there are none, because the parent then finishes."""
         return self._arrange(now_s)
 
     def time_passed(self, now_s: float) -> list[Instruction]:
-        """Give up the children that exhausted the patience, then do what is due; see ``Children.time_passed``."""
+        """Give up the children that exhausted the patience, then arrange; see ``Children.time_passed``."""
         return [*self._give_up(now_s), *super().time_passed(now_s)]
 
     @property
     def wakes_at_s(self) -> float:
-        """When the first suspended child exhausts the patience."""
+        """Time at which the first suspended child exhausts the patience."""
         if self.has_finished or self.while_suspended is not WhileSuspended.FAIL:
             return math.inf
         return min(map(self._patient_until_s, self.suspensions), default=math.inf)
@@ -101,7 +101,7 @@ class Composite(Children):
         return self.why_failed(name).partition(" ")[2] if is_failed else super()._remark(name)
 
     def _because(self) -> str:
-        """Return the rest of the sentence: how far it is, and why."""
+        """Return the rest of the sentence: progress and reason."""
         return ""
 
     def _place(self, name: str) -> str:
@@ -134,7 +134,7 @@ class InFallback(Composite):
         return Decision.NEXT
 
     def wanted(self, now_s: float) -> list[str]:
-        """Return the first available child, and those before it, which may become available."""
+        """Return the first available child, and the children before it, because these may become available."""
         wanted: list[str] = []
         for name in self._open:
             wanted.append(name)
@@ -143,7 +143,7 @@ class InFallback(Composite):
         return wanted
 
     def verdict(self, now_s: float) -> FinishParent | None:  # noqa: ARG002
-        """Return success if a child has succeeded, failure if none is left."""
+        """Return success if a child has succeeded, failure if no child is left."""
         if self._with_status(BehaviorStatus.SUCCESS):
             return FinishParent(BehaviorStatus.SUCCESS)
         if self._open:
@@ -154,7 +154,7 @@ class InFallback(Composite):
 
     @property
     def wakes_at_s(self) -> float:
-        """When the first running child becomes unavailable, or fails."""
+        """Time at which the first running child becomes unavailable, or fails."""
         if self.has_finished or len(self._running) == len(self._open):
             return super().wakes_at_s
         return min([super().wakes_at_s, *map(self._unavailable_at_s, self._running[-1:])])
@@ -174,11 +174,11 @@ class InFallback(Composite):
 
 
 class Again(Composite):
-    """Its child again and again: how often, and after which end, is for derived classes.
+    """Starts its child repeatedly; derived classes decide after which status.
 
     Args:
         names: Name of the child.
-        most: Number of starts; -1: without end.
+        most: Number of starts; -1: endless.
         pause_s: Time from an end of the child to its next start.
         while_suspended: With FAIL, a start fails whose child exhausts the patience, see ``Composite``.
         patience_s: See ``Composite``.
@@ -229,7 +229,7 @@ class Again(Composite):
 
     @property
     def wakes_at_s(self) -> float:
-        """When the pause is over, or the child exhausts the patience."""
+        """Time at which the pause is over, or the child exhausts the patience."""
         return super().wakes_at_s if self.has_finished or self._running else self._starts_at_s
 
     @property
@@ -250,19 +250,19 @@ class Again(Composite):
 
 
 class WithRetries(Again):
-    """Its child again while it fails: success as soon as the child succeeds, failure after ``most`` attempts."""
+    """Starts its child again while it fails: success as soon as the child succeeds, failure after ``most`` attempts."""
 
     again_after = BehaviorStatus.FAILURE
 
 
 class WithRepeats(Again):
-    """Its child again while it succeeds: success after ``most`` cycles, failure as soon as the child fails."""
+    """Starts its child again while it succeeds: success after ``most`` cycles, failure as soon as the child fails."""
 
     again_after = BehaviorStatus.SUCCESS
 
 
 class Stopwatch:
-    """Sums up the time in which it runs, until a limit is reached."""
+    """A timer that can be stopped and started, with a limit."""
 
     def __init__(self) -> None:
         self.sum_s = 0.0
@@ -270,19 +270,19 @@ class Stopwatch:
         self._since_s = math.inf
 
     def run(self, now_s: float, *, running: bool) -> None:
-        """Run from now on, or stand still."""
+        """Start or stop the timer."""
         self.sum_s += max(0.0, now_s - self._since_s)
         self._since_s = now_s if running else math.inf
 
     def reaches_at_s(self, limit_s: float) -> float:
-        """Return when the sum reaches the limit; infinite: not while it stands still."""
+        """Return the time at which the sum reaches the limit; infinite while the timer is stopped."""
         return -math.inf if self.sum_s >= limit_s else self._since_s + (limit_s - self.sum_s)
 
 
 class WithTimeout(Composite):
-    """Its child, for at most ``seconds``: the child's result, or failure when the time is over.
+    """Runs its child for at most ``seconds``: the result is the child's, or failure when the time is over.
 
-    With ``WhileSuspended.WAIT`` the clock stands still while the child is suspended; with ``COUNT`` it runs on.
+    While the child is suspended, the timer stops with ``WhileSuspended.WAIT`` and runs with ``COUNT``.
     """
 
     def __init__(
@@ -292,18 +292,18 @@ class WithTimeout(Composite):
         self.seconds, self._watch = seconds, Stopwatch()
 
     def begin(self, now_s: float) -> list[Instruction]:
-        """Start the child and the clock."""
+        """Start the child and the timer."""
         self._watch.run(now_s, running=True)
         return super().begin(now_s)
 
     def suspended(self, name: str, because: str, now_s: float) -> list[Instruction]:
-        """Stop or start the clock; see ``Children.suspended``."""
+        """Stop or start the timer; see ``Children.suspended``."""
         is_counted = not because or self.while_suspended is WhileSuspended.COUNT
         self._watch.run(now_s, running=is_counted)
         return super().suspended(name, because, now_s)
 
     def rearranged(self, names: Sequence[str], anew: Collection[str], now_s: float) -> list[Instruction]:
-        """Let the clock go on if the suspended child is gone; see ``Children.rearranged``."""
+        """Start the timer again if the suspended child was removed; see ``Children.rearranged``."""
         was_suspended = bool(self.suspensions)
         instructions = super().rearranged(names, anew, now_s)
         if was_suspended and not self.suspensions:
@@ -331,7 +331,7 @@ class WithTimeout(Composite):
 
 
 class WithDelay(Composite):
-    """No child: success after ``seconds``."""
+    """A node without children: success after ``seconds``."""
 
     def __init__(self, names: Sequence[str], *, seconds: float) -> None:
         super().__init__(names)
@@ -357,5 +357,5 @@ class WithDelay(Composite):
 
     @property
     def sentence(self) -> str:
-        """Until when it waits."""
+        """Text about the end of the wait."""
         return "" if self.has_finished else f"waits until {self.wakes_at_s:.1f} s of mission time"

@@ -1,7 +1,8 @@
-"""Debug views of a behavior: named intermediate pictures and values that cost nothing unless a console looks.
+"""Debug views of a behavior: named intermediate pictures and values that cost nothing unless a console watches them.
 
-A behavior shows what it has whenever it has it. A picture's maker is called only while a console looks at it, at
-most once in ``SHOWN_EVERY_S``; otherwise nothing is made and nothing goes over the bus.
+A behavior calls ``picture`` or ``value`` whenever it has new data. The function that makes a picture is called only
+while a console watches the view, at most once in ``SHOWN_EVERY_S``. Otherwise no picture is made and nothing is
+published.
 """
 
 from __future__ import annotations
@@ -30,14 +31,14 @@ from backbone.naming import did_you_mean, legal
 from backbone.ranges import LONGEST_LINE, MOST_MEASURE, MOST_PIXEL_BYTES, MOST_PX
 from backbone.wire import Message
 
-if TYPE_CHECKING:  # most behaviors see no pictures and stay without NumPy
+if TYPE_CHECKING:  # most behaviors use no pictures and need no NumPy
     from numpy.typing import NDArray
 
 Shown = float | bool | str
 
 
 class Publisher(Protocol):
-    """What views need of a bus."""
+    """The interface of a bus that views need."""
 
     @property
     def source(self) -> str:
@@ -48,30 +49,30 @@ class Publisher(Protocol):
 
 
 class LookBook:
-    """Which views consoles look at, and when each may be shown again. Pure: times are arguments.
+    """Records which views consoles watch, and when each may be published again. Pure: times are arguments.
 
     Args:
-        every_s: Shortest time between two of one view.
+        every_s: Least time between two publications of one view.
     """
 
     def __init__(self, every_s: float) -> None:
-        self._every_s, self._lock = every_s, Lock()  # a unit may show in a thread, and answers in its event loop
+        self._every_s, self._lock = every_s, Lock()  # a unit may publish in a thread beside its event loop
         self._until_s: dict[str, float] = {}
         self._again_s: dict[str, float] = {}
 
     def look(self, view: str, until_s: float) -> float:
-        """Note that a console looks until then; return until when any console looks at the view."""
+        """Record that a console watches the view until this time; return the latest such time of all consoles."""
         with self._lock:
             self._until_s[view] = until_s = max(until_s, self._until_s.get(view, until_s))
         return until_s
 
     @property
     def is_empty(self) -> bool:
-        """True as long as no view is looked at."""
+        """True while no console watches a view."""
         return not self._until_s
 
     def take(self, view: str, now_s: float) -> bool:
-        """Return whether the view is to be shown now; if so, it is not for the next ``every_s``."""
+        """Return whether to publish the view now; if so, the next publication is due after ``every_s``."""
         with self._lock:
             until_s = self._until_s.get(view)
             if until_s is None:
@@ -100,13 +101,13 @@ class DebugViews:
         self._values: dict[str, Shown] = {}
 
     def picture(self, view: str, make: Callable[[], NDArray[Any]]) -> None:
-        """Show a picture, if a console looks at the view and its last picture is old enough.
+        """Publish a picture, if a console watches the view and the view's last picture is old enough.
 
         Args:
             view: A legal name, the same for each picture of this view.
             make: Returns the picture; called at once or never. Grey levels 0 to 255 of shape (height, width), red,
                 green and blue of shape (height, width, 3), or True and False of shape (height, width). Other numbers
-                are rounded down, and those outside 0 to 255 cut off.
+                are rounded down and clipped to 0 to 255.
 
         Raises:
             ValueError: The view shows values, there are too many views, or the picture has another shape or more than
@@ -118,7 +119,7 @@ class DebugViews:
             self._publish(view, picture_of(view, now_s, make()))
 
     def value(self, view: str, value: Shown) -> None:
-        """Show a value; the newest is in the list of views, and published while a console looks.
+        """Record a value for the list of views; while a console watches the view, also publish it.
 
         Args:
             view: A legal name with the value's unit, the same for each value of this view.
@@ -139,10 +140,10 @@ class DebugViews:
         return Views([ViewEntry(view, kind, sendable(value)) for view, kind, value in entries])
 
     def look(self, asked: LookAt) -> LookedAt:
-        """Show this view from now on for the time asked; of a value the newest at once.
+        """Publish this view for the requested time; of a value, the newest one at once.
 
         Raises:
-            UnknownView: No such view was shown so far.
+            UnknownView: The behavior has not shown such a view so far.
         """
         kind = self._kinds.get(asked.view)
         if kind is None:
@@ -172,7 +173,7 @@ class DebugViews:
 
 
 def sendable(value: Shown) -> Shown:
-    """Return the value in a form that fits a message: a number beyond its range, or none at all, as text.
+    """Return the value in a form that fits a message; NaN and numbers out of range become text.
 
     Example:
         >>> sendable(3), sendable(True), sendable(float("nan"))
@@ -190,7 +191,7 @@ def picture_of(view: str, at_s: float, made: NDArray[Any]) -> ViewPicture:
     """Return the message with a copy of this picture; see ``DebugViews.picture``.
 
     Raises:
-        ValueError: It has another shape, or is too large for a message.
+        ValueError: The picture has another shape, or is too large for a message.
     """
     is_color = made.ndim == 3
     if made.ndim not in (2, 3) or (is_color and made.shape[2] != 3):

@@ -1,12 +1,11 @@
-"""GatedBus: the bus of one implementation of a behavior, which acts only while the implementation is in charge.
+"""GatedBus: the bus of one implementation of a behavior; it sends only while the implementation is in charge.
 
 Rules of this file:
 
-* Everything is heard. So an implementation beside the one in charge has its inputs.
-* Of what is sent, only questions for knowledge pass the closed gate: their classes begin with ``Ask`` or ``List``. The
-  resource pool gets no command, as without a grant. All other questions wait until the gate opens; publications are
-  dropped.
-* The name, the tokens and the address stay those of the first implementation: the component is the same.
+* All messages are received. So an implementation that is not in charge gets its inputs, too.
+* Only questions that change nothing pass the shut gate; their classes begin with ``Ask`` or ``List``. Commands to the
+resource pool are refused, as without a grant. All other questions wait until the gate opens; publications are dropped.
+* Name, tokens and address belong to the component; all implementations share them.
 """
 
 from __future__ import annotations
@@ -48,19 +47,19 @@ class GatedBus:
 
     Args:
         bus: The component's.
-        is_first: True: the implementation with which the component began.
+        is_first: True: the component began with this implementation.
 
     Attributes:
         is_open: True: the implementation is in charge.
         answer: Answers questions to the component.
-        commands: Commands to the resource pool that were answered.
+        commands: Number of answered commands to the resource pool.
     """
 
     def __init__(self, bus: Bus, *, is_first: bool = True) -> None:
         self.bus, self.is_first = bus, is_first
         self.answer: Answer = _unready
         self.route: Answer | None = None
-        """Gets the component's questions; None: ``answer`` does."""
+        """Gets the component's questions; None: ``answer`` gets them."""
         self.on_bug: Callable[[BaseException], None] = bus.on_bug
         self.commands = 0
         self._opened, self._quiet = asyncio.Event(), asyncio.Event()
@@ -86,15 +85,15 @@ class GatedBus:
         return self._opened.is_set()
 
     def open(self) -> None:
-        """Let everything pass."""
+        """Open the gate: everything passes."""
         self._opened.set()
 
     def shut(self) -> None:
-        """Let nothing more pass that acts on others."""
+        """Shut the gate: nothing passes that affects other components."""
         self._opened.clear()
 
     async def wait_quiet(self) -> None:
-        """Return when no command is under way."""
+        """Wait until no command is in progress."""
         await self._quiet.wait()
 
     # ------------------------------------------------------------------ what acts
@@ -132,7 +131,7 @@ class GatedBus:
         self.bus.declare_publisher(address, conversation)
 
     def declare_quality(self, address: str, conversation: Conversation, quality: Quality) -> None:
-        """Send the messages of a key in another quality; see ``Bus.declare_quality``."""
+        """Send the messages of a key with another quality; see ``Bus.declare_quality``."""
         self.bus.declare_quality(address, conversation, quality)
 
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
@@ -149,7 +148,7 @@ class GatedBus:
         return NoDeclaration()
 
     def declare_alive(self, address: str) -> Subscription:
-        """Raise a token of the component, which the first implementation has done for all; see ``Bus``."""
+        """Declare a token of the component; the first implementation has done it for all. See ``Bus``."""
         return self.bus.declare_alive(address) if self.is_first else NoDeclaration()
 
     def subscribe(
@@ -162,7 +161,7 @@ class GatedBus:
         latest: bool = False,
         lossless: bool = False,
     ) -> Subscription:
-        """Hear publications; see ``Bus.subscribe``."""
+        """Subscribe to publications; see ``Bus.subscribe``."""
         heard = self._mine(listener)
         return self._keep(self.bus.subscribe(address, conversation, accepts, heard, latest=latest, lossless=lossless))
 
@@ -184,7 +183,7 @@ class GatedBus:
         return self._keep(self.bus.watch_alive(address, self._mine(listener)))
 
     def watch_link(self, listener: LinkListener) -> Subscription:
-        """Watch the own link; see ``Bus.watch_link``."""
+        """Watch the component's link; see ``Bus.watch_link``."""
         return self._keep(self.bus.watch_link(self._mine(listener)))
 
     # ------------------------------------------------------------------ the rest
@@ -203,11 +202,11 @@ class GatedBus:
         return self.bus.statistics()
 
     def dropped(self) -> dict[str, int]:
-        """Return what the component did not get; see ``Bus.dropped``."""
+        """Return the counts of messages that the component did not get; see ``Bus.dropped``."""
         return self.bus.dropped()
 
     async def close(self) -> None:
-        """Hear nothing more; the component's bus stays open."""
+        """Withdraw all declarations of this implementation; the component's bus stays open."""
         for heard in list(self._heard):
             heard.close()
 
@@ -217,7 +216,7 @@ class GatedBus:
         return heard
 
     def _mine(self, listener: Callable[..., None]) -> Callable[..., None]:
-        """Return a listener whose bug is one of this implementation."""
+        """Return a wrapped listener; its bugs count as bugs of this implementation."""
 
         def heard(*what: object) -> None:
             try:
@@ -229,7 +228,7 @@ class GatedBus:
 
 
 class HeardThrough:
-    """A declaration of one implementation, which ends with it."""
+    """A declaration of one implementation; it ends with the implementation."""
 
     def __init__(self, declared: Subscription, among: dict[HeardThrough, None]) -> None:
         self._declared, self._among = declared, among
@@ -246,7 +245,7 @@ class HeardThrough:
 
 
 class NoDeclaration:
-    """Stands for a declaration that is the component's."""
+    """Placeholder for a declaration that belongs to the component."""
 
     def close(self) -> None:
         """Change nothing."""

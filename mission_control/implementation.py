@@ -1,6 +1,6 @@
-"""Implementations of a behavior: which may be exchanged, how another one is made beside it, and goes on with its state.
+"""Implementations of a behavior: checks an exchange, creates the new implementation, and hands state over.
 
-Rule of this file: nothing waits or begins here; ``behavior_exchange`` carries out the exchange.
+Rule of this file: no function waits or starts tasks; ``behavior_exchange`` carries out the exchange.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mission_control.messages import BehaviorStatus
 
 
 class Implementation(Protocol):
-    """A behavior, as its exchange needs it."""
+    """The interface of a behavior that its exchange needs."""
 
     accepts: ClassVar[Accepts | None]
     parameters_type: ClassVar[type[msgspec.Struct]]
@@ -47,7 +47,7 @@ class Implementation(Protocol):
         """True: an operator ordered it."""
 
     async def run(self) -> None:
-        """Live."""
+        """Run."""
 
     def end(self, reason: str) -> None:
         """End in good order."""
@@ -62,13 +62,13 @@ class Implementation(Protocol):
         """Apply the parameters."""
 
     def go_on_from(self, other: Self) -> None:
-        """Go on where another implementation of the component is, and in its exchanges."""
+        """Take over the state of another implementation of the component, and its exchanges."""
 
     def take_charge(self) -> None:
-        """Act from now on."""
+        """Send commands from now on."""
 
     def stand_by(self) -> None:
-        """Act no more."""
+        """Send no more commands."""
 
     def report(self, feedback: str) -> None:
         """Set the feedback."""
@@ -78,14 +78,14 @@ class Implementation(Protocol):
 
 
 Load = Callable[[str], type[Implementation]]
-"""Returns the behavior class at a path, or refuses it."""
+"""Returns the behavior class at a class path, or raises a refusal."""
 
 
 def check_exchangeable(old: Implementation) -> None:
-    """Refuse an exchange that would lose what the running behavior has.
+    """Refuse an exchange that would lose state of the running behavior.
 
     Raises:
-        NotExchanged: It has finished, has children, is an operator's order, or is still starting.
+        NotExchanged: The behavior has finished, has children, is an operator's order, or is still starting.
     """
     name = old.launch.name
     if old.status.is_final:
@@ -102,11 +102,11 @@ def check_exchangeable(old: Implementation) -> None:
 
 
 def made_beside(old: Implementation, asked: SwapClass, kind: type[Implementation]) -> Implementation:
-    """Return the new implementation, which does not live yet.
+    """Return the new implementation; it does not run yet.
 
     Raises:
-        WrongClass: It cannot be made, or answers other questions.
-        WrongParameter: It has no such parameters.
+        WrongClass: The class cannot be instantiated, or accepts other messages.
+        WrongParameter: The class has no such parameters.
     """
     if kind.accepts != old.accepts:
         raise WrongClass(
@@ -130,7 +130,7 @@ def made_beside(old: Implementation, asked: SwapClass, kind: type[Implementation
 
 
 def handed_over(old: Implementation, new: Implementation) -> bool:
-    """Let the new one go on where the old one is; its own parameters, if they are others, count."""
+    """Hand the old implementation's state over to the new one; if the parameters differ, those of the new one count."""
     new.go_on_from(old)
     is_kept = hand_over(old, new)
     given, had = msgspec.to_builtins(new.parameters), msgspec.to_builtins(old.parameters)

@@ -15,11 +15,11 @@ class InParallel(Composite):
 
     Args:
         names: Names of the children.
-        success_count: So many successes are a success; -1: all, -2: all but one, and so on.
-        failure_count: So many failures are a failure; negative as above. It also fails as soon as too few children are
-            left to succeed.
+        success_count: Number of successes for a success; -1: all, -2: all but one, and so on.
+        failure_count: Number of failures for a failure; negative as above. The parent also fails as soon as too few
+            children are left for a success.
         while_suspended: With FAIL, see ``Composite``. With SKIP, a child that exhausts the patience stays started, but
-            counts as if there were none such until it is at work again; if no other child is left, the parent waits.
+            is not counted until it is at work again; if no other child is left, the parent waits.
         patience_s: See ``Composite``.
     """
 
@@ -37,11 +37,11 @@ class InParallel(Composite):
         self._skipped = dict[str, float]()  # child → begin of the suspension for which it is skipped
 
     def decision(self, name: str) -> Decision:  # noqa: ARG002
-        """Leave every finished child; the verdict counts."""
+        """Leave every finished child; the verdict counts the results."""
         return Decision.NEXT
 
     def verdict(self, now_s: float) -> FinishParent | None:  # noqa: ARG002
-        """Return the result as soon as the counts say it."""
+        """Return the result as soon as the counts determine it."""
         succeeded, failed = self._with_status(BehaviorStatus.SUCCESS), self._with_status(BehaviorStatus.FAILURE)
         in_all = len(succeeded) + len(failed) + len(self._undecided)
         if in_all == 0 and self._left_out:
@@ -56,7 +56,7 @@ class InParallel(Composite):
         return None
 
     def time_passed(self, now_s: float) -> list[Instruction]:
-        """Leave out the children that exhausted the patience; see ``Composite.time_passed``."""
+        """Skip the children that exhausted the patience; see ``Composite.time_passed``."""
         if self.while_suspended is WhileSuspended.SKIP:
             late = [name for name in self.suspensions if self._patient_until_s(name) <= now_s]
             self._skipped |= {name: self.suspensions[name].since_s for name in late}
@@ -64,7 +64,7 @@ class InParallel(Composite):
 
     @property
     def wakes_at_s(self) -> float:
-        """When the first suspended child exhausts the patience."""
+        """Time at which the first suspended child exhausts the patience."""
         if self.has_finished or self.while_suspended is not WhileSuspended.SKIP:
             return super().wakes_at_s
         counted = (name for name in self.suspensions if name not in self._left_out)

@@ -1,7 +1,7 @@
-"""KeeperReports: a behavior that a console ordered reports to it, and is over when the console is.
+"""KeeperReports: the reports of a behavior to the console that ordered it; the behavior ends with the console.
 
-A console that notes a report lives and knows the order. If it is gone, answers nothing, or does not know the order any
-more, the behavior is over, so that no order outlives its console.
+If a console acknowledges a report, it runs and knows the order. If the console is gone, does not answer, or no longer
+knows the order, the behavior ends, so that no order outlives its console.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from mission_control.messages import ChildReport, ReportNoted
 
 log = logging.getLogger(__name__)
 
-EVERY_S = 0.3  # chosen: several times within the limit of silence; machine seconds
-REPLY_TIME_S = 0.9  # chosen: as an ARC gives its owner for a beat; machine seconds
-SILENT_S = 1.2  # chosen: one lost report and the next one; machine seconds
+EVERY_S = 0.3  # chosen: several times within SILENT_S; machine seconds
+REPLY_TIME_S = 0.9  # chosen: as ARCs allow for their owners' heartbeat; machine seconds
+SILENT_S = 1.2  # chosen: covers one lost report; machine seconds
 GONE_S = 0.5  # chosen: as ARCs do with their owners: a robot is free within a second of its console's death
 
 
@@ -43,11 +43,11 @@ class KeeperReports:
         self._news.set()
 
     async def wait_noted(self) -> None:
-        """Return when the console has noted a report: it lives and knows the order."""
+        """Wait until the console has acknowledged a report: it runs and knows the order."""
         await self._noted.wait()
 
     async def run(self) -> str:
-        """Report until the console is gone, silent, or does not know the order; return which of these, for people."""
+        """Report until the console is gone, silent, or does not know the order; return the reason, for people."""
         keeper, why = PeerMonitor(self._bus, self._keeper, gone_after_s=GONE_S), [f"{self._keeper} is gone"]
         try:
             await first_of(keeper.wait_gone(), self._report_while_noted(why))
@@ -56,7 +56,7 @@ class KeeperReports:
         return why[-1]
 
     async def _report_while_noted(self, why: list[str]) -> None:
-        """Report; add the reason when no answer comes or the order is unknown."""
+        """Report; add the reason when no answer arrives or the order is unknown."""
         noted_s = self._clock.now_s()
         while True:
             self._news.clear()

@@ -38,8 +38,9 @@ class BehaviorState(Message, frozen=True):
     Attributes:
         payload: Payload of its last report to its parent.
         holds: Role → name of its granted RCs; empty while suspended or without an ARC.
-        suspended_because: Why it is not at work: reason and cause of the suspension of its ARC or, without an ARC, of
-            all its running children; also before its first grant. Empty: it is at work, or has finished.
+        suspended_because: Why the behavior is not at work: reason and cause of the suspension of its ARC or, without an
+            ARC, of all its running children; also before its first grant. Empty: the behavior is at work, or has
+            finished.
         tree: Its branch of the behavior tree as text, one line a node.
     """
 
@@ -83,7 +84,7 @@ class GreyPicture(Message, frozen=True):
 
 
 class SwappedIn(Message, frozen=True):
-    """A robot's pictures come again after a swap, and may show another view.
+    """A robot's pictures arrive again after a context switch, and may show another view.
 
     Attributes:
         at_s: Mission time of the grant.
@@ -107,13 +108,13 @@ class MotionSeen(Message, frozen=True):
 
 
 class PictureJudged(Message, frozen=True):
-    """What a picture shows, said of each picture that is compared with the average of those before it.
+    """The analysis of one picture, which was compared with the average of earlier pictures.
 
     Attributes:
         captured_s: Mission time of the picture.
         robot: The robot of the camera.
-        votes: Whether each of the last judged pictures had a region, newest last.
-        region: Where something moves; None: nowhere for certain.
+        votes: Whether each of the last analyzed pictures had a region, newest last.
+        region: Region of motion; None: no certain motion.
         is_rejected: Whether the picture is too torn to be used.
     """
 
@@ -140,7 +141,7 @@ class WaypointReached(Message, frozen=True):
 
 
 class NotAChild(Refusal):
-    """The sender of the report is no child of this behavior."""
+    """The sender of the report is not a child of this behavior."""
 
     code = "behavior.not_a_child"
     remedy = "Report to the behavior named before you in your path."

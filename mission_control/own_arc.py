@@ -1,7 +1,7 @@
-"""OwnArc: a behavior's claim of its one ARC, and the grants of it.
+"""OwnArc: a behavior's claim of its ARC, and the ARC's grants.
 
-Rule of this file: only the behavior in charge claims the ARC and acts; one beside it hears of each grant, so that it
-can go on with the same one.
+Rule of this file: only the behavior in charge claims the ARC and acts. A second implementation gets the notices of
+grants, too, so that it can continue under the same grant.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ from resource_pool.arc_client import (
 
 log = logging.getLogger(__name__)
 
-REST_S = 0.5  # chosen: as a slice's end gives; a behavior that stops needs one command
+REST_S = 0.5  # chosen: as at the end of a slice; stopping needs one command
 NO_GRANT_YET = "no grant yet"
 
 
 class OwnerOfArc(Actor, Protocol):
-    """The behavior, as its ARC needs it; see ``BehaviorHooks`` for its decisions."""
+    """The interface of the behavior that ``OwnArc`` needs; see ``BehaviorHooks`` for its decisions."""
 
     story: StoryBook
 
@@ -56,7 +56,7 @@ class OwnerOfArc(Actor, Protocol):
 
     @property
     def path(self) -> Sequence[PathStep]:
-        """Names and priorities from the mission's root to it, as they are now."""
+        """Present names and priorities from the mission's root to the behavior."""
 
     @property
     def is_ordered(self) -> bool:
@@ -66,14 +66,14 @@ class OwnerOfArc(Actor, Protocol):
         """Note that ``absences`` may have changed."""
 
     def suspension_changed(self) -> None:
-        """Note that the reason of its suspension may have changed."""
+        """Called when the reason of its suspension may have changed."""
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish."""
 
 
 class OwnArc:
-    """Claims the ARC, keeps it, calls the hooks at the begin and end of grants, and gives it back; an ``ArcListener``.
+    """Claims the ARC, keeps it, calls the hooks at the begin and end of grants, and releases it; an ``ArcListener``.
 
     Args:
         owner: The behavior.
@@ -81,11 +81,11 @@ class OwnArc:
 
     Attributes:
         client: The client of the ARC; None without an ARC.
-        claimed: What is asked of it; None: not yet claimed.
+        claimed: The need for which the ARC is claimed; None: not yet claimed.
         rcs: Role → name of the granted RCs; empty while suspended.
         robot: The granted RC that has a body; empty while suspended, and without one.
         suspended_because: Why there is no grant, as part of a sentence.
-        acting: What the behavior does with the grant.
+        acting: The task in which the behavior uses the grant.
     """
 
     def __init__(self, owner: OwnerOfArc, hooks: BehaviorHooks) -> None:
@@ -102,7 +102,7 @@ class OwnArc:
 
     # ------------------------------------------------------------------ claimed, and given back
     async def begin(self, need: ArcNeed, beside: OwnArc | None) -> None:
-        """Claim the ARC or, beside the behavior in charge, know its grant."""
+        """Claim the ARC; if another implementation is in charge, only follow its grants."""
         self.client = ArcClient(self._gate, arc_name(self._gate, need.kind), self, self._hooks.not_now)
         self.client.frames(self._saw)
         if beside is None:
@@ -115,20 +115,20 @@ class OwnArc:
         """Handle a notice of the ARC; see ``ArcClient.handle``.
 
         Raises:
-            NotMyArc: No ARC is claimed, or another one.
+            NotMyArc: No ARC is claimed, or the notice comes from another one.
         """
         if self.client is None:
             raise NotMyArc(f"{self._owner.name} claims no ARC")
         return await self.client.handle(notice)
 
     def claim_as_now(self, need: ArcNeed | None) -> None:
-        """Let the next claim have the owner's path as it is now and, if it is given, this need."""
+        """Use the owner's present path and, if it is given, this need for the next claim."""
         if self.claimed is not None:
             self.claimed = need or self.claimed
             self._claim.update(self._claim_of(self.claimed))
 
     async def release(self) -> None:
-        """Return when the ARC is given back, or has another owner."""
+        """Release the ARC; return when it is released, or has another owner."""
         keeping, self._keeping = self._keeping, None
         if keeping is None or self.client is None:
             return None
@@ -139,7 +139,7 @@ class OwnArc:
                 return await self.client.release(f"{self._owner.name} is done")
             except LinkError as error:
                 log.info("%s: released without an answer: %s", self.client.arc, error)
-            except Refusal as refusal:  # it has another owner by now
+            except Refusal as refusal:  # the ARC has another owner by now
                 log.info("%s is not released: %s", self.client.arc, refusal)
                 return None
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
@@ -172,7 +172,7 @@ class OwnArc:
 
     @property
     def _commands_nothing(self) -> bool:
-        """True if it sends no commands, because it overrides neither ``act`` nor ``suspending``."""
+        """True if the behavior sends no commands, because it overrides neither ``act`` nor ``suspending``."""
         kind = type(self._hooks)
         return kind.act is BehaviorHooks.act and kind.suspending is BehaviorHooks.suspending
 
@@ -196,21 +196,21 @@ class OwnArc:
     async def _want_times(self, arc: ArcClient, need: ArcNeed) -> None:
         try:
             await arc.want_runtime(need.minimum_runtime_s, need.maximum_runtime_s)
-        except (Refusal, LinkError) as error:  # it has those of the class before until it is claimed again
+        except (Refusal, LinkError) as error:  # the last class's parameters stay until the next claim
             self._owner.story.note(arc.arc, f"its run times were not changed: {error}")
 
     # ------------------------------------------------------------------ in charge, or beside the one in charge
     def go_on_from(self, other: OwnArc) -> None:
-        """Go on with the claim and the counts of another implementation."""
+        """Take over the claim and the counts of another implementation."""
         self.claimed = self.claimed or other.claimed
         self._times_resumed, self._times_suspended = other._times_resumed, other._times_suspended
         self._frames_seen = other._frames_seen
 
     def compare(self, need: ArcNeed | None, other: OwnArc) -> None:
-        """Note how the ARC of the class in charge is to change when the owner is in charge.
+        """Record how the present claim must change when this owner takes charge.
 
         Raises:
-            WrongClass: It would be another ARC.
+            WrongClass: The owner needs another ARC.
         """
         had, same = other.claimed, need
         if had is not None and need is not None:
@@ -231,7 +231,7 @@ class OwnArc:
             self.acting.begin(self.client)
 
     def stand_by(self) -> None:
-        """Keep and act no more; the ARC stays with its owner's component."""
+        """Stop keeping and acting; the ARC stays with the component."""
         keeping, self._keeping = self._keeping, None
         cancel(keeping)
         self.acting.drop()
@@ -274,11 +274,11 @@ class OwnArc:
         await self._hooks.suspended(notice.reason, notice.by)
 
     async def rest(self) -> None:
-        """Bring the robot to rest, if the owner commands one, and keep it."""
+        """Bring the robot to rest, if the owner commands one; the grant continues."""
         if self.rcs and not self._commands_nothing:
             try:
                 await self._hooks.suspending(REST_S)
-            except (Refusal, LinkError) as error:  # the grant ended first, or the robot is stopped
+            except (Refusal, LinkError) as error:  # the grant ended first, or an operator stopped the robot
                 log.info("%s did not bring its robot to rest: %s", self._owner.name, error)
 
     def _saw(self, frame: Frame) -> None:

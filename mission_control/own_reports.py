@@ -1,4 +1,4 @@
-"""OwnReports: what a behavior reports to its parent, or to the console that ordered it."""
+"""OwnReports: the reports of a behavior to its parent, or to the console that ordered it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mission_control.parent_reports import ParentReports
 
 
 class Reporter(Protocol):
-    """The behavior, as its reports need it."""
+    """The interface of the behavior that its reports need."""
 
     bus: Bus
     clock: Clock
@@ -32,7 +32,7 @@ class Reporter(Protocol):
 
     @property
     def suspended_because(self) -> str:
-        """Why it is not at work."""
+        """Why the behavior is not at work."""
 
     def begin_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None] | None:
         """Run work as a task, unless the behavior is ending."""
@@ -42,10 +42,11 @@ class OwnReports:
     """Sends the newest report whenever there is news.
 
     Args:
-        behavior: On whom it reports.
+        behavior: The reporting behavior.
 
     Attributes:
-        keeper: The reports to the console that ordered the behavior; None: it is a node of the mission's tree.
+        keeper: The reports to the console that ordered the behavior; None: the behavior is a node of the mission's
+            tree.
     """
 
     def __init__(self, behavior: Reporter) -> None:
@@ -56,7 +57,7 @@ class OwnReports:
         self._is_wound_up = False
 
     def connect(self, keeper: str) -> None:
-        """Watch the console of this address or, if it is empty, the parent; the first step of a path is no behavior."""
+        """Watch the console at this address or, if it is empty, the parent; the first step of a path is none."""
         of = self._behavior
         if keeper:
             self.keeper = KeeperReports(of.bus, of.clock, keeper, self._newest)
@@ -76,17 +77,17 @@ class OwnReports:
             reader.send()
 
     def begin(self) -> None:
-        """Send the first report; it takes the place of an earlier life's."""
+        """Send the first report; it replaces the reports of an earlier process."""
         self._told_because = self._behavior.suspended_because
         self.send()
 
     def suspension_changed(self) -> None:
-        """Send a report if the reason of the suspension is another one."""
+        """Send a report if the reason of the suspension has changed."""
         if self._behavior.suspended_because != self._told_because:
             self.begin()
 
     async def conclude(self) -> None:
-        """Send the final status; return when the parent has noted it. A console gets it until it ends the behavior."""
+        """Send the final status until the parent has acknowledged it; to a console, until it ends the behavior."""
         self._is_wound_up = True
         if self.keeper is not None:
             self.keeper.send()
@@ -94,7 +95,7 @@ class OwnReports:
             await self._parent.conclude()
 
     def _newest(self) -> ChildReport:
-        """Return the newest report; it has the final status only after the ARC and the children are given back."""
+        """Return the newest report; it has the final status only after ARC and children are released."""
         of = self._behavior
         status = of.status if self._is_wound_up else BehaviorStatus.RUNNING
         return ChildReport(of.name, status, of.payload, of.suspended_because)

@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 
 class ParentReports:
-    """Sends the newest report, again until the parent notes it; an older one that did not arrive is left out.
+    """Sends the newest report until the parent acknowledges it; older reports that did not arrive are dropped.
 
     Args:
         bus: Bus of the behavior.
@@ -46,7 +46,7 @@ class ParentReports:
             self._sending = self._begin(self._send_while_due(), "report")
 
     async def conclude(self) -> None:
-        """Send the last report, and return when the parent has noted it."""
+        """Send the last report until the parent has acknowledged it."""
         sending, self._sending = self._sending, None
         await end_task(sending)
         await self._send_until_noted()
@@ -65,7 +65,7 @@ class ParentReports:
             await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
 
     async def _is_noted(self, report: ChildReport) -> bool:
-        """Send the report once; return True if the parent noted or refused it."""
+        """Send the report once; return True if the parent acknowledged or refused it."""
         try:
             await self._bus.ask(self._parent.address, report, ReportNoted, within_s=REPLY_TIME_S)
         except LinkError as error:

@@ -90,11 +90,11 @@ class AggregateResourceController(Component[ArcParameters]):
     roles: ClassVar[Mapping[str, str] | Sequence[str]] = ()
     """Role → kind of RC in its set; a sequence of kinds if each role is named like its kind."""
     commands: ClassVar[Mapping[type[Command], str | Sequence[str]]] = {}
-    """Commands of its owner, each with the role of the RC that obeys it; several roles: the command names one."""
+    """Commands of its owner, each with the role of the RC that obeys it; of several roles the command names one."""
     body: ClassVar[str] = ""
-    """Role of the RC that has a body, which operators can stop; empty: none."""
+    """Role of the RC that has a body; operators can stop this RC. Empty: none."""
     usage: ClassVar[Usage] = DEFAULT_DRIVE_USAGE
-    """Its packets on the radio for an owner that does not say more, as a console."""
+    """Default usage of the radio, for owners such as consoles that state none."""
     gives_pictures: ClassVar[bool] = False
     """True if pictures of its robot are published under its address."""
 
@@ -129,7 +129,7 @@ class AggregateResourceController(Component[ArcParameters]):
     # ------------------------------------------------------------------ for derived classes
     @classmethod
     def abilities(cls) -> Abilities:
-        """Return the commands that it passes on, see ``Component``."""
+        """Return the commands that the ARC passes on; see ``Component``."""
         return Abilities(
             gives_pictures=cls.gives_pictures,
             body=cls.body,
@@ -138,7 +138,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     @classmethod
     def kinds(cls) -> dict[str, str]:
-        """Return role → kind of RC of its set."""
+        """Return role → kind of RC, for the ARC's set."""
         return dict(cls.roles) if isinstance(cls.roles, Mapping) else {kind: kind for kind in cls.roles}
 
     def rc(self, role: str) -> str:
@@ -199,7 +199,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 log.info("not withdrawn: %s", error)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Obey the RC manager for the gate, and the owner for everything else."""
+        """Carry out orders of the RC manager for the gate, and orders of the owner for everything else."""
         match asked.body:
             case OpenGate() | CloseGate() | AskRequest() | TakePath() if asked.source != RC_MANAGER:
                 raise NotFromYou(f"{self.name} does not take {type(asked.body).__name__} from {asked.source}")
@@ -395,6 +395,6 @@ class AggregateResourceController(Component[ArcParameters]):
                     await self._ask_anew()
 
     async def _ask_anew(self) -> None:
-        """Withdraw the holds that the RC manager still counts, and send the request again."""
+        """Withdraw the holds that the RC manager still has on record, and send the request again."""
         if await self._placed.withdraw_all():
             await self._send_request()

@@ -123,7 +123,7 @@ class ArcClient:
     """
 
     def __init__(self, bus: Bus, arc: str, listener: ArcListener, not_now: Callable[[], float] | None = None) -> None:
-        """Begin with nothing claimed.
+        """Create a client that claims no ARC yet.
 
         Args:
             bus: Bus of the decision process.
@@ -162,11 +162,11 @@ class ArcClient:
             clock: The mission's clock.
             kind: Component type of the ARC: ``drive``, ``video_drive``, ``capture``.
             parameters: Made by ``claim_parameters``.
-            rests: True: the ARC was started with these parameters before and rests; it is only asked to want time
-                again, unless it is gone.
-            is_there: True: it was claimed for this owner before, and only has to be claimed again when it is gone.
-            patience_s: Time in which a refused first start is repeated, seconds of the machine, because a host may be
-                returning or an ARC of an earlier life may be ending.
+            rests: True: the ARC was started with these parameters before and rests. ``keep`` wakes it, and starts it
+                again only if it is gone.
+            is_there: True: this owner has claimed the ARC before; ``keep`` claims it again only if it is gone.
+            patience_s: Time during which a refused first start is retried, in machine seconds: a host may be
+                restarting, or the ARC of an earlier process may be ending.
             on_changed: Called when ``wish.absence()`` may have changed.
 
         Raises:
@@ -211,7 +211,7 @@ class ArcClient:
         return Noted()
 
     async def wait_granted(self) -> Resumed:
-        """Return when the RCs are granted."""
+        """Wait until the RCs are granted."""
         while self.granted is None:
             await self._granted.wait()
         return self.granted
@@ -233,7 +233,7 @@ class ArcClient:
             raise NoSuchAction(f"{self.arc} has no command {command.word()}", command=command.word()) from unknown
 
     async def give(self, word: str, values: Mapping[str, object], role: str = "") -> Applied:
-        """Send a command by its word; see ``command``.
+        """Send the command that has this word; see ``command``.
 
         Raises:
             WrongCommand: The values do not fit the command's fields.
@@ -280,7 +280,7 @@ class ArcClient:
         return self._bus.subscribe(at, Conversation.FRAMES, Frame, arrived, latest=True)
 
     async def wait_stop_lifted(self, robot: str) -> None:
-        """Return when no operator's stop is in force on this robot.
+        """Wait until no operator's stop is in force on this robot.
 
         Raises:
             LinkError: The robot's RC did not answer.
@@ -308,7 +308,7 @@ class ArcClient:
         await self._request(WantIdle(idle))
 
     async def rest(self) -> None:
-        """Give the RCs back and keep the ARC, which wants no time until ``keep`` with ``rests``.
+        """Return the RCs and keep the ARC process; the ARC requests no time until ``keep`` with ``rests``.
 
         When: during a grant, because a waiting ARC could be granted at this moment. Afterwards the ARC holds no RC, and
         a new request needs no new process.
@@ -332,7 +332,7 @@ class ArcClient:
         await self._request(WantLonger(until_s))
 
     async def release(self, reason: str = "done") -> None:
-        """Give the RCs back and end the ARC. Idempotent."""
+        """Return the RCs and end the ARC. Idempotent."""
         try:
             await self._bus.ask(self.address, Release(reason), Accepted, within_s=REPLY_TIME_S)
         except (LinkError, Refusal) as error:

@@ -1,4 +1,4 @@
-"""The commands of one type of ARC: which RC of its set obeys which. Pure."""
+"""The commands of one type of ARC, and the RC of its set that carries out each command. Pure."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from resource_pool.messages import GiveCommand, NoSuchAction
 
 
 class ArcCommands:
-    """What the owner of such an ARC may command.
+    """The commands that an ARC of one type accepts from its owner.
 
     Args:
         kind: The type of the ARC.
-        able: Command → the role of the RC that obeys it; several roles: the command names one.
+        able: Command → role of the RC that carries it out. If there are several roles, the command names one.
     """
 
     def __init__(self, kind: str, able: Mapping[type[Command], str | Sequence[str]]) -> None:
         self._kind, self._able = kind, able
 
     def forms(self) -> list[CommandForm]:
-        """Return each command as consoles offer it."""
+        """Return each command in the form that consoles show."""
         return [
             command_form(kind, kind.word(), moves=kind.moves, without=OF_THE_BASE, roles=self._roles_of(kind))
             for kind in self._able
@@ -31,7 +31,8 @@ class ArcCommands:
         """Return the command that has this word.
 
         Raises:
-            NoSuchAction: None has it. ``Refusal``: its values are not legal.
+            NoSuchAction: No command has this word.
+            WrongCommand: The values do not fit the command's fields.
         """
         for kind in self._able:
             if kind.word() == order.word:
@@ -40,10 +41,11 @@ class ArcCommands:
         raise NoSuchAction(f"{self._kind} has no command {order.word}; it has: {known}", command=order.word)
 
     def role_of(self, command: Command) -> str:
-        """Return the role of the RC that is to obey.
+        """Return the role of the RC that carries out the command.
 
         Raises:
-            NoSuchAction: The RC of this role does not obey such a command, or several do and the command names none.
+            NoSuchAction: The RC of this role does not accept this command, or several RCs accept it and the command
+                names no role.
         """
         roles = self._roles_of(type(command))
         if command.role not in ([*roles, ""] if len(roles) == 1 else roles):

@@ -19,7 +19,7 @@ from resource_pool.messages import ArcState
 
 log = logging.getLogger(__name__)
 
-REPLY_TIME_S = 1.0  # chosen: a command that takes longer justifies a stop
+REPLY_TIME_S = 1.0  # chosen: after a longer wait an operator has reason to press the emergency stop
 START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are starting
 
 
@@ -51,13 +51,13 @@ class ArcKeeper:
     def __init__(
         self, bus: Bus, arc: str, wish: Wish, client: KeptArc, clock: Clock, on_changed: Callable[[], None]
     ) -> None:
-        """Begin with nothing claimed.
+        """Create a keeper that claims no ARC yet.
 
         Args:
             bus: Bus of the decision process.
             arc: Name of the ARC.
-            wish: Notes while the ARC is missing, and why.
-            client: Talks to the ARC.
+            wish: Records that the ARC is missing, and why.
+            client: Sends questions to the ARC and applies its state.
             clock: The mission's clock.
             on_changed: Called when ``wish.absence()`` may have changed.
         """
@@ -93,7 +93,7 @@ class ArcKeeper:
             await self._client.lost()
 
     async def _wake(self) -> bool:
-        """Wake a resting ARC, which then sends its request; return False if this is not certain."""
+        """Wake a resting ARC, which then sends its request; return False if the ARC did not confirm."""
         try:
             await self._client.idle(False)
         except (LinkError, Refusal) as error:
@@ -102,7 +102,7 @@ class ArcKeeper:
         return True
 
     async def _start_anew(self, kind: str, parameters: dict[str, object], give_up_s: float) -> None:
-        """Start the ARC; first end an ARC that an earlier life of the owner left behind."""
+        """Start the ARC; first end an ARC that an earlier process of the owner left behind."""
         while True:
             try:
                 order = Start(kind, self._arc, parameters)
@@ -127,14 +127,14 @@ class ArcKeeper:
     async def _end_leftover(self) -> None:
         try:
             await self._bus.ask(PLACER, StopComponent(self._arc, "left from before"), Ended, within_s=START_TIME_S)
-        except Refusal:  # the placer does not have it: stop it directly
+        except Refusal:  # the placer does not know the ARC, so stop it directly
             with contextlib.suppress(LinkError):
                 await self._bus.ask(self._client.address, Stop("left from before"), Stopping, within_s=REPLY_TIME_S)
         except LinkError as error:
             log.info("%s: ended without an answer: %s", self._arc, error)
 
     async def _note_absence(self, monitor: PeerMonitor) -> None:
-        """Report the ARC as absent while its token does not stand, also while only the own link may be down."""
+        """Report the ARC as absent while its token is missing, even if only this component's own link may be down."""
         await monitor.wait_risen(1)
         while True:
             await monitor.wait_hidden()
@@ -145,7 +145,7 @@ class ArcKeeper:
             self._on_changed()
 
     async def _agree_after_absence(self, monitor: PeerMonitor) -> None:
-        """Ask the ARC for its state whenever its token rises again, because notices may have been lost meanwhile."""
+        """Ask the ARC for its state whenever its token reappears, because notices may have been lost meanwhile."""
         await monitor.wait_there()
         while True:
             await monitor.wait_risen(monitor.times_risen + 1)

@@ -1,4 +1,4 @@
-"""What a decision process does at the begin and end of grants."""
+"""Callbacks of a decision process for the begin and end of grants."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from resource_pool.messages import Resumed, Suspended, Suspending
 
 
 class NotMyArc(Refusal):
-    """This decision process does not claim the ARC of the notice."""
+    """A notice came from an ARC that this decision process has not claimed."""
 
     code = "arc.not_mine"
     remedy = "Nothing to do: an ARC whose owner does not know it ends by itself."
 
 
 class ArcListener(Protocol):
-    """A decision process's reactions to the begin and end of grants."""
+    """Callbacks of a decision process for the begin and end of grants."""
 
     async def arc_resumed(self, notice: Resumed) -> None:
-        """Continue: commands pass from now on."""
+        """The grant has begun: commands pass from now on."""
 
     async def arc_suspending(self, notice: Suspending) -> None:
-        """Stop cleanly; return after that, within ``notice.deadline_s``."""
+        """The grant is about to end: bring the robot to a clean stop, then return, within ``notice.deadline_s``."""
 
     async def arc_suspended(self, notice: Suspended) -> None:
-        """Stop sending commands, because the RCs are gone; keep your state."""
+        """The grant has ended and the RCs are revoked: send no more commands, but keep your state."""

@@ -13,7 +13,7 @@ from backbone.scheduling.requests import MissingRuntime, PathNode, SchedulingReq
 from resource_pool.messages import DEFAULT_DRIVE_USAGE, NotMySet
 
 ROBOT = "robot"
-"""Stands in a wish for the role of the RC with a body, for owners that do not know what the ARC's kind calls it."""
+"""Placeholder in a wish: the role of the RC that has a body, for owners that do not know the role's name."""
 
 
 class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -28,7 +28,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         wish: Role → name of the RC.
         features: Role → features.
         usages: Period, packet time, deadline, jitter (seconds) and kind of the packets on the radio, for each kind of
-            packet; none: the usage of the ARC's class.
+            packet; empty: the usage of the ARC's class.
         idle: True: the owner wants no time yet.
         stops_at_once: True: the owner needs no time to stop at the end of a slice.
         may_say_not_now: True: ask the owner shortly before the end of a slice that can be extended.
@@ -75,8 +75,8 @@ def claim_parameters(
             the ARC's class, for a hand on a stick.
         console: True for consoles.
         idle: True: no time is wanted yet.
-        stops_at_once: True: the owner needs no time to stop at the end of a slice. Then ``arc_suspending`` is not
-            called, and the context switch does not wait for the owner.
+        stops_at_once: True: the owner needs no time to stop at the end of a slice. Then the context switch does not
+            wait for the owner, and ``arc_suspending`` is not called.
         may_say_not_now: True: the owner is asked shortly before the end of each slice that can be extended.
 
     Raises:
@@ -113,8 +113,8 @@ def request_of(
         arc: Name of the ARC.
         given: Its parameters.
         sets: Sets of RCs that match, each role → name.
-        sharable: Names of the RCs that it uses by streams.
-        usage: What it uses if its parameters do not say.
+        sharable: Names of the sharable RCs, which the ARC uses through packet streams.
+        usage: Usage of the radio if the parameters state none.
     """
     return scheduling_request(
         arc,
@@ -145,7 +145,7 @@ def set_of(arc: str, sets: Sequence[dict[str, str]], rcs: Iterable[str]) -> dict
 
 
 def require_runtime(arc: str, least_s: float, most_s: float) -> None:
-    """Refuse run times that no slice can have, because a later RC manager would refuse the whole request.
+    """Reject run times that no slice can have, because a restarted RC manager would reject the whole request.
 
     Raises:
         MissingRuntime: No slice can have these run times.

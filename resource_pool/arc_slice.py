@@ -12,7 +12,7 @@ from backbone.rc_manager.messages import Done, Extend
 from resource_pool.gate import Gate
 from resource_pool.messages import Noted, SliceEnds
 
-ASK_BEFORE_END_S = 0.2  # chosen: question and answer take milliseconds, and a later answer is more accurate
+ASK_BEFORE_END_S = 0.2  # chosen: question and answer take milliseconds, and the owner estimates better near the end
 RC_REPLY_S = 0.8  # chosen: a robot RC itself gives the radio half a second
 
 
@@ -33,7 +33,7 @@ class ArcSlice:
         longest_s: Callable[[], float],
         note: Callable[[str, str], object],
     ) -> None:
-        """Begin without a slice.
+        """Create the record of an ARC without a slice.
 
         Args:
             bus: For questions to owner and RC manager.
@@ -63,7 +63,7 @@ class ArcSlice:
             ask_s = self.end_s - ASK_BEFORE_END_S
             if self._clock.now_s() < ask_s:
                 await self._clock.sleep_until_s(ask_s)
-                continue  # it may have been extended meanwhile
+                continue  # the slice may have been extended meanwhile
             wanted_s = await self._ask_whether_not_now()
             if not wanted_s > 0:
                 return

@@ -1,4 +1,4 @@
-"""Places at which robots begin, as a mission file writes them."""
+"""Start places of robots, in the notation of the mission file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ def read_begins(text: str) -> dict[str, FloorPose]:
     """Return name → place of a text like ``scout1:1,1,90 scout2:3,1``; headings are degrees, 0 if left out.
 
     Raises:
-        ValueError: A part of the text is no named place, or a name comes twice.
+        ValueError: A part of the text is not a named place, or a name occurs twice.
 
     Example:
         >>> read_begins("scout1:1,2")

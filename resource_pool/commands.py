@@ -1,4 +1,4 @@
-"""Commands: what an RC does for the ARC that holds it.
+"""Commands that an RC carries out for the ARC that holds it.
 
 The RC that obeys a command declares it, as one message class. A decision process sends the command to its ARC; the ARC
 fills in its own name and the epoch, and passes the command on to the RC of its role. The answer contains the applied
@@ -23,7 +23,7 @@ class Command(Message, frozen=True, kw_only=True):
     """Base class of commands; derive and add the command's own fields.
 
     Attributes:
-        role: Role of the RC in its ARC; empty: the only role that takes this command.
+        role: Role of the RC in its ARC; empty: the only role that accepts this command.
         after_stop: Number of the robot's last stop whose lift the sender knows; 0: no stop.
         arc: The ARC that commands; filled in by the ARC.
         epoch: Epoch of the RC's connection; filled in by the ARC.
@@ -39,7 +39,7 @@ class Command(Message, frozen=True, kw_only=True):
 
     @classmethod
     def word(cls) -> str:
-        """Return its name in ``Applied``, scripts and stories.
+        """Return the command's name in ``Applied``, scripts and stories.
 
         Example:
             >>> SwitchTransmitter.word()
@@ -48,12 +48,12 @@ class Command(Message, frozen=True, kw_only=True):
         return re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
 
     def under(self, arc: str, epoch: int) -> Self:
-        """Return this command under a grant to an ARC."""
+        """Return this command with the ARC and the epoch of its grant filled in."""
         return msgspec.structs.replace(self, arc=arc, epoch=epoch)
 
 
 OF_THE_BASE = Command.__struct_fields__
-"""Fields that the ARC and its client fill in, not the person or behavior that commands."""
+"""Fields that the ARC and its client fill in, not the commanding person or behavior."""
 
 
 class WrongCommand(Refusal):
@@ -84,10 +84,10 @@ def command_of(kind: type[Command], values: Mapping[str, object], *, role: str, 
 
 
 def clipped(order: Command, limits: Mapping[str, tuple[float, float]]) -> dict[str, float]:
-    """Return those of the command's values that have limits, each within them.
+    """Return the command's limited values, each clipped to its limits.
 
     Raises:
-        WrongCommand: One of them is not finite.
+        WrongCommand: A value is not finite.
 
     Example:
         >>> clipped(Move(5.0, 0.5), {"forward_m_s": (-1.0, 1.0), "turn_rad_s": (-2.0, 2.0)})

@@ -1,12 +1,12 @@
-"""Dead reckoning: where one robot is believed to be, from the motions that it carried out since a known place.
+"""Dead reckoning: estimates one robot's pose from the motions that it carried out since a known place.
 
-Rules of this file: no bus, no clock. Events and mission time go in, beliefs come out.
+Rules of this file: no bus, no clock. Events and mission time go in; pose estimates ("beliefs") come out.
 
-* A motion lasts until the next one, at most ``COMMAND_TIMEOUT_S``, as robots end it. Where a robot counts its way by
-  itself, its count replaces the commanded way.
-* The spread grows with way and turns, and never shrinks but by a sighting of a landmark, which replaces the belief. On
-  a way back the error may get smaller, if errors are as ``doubt`` has them; the spread that is told does not.
-* Numbers that no robot can have change nothing; time never runs backwards.
+* A motion lasts until the next one, but at most ``COMMAND_TIMEOUT_S``, because robots then stop by themselves. If a
+  robot measures its own way (odometry), its count replaces the commanded way.
+* The spread grows with way and turns. It shrinks only when a landmark is sighted, because the sighting replaces the
+  belief. By the model in ``doubt`` the error may shrink on a way back; the published spread does not.
+* Impossible numbers are ignored; time never runs backwards.
 
 Source: Borenstein, Everett and Feng, "Where am I?", 1996, chapter 1: odometry "is fundamentally the integration of
 incremental motion information over time, which leads inevitably to the accumulation of errors".
@@ -22,17 +22,17 @@ from resource_pool.doubt import Doubt
 from resource_pool.localization import PoseSource
 from resource_pool.messages import COMMAND_TIMEOUT_S
 
-LEAST_SHARE = 0.01  # chosen: of the way; so much the spread grows at least, also on a way back
-JUMP_M = 0.5  # chosen: longer than a Scout's jump over 30 cm carries it
-JUMP_RAD = math.pi / 2  # chosen: it lands on its wheels, but turned
+LEAST_SHARE = 0.01  # chosen: of the way; the spread grows by at least this share, also on a way back
+JUMP_M = 0.5  # chosen: farther than a Scout's jump over 30 cm leads
+JUMP_RAD = math.pi / 2  # chosen: the robot lands on its wheels, but turned
 ROUND_M = 0.01  # chosen: resolution of a count
 ROUND_RAD = 0.02  # chosen: same
-FASTEST_M_S = 5.0  # chosen: faster than any robot of a room; an odometer that says more has begun anew
-MOST_RAD_S = 50.0  # chosen: faster than any robot of a room turns
+FASTEST_M_S = 5.0  # chosen: faster than any indoor robot; an odometer with a larger step has been reset
+MOST_RAD_S = 50.0  # chosen: faster than any indoor robot turns
 FARTHEST_M = 1e6  # the limit of ``Meters``
-REMEMBERED_S = 1.0  # chosen: a picture is older by a third of a second at most when its landmark is found
+REMEMBERED_S = 1.0  # chosen: a landmark is found at most a third of a second after its picture was taken
 REMEMBERED = 128  # chosen: twice as many motions as arrive in that time
-SIGHT_LASTS_S = 1.0  # chosen: while a robot looks at a landmark, sightings come several times a second
+SIGHT_LASTS_S = 1.0  # chosen: while a robot sees a landmark, sightings arrive several times a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class FloorPose:
         )
 
     def after(self, begin: FloorPose, end: FloorPose) -> FloorPose:
-        """Return the pose that one gets to from here by what led from ``begin`` to ``end``."""
+        """Return the pose reached from here by the same motion that leads from ``begin`` to ``end``."""
         angle_rad = self.heading_rad - begin.heading_rad
         x_m, y_m = end.x_m - begin.x_m, end.y_m - begin.y_m
         return FloorPose(
@@ -70,19 +70,19 @@ class FloorPose:
 
     @property
     def is_finite(self) -> bool:
-        """True if it is a place in some room."""
+        """True if every coordinate is finite and within the limit of ``Meters``."""
         return _are_sane(FARTHEST_M, self.x_m, self.y_m, self.heading_rad)
 
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """Where a robot is believed to be.
+    """The estimated pose of a robot.
 
     Attributes:
         at_s: Mission time for which it holds.
         spread_m: Standard deviation of the place.
-        spread_rad: Standard deviation of the heading, at most pi: it may look anywhere.
-        source: What it rests on last.
+        spread_rad: Standard deviation of the heading, at most pi; pi: the heading is unknown.
+        source: Kind of the newest evidence for it.
     """
 
     pose: FloorPose
@@ -96,7 +96,7 @@ class DeadReckoning:
     """The belief about one robot.
 
     Args:
-        begin: Where it is believed to be first; finite.
+        begin: The first belief; finite.
     """
 
     def __init__(self, begin: Belief) -> None:
@@ -104,7 +104,7 @@ class DeadReckoning:
         self._doubt = Doubt.of(begin.spread_m, begin.spread_rad)
         self._moves = (0.0, 0.0)
         self._until_s = begin.at_s
-        self._count: tuple[float, float, float] | None = None  # its own count of way and turn at the last reading, when
+        self._count: tuple[float, float, float] | None = None  # its own count: way, turn, mission time
         self._counted_from = (begin, self._doubt)
         self._commanded: tuple[float, float] | None = (0.0, 0.0)  # way and turn until the first count
         self._sighted_s = -math.inf
@@ -116,27 +116,27 @@ class DeadReckoning:
         return any(self._moves) and self._belief.at_s < self._until_s
 
     def believe(self, now_s: float) -> Belief:
-        """Return the belief for this time; a time before the last one means the last one."""
+        """Return the belief for this time; a time before the last event counts as the time of that event."""
         self._advance(now_s)
         return self._belief
 
     def moves(self, forward_m_s: float, turn_rad_s: float, at_s: float) -> None:
-        """Note that the robot moves like this from now on, for ``COMMAND_TIMEOUT_S`` at most."""
+        """Record that the robot moves at these speeds from now on, for at most ``COMMAND_TIMEOUT_S``."""
         if not (_are_sane(FASTEST_M_S, forward_m_s) and _are_sane(MOST_RAD_S, turn_rad_s)):
             return
         self._advance(at_s)
         self._moves, self._until_s = (forward_m_s, turn_rad_s), self._belief.at_s + COMMAND_TIMEOUT_S
 
     def jumps(self, at_s: float) -> None:
-        """Note that the robot leaves the floor, and comes down somewhere near."""
+        """Record a jump: the robot leaves the floor and lands somewhere near."""
         self.moves(0.0, 0.0, at_s)
         self._loses(JUMP_M, JUMP_RAD)
 
     def counts(self, way_m: float, turned_rad: float, at_s: float) -> None:
-        """Take the robot's own count of its way and turn since it was switched on, in place of the commanded ones.
+        """Use the robot's own count of way and turn since power-on instead of the commanded motion.
 
-        The first count, the first after a sighting, and one that no robot can have reached, begin a new series. But a
-        first count of no more than was commanded since the begin has counted since the begin.
+        The first count, the first count after a sighting, and an impossible count begin a new series. But if the first
+        count is not larger than the way commanded since the begin, the robot has counted since the begin.
         """
         if not _are_sane(FARTHEST_M, way_m, turned_rad):
             return
@@ -159,9 +159,9 @@ class DeadReckoning:
         self._count, self._counted_from = (way_m, turned_rad, now.at_s), (self._belief, self._doubt)
 
     def sighted(self, pose: FloorPose, spread_m: float, spread_rad: float, at_s: float) -> None:
-        """Take the pose that a landmark showed, and add the motion since ``at_s``.
+        """Replace the belief by the pose that a landmark showed at ``at_s``, plus the motion since then.
 
-        What is longer ago than ``REMEMBERED_S`` changes nothing.
+        A sighting older than ``REMEMBERED_S`` is ignored.
         """
         now = self._belief
         fits = pose.is_finite and _are_sane(FARTHEST_M, spread_m, spread_rad) and min(spread_m, spread_rad) >= 0
@@ -194,7 +194,7 @@ class DeadReckoning:
         self._widen(spread_m, math.sqrt(before.spread_rad**2 + self._doubt.hh - doubted_rad2))
 
     def _widen(self, spread_m: float, spread_rad: float) -> None:
-        """Be at least as unsure as this."""
+        """Raise the spreads to at least these values."""
         now = self._belief
         self._belief = replace(
             now,
@@ -221,13 +221,13 @@ class DeadReckoning:
     def _remember(self) -> None:
         now = self._belief
         if self._past and self._past[-1][0] == now.at_s:
-            self._past.pop()  # it was put right
+            self._past.pop()  # a sighting has corrected the belief
         self._past.append((now.at_s, now.pose))
         while len(self._past) > 2 and self._past[1][0] <= now.at_s - REMEMBERED_S:
             self._past.popleft()
 
     def _at(self, at_s: float) -> FloorPose:
-        """Return the pose believed for a time in the past, on a straight line between two that are known."""
+        """Return the pose believed for a past time, interpolated between the two nearest recorded poses."""
         before_s, before = self._past[0]
         for after_s, after in self._past:
             if after_s >= at_s:
@@ -243,7 +243,7 @@ class DeadReckoning:
 
 
 def _are_sane(most: float, *numbers: float) -> bool:
-    """Return whether each of the numbers is one, and not beyond this."""
+    """Return whether all numbers are finite and within this limit."""
     return all(abs(number) <= most for number in numbers)
 
 

@@ -1,7 +1,7 @@
-"""Doubt: how sure a reckoned pose is, as the covariance of place and heading.
+"""Doubt: the uncertainty of a dead-reckoned pose, as the covariance of place and heading.
 
-An error of the heading becomes one of the place on the way, and less of one on the way back. Errors of way and turn are
-independent, so variances grow in proportion to both.
+On the way out an error of the heading adds to the error of the place; on the way back it takes some of that away.
+Errors of way and turn are independent, so variances grow in proportion to both.
 
 Source: Thrun, Burgard and Fox, "Probabilistic Robotics", 2005, section 3.3: prediction of an extended Kalman filter.
 """
@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-PLACE_M2_PER_M = 0.0016  # chosen: 4 cm in a meter; a Scout in the simulated room was measured to lack 1 to 2
-HEADING_RAD2_PER_M = 0.0004  # chosen: one degree in a meter; nothing measured, floors are not as even as the simulated
-HEADING_RAD2_PER_RAD = 0.006  # chosen: 4 degrees in one radian; a Scout in the simulated room lacks 2 to 4
-MOST_RAD2 = math.pi**2  # the robot may look anywhere
+PLACE_M2_PER_M = 0.0016  # chosen: 4 cm in a meter; measured with a Scout in the simulated room: 1 to 2
+HEADING_RAD2_PER_M = 0.0004  # chosen: one degree in a meter; not measured: real floors are less even
+HEADING_RAD2_PER_RAD = 0.006  # chosen: 4 degrees in one radian; measured with a Scout in the simulated room: 2 to 4
+MOST_RAD2 = math.pi**2  # the heading is unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Doubt:
 
     @classmethod
     def of(cls, spread_m: float, spread_rad: float) -> Doubt:
-        """Return the doubt of a pose with these standard deviations, alike in all directions."""
+        """Return the doubt of a pose with these standard deviations, the same in all directions."""
         return cls(spread_m**2, spread_m**2, min(MOST_RAD2, spread_rad**2))
 
     @property
@@ -48,10 +48,10 @@ class Doubt:
         """Return the doubt after a motion.
 
         Args:
-            x_m: How far it led along x.
-            y_m: How far it led along y.
-            way_m: Its length, 0 or more.
-            turned_rad: Its turn, 0 or more.
+            x_m: Displacement along x.
+            y_m: Displacement along y.
+            way_m: Length of the way, 0 or more.
+            turned_rad: Size of the turn, 0 or more.
         """
         place = PLACE_M2_PER_M * way_m
         heading = HEADING_RAD2_PER_M * way_m + HEADING_RAD2_PER_RAD * turned_rad
@@ -65,7 +65,7 @@ class Doubt:
         )
 
     def larger(self, spread_m: float, spread_rad: float) -> Doubt:
-        """Return the doubt after something unknown of these standard deviations."""
+        """Return the doubt after an unknown disturbance with these standard deviations."""
         return Doubt(
             self.xx + spread_m**2,
             self.yy + spread_m**2,

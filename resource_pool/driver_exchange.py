@@ -3,9 +3,9 @@
 Rules of this file:
 
 * The RC, its holds and their epochs do not take part: only the driver in its slot changes, between two calls.
-* If both drivers say so (``opens_beside``), or have nothing to open, the new one is opened beside the old one. Else the
+* If both drivers set ``opens_beside``, or have nothing to open, the new one is opened beside the old one. Otherwise the
   old one is closed first, and calls wait until a device is open again.
-* The first failure of the new one in its time of proof brings the old one back, which does the same call.
+* If the new driver fails during its trial, the old driver comes back and repeats the failed call.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ CLOSES_WITHIN_S = 2.0  # chosen: a device that does not close by then hangs; mac
 
 
 class RcOfDrivers(Protocol):
-    """The RC, as the exchange of its driver needs it."""
+    """The interface of the RC that a driver exchange needs."""
 
     bus: Bus
     clock: Clock
@@ -101,7 +101,7 @@ class DriverExchanges:
         self._news = asyncio.Event()
 
     def made(self, build: Callable[[DriverSite], object], site: DriverSite) -> object:
-        """Return a driver whose own failures count as those of this driver."""
+        """Return a driver whose spontaneous failures count as failures of this driver."""
         mine: list[object] = []
         driver = build(dataclasses.replace(site, fail=lambda bug: self._driver_failed(mine[0] if mine else None, bug)))
         mine.append(driver)
@@ -120,7 +120,7 @@ class DriverExchanges:
         self._rc.fail(bug)
 
     def _failed(self, error: BaseException) -> asyncio.Event | None:
-        """Let the old one come back if the new one is not proved; return what is set when it works."""
+        """Bring the old driver back if the new one is on trial; return the event that is set when the old one works."""
         going = self._going
         if going is None or going.course.phase is ExchangePhase.PROVED or going.slot.works is not going.new:
             return None
@@ -138,15 +138,15 @@ class DriverExchanges:
 
     # ------------------------------------------------------------------ the exchange
     async def swap(self, asked: SwapClass, slots: Sequence[DriverSlot]) -> Swapped:
-        """Exchange the driver; return when the new one has proved itself, or the old one has come back.
+        """Exchange the driver; return when the new one has passed its trial, or the old one is back.
 
         Raises:
-            ExchangeRunning: Another exchange of this driver is not over.
-            NotExchanged: The RC has not one driver.
+            ExchangeRunning: Another exchange of this driver is still running.
+            NotExchanged: The RC does not have exactly one driver.
             UnknownDriver: No driver has this name.
-            WrongClass: The class cannot be read or made, or is no driver of this kind.
+            WrongClass: The class cannot be imported or created, or is not a driver of this kind.
             WrongParameter: The driver refuses its options.
-            ValuesChanged: Its file declares values otherwise.
+            ValuesChanged: The new file declares classes of values differently.
         """
         if self._is_busy:
             remedy = "Wait until it is over; 'scout-backbone log' shows it."
@@ -186,7 +186,7 @@ class DriverExchanges:
         return going.course.answer(self._now_s(), remark)
 
     async def _over(self, going: _DriverExchange) -> str:
-        """Return what an operator should know when one of the two is there alone."""
+        """Wait until only one of the two drivers is left; return the result for the operator."""
         while not going.course.is_over:
             self._news.clear()
             await set_within(self._news, max(0.0, going.course.due_s - self._now_s()) / self._rc.clock.rate)
@@ -194,7 +194,7 @@ class DriverExchanges:
         return await (self._proved(going) if going.course.phase is ExchangePhase.PROVED else self._returned(going))
 
     def _made(self, asked: SwapClass, slot: DriverSlot, kind: Callable[[DriverSite], object]) -> _DriverExchange:
-        """Return the exchange with the new driver, not open yet."""
+        """Return the exchange with its new driver, which is not open yet."""
         old, rc = slot.works, self._rc
         if missing := methods_of(old) - methods_of(kind):
             raise WrongClass(
@@ -242,10 +242,10 @@ class DriverExchanges:
             going.course.fail(self._now_s(), complaint(error))
 
     async def _taken_over(self, going: _DriverExchange) -> None:
-        """Let the new one work, between two calls."""
+        """Switch to the new driver between two calls."""
         going.slot.shut()
         await going.slot.wait_quiet()
-        if going.course.is_over:  # it failed by itself meanwhile
+        if going.course.is_over:  # the new driver failed by itself meanwhile
             return
         now_s = self._now_s()
         going.course.keeps_state = bool(going.course.tried(now_s, lambda: hand_over(going.old, going.new)))
@@ -258,7 +258,7 @@ class DriverExchanges:
         self._tell(f"{going.asked.class_path} works, and has to prove itself", LogLevel.INFO)
 
     async def _brought_up(self, going: _DriverExchange) -> None:
-        """Have the RC repeat what stands; a fault in it is one of the driver that works."""
+        """Let the RC restore the driver's state; a fault during that counts as a fault of the working driver."""
         if going.course.switched_s is None:
             return
         try:
@@ -294,7 +294,7 @@ class DriverExchanges:
         return await revise_start(self._rc.bus, order)
 
     async def _close(self, driver: object) -> None:
-        """Close a driver that works no more; that it cannot is told, and changes nothing."""
+        """Close a driver that is no longer in use; if this fails, log it and go on."""
         close = getattr(driver, "close", None)
         if close is None:
             return

@@ -1,9 +1,9 @@
-"""DriverSlot: stands in an RC where its driver stands, so that another driver can take the place between two calls.
+"""DriverSlot: a proxy for an RC's driver, so that the driver can be replaced between two calls.
 
 Rules of this file:
 
-* At any instant one driver works: all calls go to it, and only its callbacks arrive.
-* Another one takes over when no call is under way. Calls that come while no device is open wait.
+* At any instant exactly one driver works: all calls go to this driver, and only its callbacks arrive.
+* A new driver takes over while no call is in progress. Calls wait while no device is open.
 * While a driver is on trial, its bugs and hardware faults, and calls that hang, reach the RC only if the old driver
   cannot do the same call.
 """
@@ -25,12 +25,12 @@ SLOTS_KEPT = 64  # chosen: more than the kinds of drivers in one process
 
 
 class DriverSlot:
-    """The place of a driver; made by ``slot_for``, which adds the methods of the driver.
+    """Proxy for a driver; ``slot_for`` creates it and adds the driver's methods.
 
     Attributes:
         works: The driver that works.
-        on_trial: Called with the exception when the driver that works fails; returns None if it is not on trial, else
-            an event that is set when the old one works again.
+        on_trial: Called with the exception when the working driver fails. Returns None if that driver is not on trial;
+            otherwise an event that is set when the old driver works again.
         calls: Calls that were answered.
         is_tried: True: the driver that works is on trial.
     """
@@ -50,24 +50,24 @@ class DriverSlot:
 
     # ------------------------------------------------------------------ for the exchange
     def shut(self) -> None:
-        """Let calls wait."""
+        """Make calls wait from now on."""
         self._opened.clear()
 
     def open_gate(self) -> None:
-        """Let calls go to the driver that works."""
+        """Pass calls to the working driver from now on."""
         self._opened.set()
 
     async def wait_open(self) -> None:
-        """Return when calls go to a driver."""
+        """Wait until calls are passed to a driver."""
         await self._opened.wait()
 
     async def wait_quiet(self) -> None:
-        """Return when no call is under way."""
+        """Wait until no call is in progress."""
         await self._quiet.wait()
 
     # ------------------------------------------------------------------ calls
     def call(self, name: str, arguments: tuple[object, ...], named: Mapping[str, object]) -> object:
-        """Call a method that does not wait."""
+        """Call a synchronous method."""
         driver = self.works
         try:
             done: object = getattr(driver, name)(*(self._while_works(driver, one) for one in arguments), **named)
@@ -75,14 +75,14 @@ class DriverSlot:
             back = None if _is_no_fault(error) else self.on_trial(error)
             if back is None:
                 raise
-            if not back.is_set():  # its device has to be opened first, and this caller cannot wait
+            if not back.is_set():  # the device must be opened first, and a synchronous caller cannot wait
                 raise HardwareFault(f"{name}: {error}") from error
             return self.call(name, arguments, named)
         self.calls += 1
         return done
 
     async def call_later(self, name: str, arguments: tuple[object, ...], named: Mapping[str, object]) -> object:
-        """Call a method that waits."""
+        """Call an asynchronous method."""
         await self._opened.wait()
         driver, back = self.works, None
         self._under_way += 1
@@ -108,7 +108,7 @@ class DriverSlot:
         return await self.call_later(name, arguments, named)
 
     def _while_works(self, driver: object, given: object) -> object:
-        """Return a callback that arrives only while this driver works, and any other argument as it is."""
+        """Wrap a callback so that it is called only while this driver works; return any other argument unchanged."""
         if not callable(given):
             return given
 
@@ -140,7 +140,7 @@ def _slot_class(driver: type[Any]) -> type[DriverSlot]:
 
 
 def methods_of(driver: object) -> set[str]:
-    """Return the names of the methods by which an RC may call this driver."""
+    """Return the names of the driver's methods that an RC may call."""
     found = inspect.getmembers(driver if isinstance(driver, type) else type(driver), callable)
     return {name for name, method in found if not name.startswith("_") and not isinstance(method, type)}
 
@@ -160,5 +160,5 @@ def _at_once(name: str) -> Callable[..., object]:
 
 
 def _is_no_fault(error: BaseException) -> bool:
-    """Return whether a driver that works well may raise this: a refusal of what it was given."""
+    """Return whether a healthy driver may raise this exception, because it refuses its arguments."""
     return isinstance(error, Refusal) and not isinstance(error, HardwareFault)

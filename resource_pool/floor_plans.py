@@ -1,4 +1,4 @@
-"""Floor plans: the plan of a described room, its landmarks, and where a sighting of one puts a robot.
+"""Floor plans: the plan of a described room, and the robot's pose that follows from a sighting of a landmark.
 
 Rules of this file: no bus, no clock, no physics.
 """
@@ -13,11 +13,11 @@ from resource_pool.localization import FloorPlan, FloorShape, LandmarkSighting, 
 from scout_model.description import WorldDescription
 from scout_model.dimensions import BOARD_THICKNESS_M, BOARD_WIDTH_M
 
-TWICE_AS_NEAR = 2.0  # chosen: boards look alike; one is meant if the next would move the belief twice as far
+TWICE_AS_NEAR = 2.0  # chosen: boards look alike; the nearest is taken if the next would move the belief twice as far
 
 
 def plan_of(room: WorldDescription) -> FloorPlan:
-    """Return the plan of a room: furniture, ramps, dark places, landmarks, without what moves."""
+    """Return the plan of a room: furniture, ramps, dark places and landmarks, but no moving bodies."""
     blocks = [(ShapeKind.FURNITURE, one) for one in room.furniture] + [
         (ShapeKind.DARK, one) for one in room.dark_places
     ]
@@ -36,14 +36,14 @@ def plan_of(room: WorldDescription) -> FloorPlan:
 
 
 def board(name: str, at: FloorPose) -> FloorShape:
-    """Return the shape of a landmark's board, which faces along its heading."""
+    """Return the shape of a landmark's board; the board faces along the heading."""
     return FloorShape(
         name, ShapeKind.LANDMARK, at.x_m, at.y_m, BOARD_THICKNESS_M, BOARD_WIDTH_M, heading_rad=at.heading_rad
     )
 
 
 def before_board(at: FloorPose, sighting: LandmarkSighting) -> FloorPose:
-    """Return the robot's pose in the room, if the board that it sees is this one."""
+    """Return the robot's pose in the room, if it sees this board."""
     ahead_x, ahead_y = math.cos(at.heading_rad), math.sin(at.heading_rad)
     return FloorPose(
         at.x_m + sighting.ahead_m * ahead_x + sighting.left_m * ahead_y,
@@ -53,11 +53,11 @@ def before_board(at: FloorPose, sighting: LandmarkSighting) -> FloorPose:
 
 
 def sighted_from(plan: FloorPlan, sighting: LandmarkSighting, belief: Belief) -> FloorPose | None:
-    """Return where the robot stands that sees a landmark of the plan; boards look alike.
+    """Return the pose of a robot that sees some landmark of the plan; boards look alike.
 
     Returns:
-        The pose nearest to the belief; None if there is no landmark, or the second nearest is less than twice as far
-        away and the belief is no surer than that.
+        The candidate pose nearest to the belief. None if the plan has no landmark, or if the second nearest candidate
+        is less than twice as far away and the belief is too uncertain to exclude it.
     """
     boards = (FloorPose(one.x_m, one.y_m, one.heading_rad) for one in plan.shapes if one.kind is ShapeKind.LANDMARK)
     poses: Sequence[FloorPose] = sorted(

@@ -1,6 +1,6 @@
-"""HoldEnds: brings the resource of an RC into its safe state at every end of a hold, and remembers where this failed.
+"""HoldEnds: brings an RC's resource into its safe state at every end of a hold, and records failures.
 
-Rule of this file: a hold that did not end safely is made up for before the next connection.
+Rule of this file: if a hold did not end safely, the RC retries the safe state before the next connection.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from resource_pool.holds import Hold, HoldTable
 
 log = logging.getLogger(__name__)
 
-SAFE_WITHIN_S = 0.4  # chosen: below the RC manager's limit, so that the reason reaches it; machine seconds
+SAFE_WITHIN_S = 0.4  # chosen: below the RC manager's limit, so that the RC manager gets the reason; machine seconds
 
 
 class RcOfHolds(Protocol):
-    """The RC, as the ends of its holds need it."""
+    """The interface of the RC that ``HoldEnds`` needs."""
 
     holds: HoldTable
     story: StoryBook
@@ -47,7 +47,7 @@ class HoldEnds:
     """Ends holds that have left the table.
 
     Attributes:
-        faults: Safe states that were not reached at an attempt.
+        faults: Number of attempts that did not reach the safe state.
     """
 
     def __init__(self, rc: RcOfHolds) -> None:
@@ -57,14 +57,14 @@ class HoldEnds:
         self._remark = ""
 
     def unsafe(self, arc: str) -> Hold | None:
-        """Return the ended hold of this ARC, if the resource is not safe after it."""
+        """Return the ended hold of this ARC if the resource is still unsafe after it."""
         return self._unsafe.get(arc)
 
     async def end(self, hold: Hold, reason: str) -> None:
         """Bring the resource of the ended hold into its safe state.
 
         Raises:
-            HardwareFault: It is not safe; the RC tries again before the next connection.
+            HardwareFault: The resource is not safe; the RC retries before the next connection.
         """
         rc = self._rc
         self._unsafe[hold.arc] = hold
@@ -82,7 +82,7 @@ class HoldEnds:
         self.report_holders()
 
     async def end_all(self, ended: Sequence[Hold], reason: str) -> None:
-        """End these holds; a fault of the hardware at one of them stops neither the others nor the caller."""
+        """End these holds; if the hardware fails at one of them, the others are still ended and nothing is raised."""
         for hold in ended:
             try:
                 await self.end(hold, reason)
@@ -90,24 +90,24 @@ class HoldEnds:
                 log.warning("%s", fault)
 
     async def make_up(self) -> None:
-        """Bring the resource into its safe state where this failed.
+        """Retry the safe state for every hold for which it failed.
 
         Raises:
-            HardwareFault: It is still not safe.
+            HardwareFault: The resource is still not safe.
         """
         for hold in list(self._unsafe.values()):
             await self.end(hold, "made up for")
 
     def remark(self, line: str) -> None:
-        """Report this line of the driver behind the holders from now on."""
+        """Show this line of the driver after the holders from now on."""
         if line != self._remark:
             self._remark = line
             self.report_holders()
 
     def report_holders(self) -> None:
-        """Report who holds the RC, and after whom it is not safe."""
+        """Report the ARCs that hold the RC, and the ARCs whose holds did not end safely."""
         holders = ", ".join(hold.arc for hold in self._rc.holds.holds())
         unsafe = f", not safe after {', '.join(self._unsafe)}" if self._unsafe else ""
         remark = f"; {self._remark}" if self._remark else ""
         self._rc.report(f"held by {holders}{unsafe}{remark}" if holders else f"free{unsafe}{remark}")
-        self._rc.changed()  # the holder may be the same with a new epoch
+        self._rc.changed()  # the same ARC may hold the RC with a new epoch

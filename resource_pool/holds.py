@@ -1,6 +1,6 @@
-"""Holds of an RC: epochs only grow, a unit RC has one holder, a hold lasts as long as its lease.
+"""Holds of an RC: epochs only grow, a unit RC has at most one holder, a hold lasts as long as its lease.
 
-Rules of this file: pure; time is an argument; no bus. The RC's loop reports and obeys.
+Rules of this file: pure; time is an argument; no bus. The RC's loop reports events and carries out the results.
 
 Source: RAM 2002, "The RC Scheduler"; fencing by epoch after ARCHITECTURE's rules 2 and 3.
 """
@@ -63,7 +63,7 @@ class HoldTable:
         self._holds[hold.arc] = hold
 
     def check(self, hold: Hold) -> Hold | None:
-        """Check a connection without a change; return the ARC's present hold, which it would replace.
+        """Check a connection without making it; return the ARC's present hold, which the connection would replace.
 
         Raises:
             StaleEpoch: As for ``connect``.
@@ -90,7 +90,7 @@ class HoldTable:
         return self.find(arc, epoch) is not None
 
     def has_lost(self, arc: str, epoch: int) -> bool:
-        """Return whether this is a hold of the RC that has ended."""
+        """Return whether this hold has ended: its epoch is not new, and the ARC does not hold the RC under it."""
         return epoch <= self.last_epoch and not self.has(arc, epoch)
 
     def disconnect(self, arc: str, epoch: int) -> Hold | None:
@@ -139,5 +139,5 @@ class HoldTable:
         return over
 
     def next_expiry_s(self) -> float | None:
-        """Return when the next lease expires; None without a hold."""
+        """Return the time at which the next lease expires; None without a hold."""
         return min((hold.lease_until_s for hold in self._holds.values()), default=None)

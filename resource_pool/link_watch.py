@@ -1,9 +1,9 @@
-"""Link watch: counts the replies that robots gave and owed on one radio, and notices a robot that does not reply.
+"""Link watch: counts received and lost replies on one radio, and detects a robot that does not reply.
 
 Rules of this file:
 
-* ``LOST_IN_A_ROW`` lost replies in a row are one piece of news; further ones are only counted.
-* The first reply afterwards is one piece of news.
+* ``LOST_IN_A_ROW`` lost replies in a row make one event; further losses are only counted.
+* The first reply afterwards makes one event.
 
 Pure.
 """
@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-LOST_IN_A_ROW = 3  # chosen: in air that loses a hundredth of all packets, by chance once in 17 hours
+LOST_IN_A_ROW = 3  # chosen: at a packet loss of 1 %, a false alarm happens once in 17 hours
 
 
 class LinkNews(Enum):
@@ -66,7 +66,7 @@ class LinkWatch:
         return LinkNews.SILENT if link.in_a_row == LOST_IN_A_ROW else LinkNews.NONE
 
     def counts(self) -> dict[str, float]:
-        """Return replies and lost replies, in all and lost ones of each robot, by name."""
+        """Return counts by name: replies and lost replies in total, and lost replies of each robot."""
         links = self._links.values()
         return {
             "replies": sum(link.replies for link in links),

@@ -1,4 +1,4 @@
-"""Messages of localizers: where robots are believed to be, how surely, from what, and the plan of the floor.
+"""Messages of localizers: estimated poses of robots with their uncertainty and source, and the plan of the floor.
 
 * component → localizer: ``AskPose``, ``AskHome``, ``AskFloorPlan``; localizer → everybody: ``Pose``, published under
   its address (conversation ``poses``) when a believed position changes.
@@ -27,38 +27,38 @@ class UnknownPlace(Refusal):
     """The localizer does not know the body."""
 
     code = "localizer.unknown_body"
-    remedy = "Use the name of a robot whose place at the beginning the mission file says, or of something in the room."
+    remedy = "Use the name of a robot with a start place in the mission file, or of another body in the room."
 
 
 class PoseSource(StrEnum):
-    """Where a position comes from; consoles show it."""
+    """Source of a position, for consoles."""
 
-    SIMULATOR = "simulator"  # the simulated world itself: no real room has it
+    SIMULATOR = "simulator"  # the simulated world itself; no real room has this source
     TRACKING = "tracking"  # a camera above the room
-    DEAD_RECKONING = "dead reckoning"  # the commands that the robot carried out, since its last known place
-    LANDMARK = "landmark"  # a landmark that the robot sees
+    DEAD_RECKONING = "dead reckoning"  # dead reckoning: the motions since the robot's last known place
+    LANDMARK = "landmark"  # a landmark in the robot's picture
 
 
 class AskPose(Message, frozen=True):
-    """Ask a localizer for the pose of a robot, or of another body that it knows."""
+    """Ask a localizer for the pose of a robot, or of another body known to it."""
 
     body: Mention
 
 
 class AskHome(Message, frozen=True):
-    """Ask a localizer for the pose of a robot when the localizer first knew it."""
+    """Ask a localizer for a robot's first known pose."""
 
     body: Mention
 
 
 class Pose(Message, frozen=True, tag="Pose/2"):
-    """Answer to ``AskPose`` and ``AskHome``, and publication: the believed pose of a body.
+    """The estimated pose of a body: answer to ``AskPose`` and ``AskHome``, and publication.
 
     Attributes:
         at_s: Mission time for which it holds.
-        source: What it rests on last.
+        source: Kind of the newest evidence for it.
         spread_m: Standard deviation of the position; 0: exact.
-        spread_rad: Standard deviation of the heading; pi: it may look anywhere.
+        spread_rad: Standard deviation of the heading; pi: the heading is unknown.
     """
 
     body: Mention
@@ -78,7 +78,7 @@ class LandmarkSighting(Message, frozen=True):
         at_s: Mission time of the picture.
         ahead_m: Distance from the board along the line at a right angle to it.
         left_m: Distance from that line, to the left as seen by a robot that faces the board.
-        heading_rad: Of the robot; 0: it faces the board at a right angle.
+        heading_rad: Heading of the robot; 0: the robot faces the board at a right angle.
         spread_m: Standard deviation of the position.
     """
 
@@ -91,7 +91,7 @@ class LandmarkSighting(Message, frozen=True):
 
 
 class ShapeKind(StrEnum):
-    """What stands on a floor."""
+    """Kinds of shapes on a floor plan."""
 
     FURNITURE = "furniture"
     WALL = "wall"
@@ -104,7 +104,7 @@ class FloorShape(Message, frozen=True):
     """A rectangle on the floor.
 
     Attributes:
-        kind: What it is.
+        kind: Kind of object.
         x_m: Middle.
         y_m: Middle.
         width_m: Along its own x axis.
@@ -131,7 +131,7 @@ class FloorPlan(Message, frozen=True):
     Attributes:
         width_m: Of the room, along x.
         depth_m: Of the room, along y.
-        shapes: What stands in it.
+        shapes: Objects on the floor.
         image: A picture of the plan, PNG or JPEG, that covers the whole room; empty: none.
     """
 

@@ -1,10 +1,10 @@
-"""Localizer: where robots are believed to be, by dead reckoning and landmarks; no camera above the room, no simulator.
+"""Localizer: estimates robots' poses by dead reckoning and landmarks, without ceiling camera and without simulator.
 
-It begins with the places at which the mission file says that the robots stand, listens to what their RCs have them do
-and to what they count themselves, and corrects itself when a behavior sees a landmark. The rules are in
-``dead_reckoning``; this file has the loop. It keeps its beliefs in a file: a restarted localizer continues from there,
-less sure by what a robot can have done by the commands that it missed, and without the file it is sure of no robot that
-was commanded before.
+It begins with the start places in the mission file, and adds the motions that RCs publish and the odometry of the
+robots. If a behavior sees a landmark, the localizer corrects the robot's pose. The rules are in ``dead_reckoning``;
+this file has the loop. The localizer saves its beliefs in a file. A restarted localizer continues from the file; for
+each robot it raises the uncertainty by the motions that the missed commands may have caused. Without the file, the pose
+of every robot that was commanded before is unknown.
 
 In mission.xml: a resource of type ``localizer``, named by behaviors as ``localizer``. No ARC needs it.
 """
@@ -50,16 +50,16 @@ from scout_model.description import WorldDescription
 log = logging.getLogger(__name__)
 
 EVERY_S = 0.2  # chosen: five poses a second are a smooth track on a map
-PLACED_M = 0.02  # chosen: a robot is put on its mark by hand
+PLACED_M = 0.02  # chosen: a person puts a robot on its mark by hand
 PLACED_RAD = math.radians(2.0)  # chosen: same
 SIGHTED_RAD = math.radians(3.0)  # chosen: twice what servoing at 1 m was measured to err
-UNSEEN_M_S = 0.2  # chosen: standard deviation of a speed of up to 0.35 m/s to and fro
+UNSEEN_M_S = 0.2  # chosen: standard deviation of a speed of up to 0.35 m/s forward or backward
 UNSEEN_RAD_S = 0.9  # chosen: same, of up to 1.5 rad/s
-LOST_M = 100.0  # chosen: larger than a room: it may be anywhere
-LATE_S = 0.5  # chosen: a message that is older says nothing of now
-FIRST_REPLY_S = 0.5  # chosen: an RC that runs answers in milliseconds
+LOST_M = 100.0  # chosen: larger than a room: the place is unknown
+LATE_S = 0.5  # chosen: an older message says nothing about the present
+FIRST_REPLY_S = 0.5  # chosen: a running RC answers in milliseconds
 WAY, TURNED = "way_m", "turned_rad"
-"""Fields of a robot's reports with its own count of way and turn since it was switched on."""
+"""Fields of a robot's reports with its odometry: way and turn since power-on."""
 
 Size = Annotated[float, msgspec.Meta(ge=0, le=1000)]
 
@@ -68,13 +68,13 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
     """Parameters of a localizer.
 
     Attributes:
-        starts: Where robots stand at the beginning, ``name:x,y,heading`` in meters and degrees, separated by blanks;
-            robots that are not named stand where the world has them.
-        landmarks: Boards besides those of the world, in the same form; each faces along its heading.
+        starts: Start places of robots, ``name:x,y,heading`` in meters and degrees, separated by blanks; robots left out
+            begin at their place in the simulated world.
+        landmarks: Landmark boards in addition to those of the world, in the same form; each faces along its heading.
         width_m: Extent of the room along x, meters; 0: that of the world.
         depth_m: Extent of the room along y, meters; 0: that of the world.
-        floor_plan: PNG or JPEG picture that covers the whole floor, for maps: in the mission file the name of its file,
-            relative to the mission file; here what that holds, in base64.
+        floor_plan: PNG or JPEG picture of the whole floor, for maps. The mission file names a file, relative to itself;
+            the localizer gets the file's content in base64.
         room: The world of the mission file.
     """
 
@@ -90,7 +90,7 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
             read_begins(places)
 
     def begins(self) -> dict[str, FloorPose]:
-        """Return robot → where it begins."""
+        """Return robot → its start place."""
         robots = [] if self.room is None else self.room.robots
         return {one.name: FloorPose(one.x_m, one.y_m, one.heading_rad) for one in robots} | read_begins(self.starts)
 
@@ -98,7 +98,7 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
         """Return the plan of the floor.
 
         Raises:
-            ValueError: ``floor_plan`` is no base64.
+            ValueError: ``floor_plan`` is not valid base64.
         """
         of_world = FloorPlan(0.0, 0.0) if self.room is None else plan_of(self.room)
         own = [board(name, at) for name, at in read_begins(self.landmarks).items()]
@@ -112,11 +112,11 @@ class LocalizerParameters(RcParameters, frozen=True, kw_only=True):
 
 
 class Known(msgspec.Struct, frozen=True):
-    """What is known of a robot.
+    """Saved knowledge about a robot.
 
     Attributes:
         number: Number of commands that its RC had applied.
-        is_moving: A motion was in force.
+        is_moving: True if the robot was moving.
     """
 
     belief: Belief
@@ -125,7 +125,7 @@ class Known(msgspec.Struct, frozen=True):
 
 
 class Memory(msgspec.Struct, frozen=True):
-    """What a localizer keeps for its next life.
+    """The state that a localizer saves for its next process.
 
     Attributes:
         at_s: Mission time.
@@ -156,7 +156,7 @@ class Localizer(ResourceController[LocalizerParameters]):
         self._heard = self._sightings = self._poses = 0
 
     async def connect(self) -> None:
-        """Listen to robots' RCs and to behaviors that see landmarks."""
+        """Subscribe to robots' RCs and to behaviors that see landmarks."""
         await super().connect()
         for name in self._homes:
             self.bus.subscribe(address(Subsystem.RESOURCE_POOL, name), Conversation.MOTIONS, Applied, self._applied)
@@ -166,13 +166,13 @@ class Localizer(ResourceController[LocalizerParameters]):
         await asyncio.gather(*map(self._begin, self._homes))
 
     async def serve(self) -> None:
-        """Publish each pose that changes, and keep the beliefs."""
+        """Publish each pose that changes, and save the beliefs."""
         self.start_task(self._publish_when_changed(), "poses")
         self._stir.set()
         await super().serve()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``AskPose``, ``AskHome`` and ``AskFloorPlan``, too."""
+        """Also answer ``AskPose``, ``AskHome`` and ``AskFloorPlan``."""
         match asked.body:
             case AskPose(body=body):
                 return self._pose(body)
@@ -183,7 +183,7 @@ class Localizer(ResourceController[LocalizerParameters]):
         return await super().answer(asked)
 
     def statistics(self) -> dict[str, float]:
-        """Count what was heard and published, too."""
+        """Also count messages received and poses published."""
         own = {"motions_heard": self._heard, "sightings_taken": self._sightings, "poses_published": self._poses}
         return {**super().statistics(), **own, "robots_known": len(self._robots)}
 
@@ -219,7 +219,7 @@ class Localizer(ResourceController[LocalizerParameters]):
             self._stir.set()
 
     def _plausible_s(self, at_s: float) -> float:
-        """Return the time that a message states, unless it is one at which it cannot have been sent."""
+        """Return the time in a message, or the present time if the message cannot have been sent at that time."""
         now_s = self.clock.now_s()
         return at_s if now_s - LATE_S * max(1.0, self.clock.rate) <= at_s <= now_s else now_s
 
@@ -264,11 +264,11 @@ class Localizer(ResourceController[LocalizerParameters]):
 
     # ------------------------------------------------------------------ from life to life
     async def _begin(self, name: str) -> None:
-        """Begin with a robot, after a look at how much its RC has applied without this life of the localizer."""
+        """Begin with a robot: ask its RC how many commands it applied before this process of the localizer began."""
         try:
             rc = address(Subsystem.RESOURCE_POOL, name)
             applied: int | None = (await self.bus.ask(rc, AskRc(), RcState, within_s=FIRST_REPLY_S)).applied
-        except (LinkError, Refusal):  # it does not run: at the begin of a mission it has applied nothing
+        except (LinkError, Refusal):  # the RC does not run: at the begin of a mission it has applied no command
             applied = None
         first = self._first(name, applied)
         self._robots[name], self._numbers[name] = DeadReckoning(first), applied or 0
@@ -276,11 +276,11 @@ class Localizer(ResourceController[LocalizerParameters]):
             self.publish_event(name, f"is at a place that {self.name} does not know", LogLevel.WARNING)
 
     def _first(self, name: str, applied: int | None) -> Belief:
-        """Return the first belief: where the robot is put, or what an earlier life kept, less sure by what it missed.
+        """Return the first belief: the start place, or the saved belief with more uncertainty for missed commands.
 
         Args:
             name: The robot.
-            applied: Number of commands that its RC has applied; None: it does not run.
+            applied: Number of commands that its RC has applied; None: the RC does not run.
         """
         now_s, before = self.clock.now_s(), self._before
         if before is None and not applied:
@@ -318,11 +318,11 @@ def _pose_of(body: str, belief: Belief) -> Pose:
 
 
 def _read(file: Path | None) -> Memory | None:
-    """Return what an earlier life of this localizer kept."""
+    """Return the state saved by an earlier process of this localizer."""
     if file is None or not file.exists():
         return None
     try:
         return msgspec.msgpack.decode(file.read_bytes(), type=Memory)
     except (OSError, msgspec.DecodeError) as error:
         log.error("%s: %s", file, error)
-        return Memory(0.0, {})  # there was a life before, so robots may be anywhere
+        return Memory(0.0, {})  # an earlier process existed, so all places are unknown

@@ -1,4 +1,4 @@
-"""An ARC's watch over the RC manager: one that was restarted knows no request that it has not asked for."""
+"""An ARC's watch over the RC manager: a restarted RC manager knows only the requests that it has collected."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.component.peer_monitor import PeerMonitor
 
-ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; after this it has missed one
+ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; after this time it has missed this ARC
 
 
 class ManagerWatch:
     """Watches the RC manager for one ARC.
 
     Args:
-        bus: For its token.
+        bus: For the RC manager's token.
     """
 
     def __init__(self, bus: Bus) -> None:
@@ -26,7 +26,7 @@ class ManagerWatch:
 
     @property
     def is_there(self) -> bool:
-        """Whether an RC manager lives; False before ``watch``."""
+        """Whether an RC manager runs; False before ``watch``."""
         return self._manager is not None and self._manager.is_there
 
     def asks(self) -> None:

@@ -106,7 +106,7 @@ class ArcState(Message, frozen=True, tag="ArcState/2"):
 
 
 class Accepted(Message, frozen=True):
-    """Answer to questions without a result."""
+    """Answer to a request that has no result."""
 
 
 class Applied(Message, frozen=True):
@@ -217,15 +217,15 @@ class LoadPacket(Message, frozen=True, tag="LoadPacket/2"):
         payload: Bytes of the robot's own protocol.
         safe_payload: The robot's last packet when the ARC is disconnected.
         robot_epoch: Epoch of the robot RC's connection, for the audit.
-        at_once: True: once, in the next turn of its stream, answered when it is on the air.
-            False: at its stream's rate from now on, until replaced.
+        at_once: True: sent once, in the next turn of its stream; the answer follows when it is on the air. False:
+            repeated at its stream's rate from now on, until replaced.
         lasts_s: With ``at_once`` False: mission seconds after which ``afterwards`` replaces it; 0: never.
             A robot RC that hangs must not keep its robot moving through the radio.
         afterwards: The packet that is repeated after this one; empty: the one before it.
         kind: Kind of its stream; the ARC's first stream if the ARC has none of this kind.
-        moves: True: it moves the robot, and is not sent after a packet of a later stop was loaded.
+        moves: True: it moves the robot. It is not sent once a packet of a later stop was loaded.
         robot_stop: Number of the robot's last stop when the packet was made.
-        answers: True: the robot's replies can be read, so the radio asks for them, if it can.
+        answers: True: the robot's replies can be decoded, so a radio that can receive replies asks for them.
     """
 
     arc: Mention
@@ -244,11 +244,11 @@ class LoadPacket(Message, frozen=True, tag="LoadPacket/2"):
 
 
 class PacketLoaded(Message, frozen=True):
-    """Answer to ``LoadPacket``: the packet is loaded, and sent if ``at_once``."""
+    """Answer to ``LoadPacket``: the packet is loaded; with ``at_once``, it is sent."""
 
 
 class Reply(Message, frozen=True):
-    """A robot's reply, published under the address of the radio that heard it.
+    """A robot's reply, published under the address of the radio that received it.
 
     Attributes:
         network_id: Network id of the robot.
@@ -264,7 +264,7 @@ class AskReadings(Message, frozen=True):
 
 
 class Readings(Message, frozen=True):
-    """What the hardware of an RC measured last.
+    """The newest measurements of an RC's hardware.
 
     Attributes:
         rc: The RC.
@@ -278,7 +278,7 @@ class Readings(Message, frozen=True):
 
 
 class NothingHeard(Message, frozen=True):
-    """A framegrabber receives no transmitter; sent to the ARC that holds it.
+    """A framegrabber receives no transmitter; sent to the ARC that holds the framegrabber.
 
     Attributes:
         rc: The framegrabber.
@@ -377,6 +377,6 @@ class NoTurnSoon(Refusal):
 
 
 DEFAULT_DRIVE_USAGE = Usage(period_s=0.05, packet_time_s=0.002, kind="drive")
-"""Chosen: 20 commands a second suffice for a hand on a stick; 2 ms is 24 bytes at 115.2 kbit/s."""
+"""Chosen: 20 commands a second are enough for manual control; 2 ms is 24 bytes at 115.2 kbit/s."""
 
 COMMAND_TIMEOUT_S = 0.5  # chosen: about a keyboard's repeat delay; a robot stops within a body length

@@ -10,8 +10,8 @@ from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
 from resource_pool.messages import Noted, Resumed, Suspended, Suspending
 
-NOTICE_S = 1.0  # chosen: an owner that needs longer fails its beat too
-NOTICE_AGAIN_S = 0.1  # chosen: a restarted hub is back after a few attempts; machine seconds
+NOTICE_S = 1.0  # chosen: an owner that needs longer misses its heartbeat, too
+NOTICE_AGAIN_S = 0.1  # chosen: a restarted hub is reachable again after a few attempts; machine seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +24,10 @@ class _Notice:
 
 
 class OwnerNotices:
-    """The notices that wait for the owner."""
+    """Queue of notices to the owner."""
 
     def __init__(self, bus: Bus, clock: Clock, owner: str, note: Callable[[str, str], object]) -> None:
-        """Send nothing yet.
+        """Create an empty queue.
 
         Args:
             bus: For the notices.
@@ -45,7 +45,7 @@ class OwnerNotices:
         return noted
 
     async def send(self) -> None:
-        """Send one notice after the other, so that no notice overtakes another on its way to a slow owner."""
+        """Send the notices one at a time, so that no notice overtakes another on its way to a slow owner."""
         while True:
             waiting = await self._waiting.get()
             await self._send_until_noted(waiting)

@@ -1,4 +1,4 @@
-"""An ARC's watch over its owner: it ends with its owner, and says with each renewal of leases that both live."""
+"""An ARC's watch over its owner: the ARC ends with its owner, and publishes a heartbeat with each renewal of leases."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from backbone.rc_manager.messages import BEAT_WITHIN_S, Beat
 from backbone.waiting import set_within
 from resource_pool.messages import ArcState, AskBeat, Noted
 
-OWNER_GONE_S = 0.5  # chosen: a robot is free within a second of its console's death; a new hub is found sooner
-OWNER_BEAT_S = 0.9  # chosen: an owner that answers later has missed a beat; less than the RC manager's limit
+OWNER_GONE_S = 0.5  # chosen: if a console dies, its robot is free within a second; a new hub is found sooner
+OWNER_BEAT_S = 0.9  # chosen: an owner that answers later has missed a heartbeat; less than the RC manager's limit
 BEAT_SPREAD_S = 0.2  # chosen: all ARCs get a renewal at once; their owners and the hub answer a few at a time
 
 
@@ -24,10 +24,10 @@ class OwnerWatch:
     """Watches the owner of one ARC.
 
     Args:
-        bus: For questions and beats.
+        bus: For questions and heartbeats.
         clock: The mission's clock.
         owner: Address of the decision process.
-        state: Returns the ARC's state, which the owner gets with each beat.
+        state: Returns the ARC's state, which the ARC sends to the owner with each heartbeat question.
         end: Ends the ARC for this reason.
         note: Subject, event → the story.
     """
@@ -47,7 +47,7 @@ class OwnerWatch:
         self._renewed = asyncio.Event()
 
     def leases_renewed(self) -> None:
-        """Let the next beat follow soon."""
+        """Schedule the next heartbeat soon."""
         self._renewed.set()
 
     async def watch(self) -> None:

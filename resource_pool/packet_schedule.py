@@ -9,8 +9,9 @@ Rules of this file:
   the next turn of its stream. So no stream sends more than was admitted, and no other stream is late.
 * A packet that is not finished by its deadline is an overrun; a packet that has not begun by then is lost. The deadline
   is the next release unless the ARC stated another.
-* An ARC's packets reach only the robots for which it loaded packets; several of its robots take turns.
-* A packet that moves a robot and was made before its last stop is not sent, whether it waits or arrives later.
+* An ARC's packets go only to the robots for which it loaded packets; if it has several robots, they take turns.
+* If a packet moves a robot and was made before the robot's last stop, it is not sent, whether it already waits or
+  arrives later.
 
 Pure; times are mission seconds.
 
@@ -61,7 +62,7 @@ class Packet:
     robot_stop: int = 0
 
     def at(self, now_s: float) -> Packet:
-        """Return the packet for this time: itself, or its ``afterwards``."""
+        """Return the packet to send at this time: this packet, or its ``afterwards``."""
         if now_s < self.until_s:
             return self
         return replace(self, payload=self.afterwards or self.safe_payload, until_s=math.inf, moves=False)
@@ -111,7 +112,7 @@ class _Stream:
         return packet, release_s
 
     def stopped(self, network_id: int, stop: int) -> list[int]:
-        """Drop packets that move the robot, mark the rest as made after the stop; return the dropped tickets."""
+        """Drop packets that move the robot, and mark the others as made after the stop; return the dropped tickets."""
         dropped = [once.ticket for once in self.urgent if once.network_id == network_id and once.moves]
         self.urgent = deque(
             replace(once, robot_stop=stop) if once.network_id == network_id else once
@@ -156,7 +157,7 @@ class _Sender:
 
 @dataclass(frozen=True, slots=True)
 class Sending:
-    """One packet that is due.
+    """A packet that is due.
 
     Attributes:
         air_time_s: Its admitted time on the air.
@@ -248,7 +249,7 @@ class PacketSchedule:
         stream = sender.stream_of(packet.kind)
         stream.packets[packet.network_id] = packet
         stream.begin(now_s)
-        if stream is sender.main:  # it is newer than the ``afterwards`` of a waiting packet
+        if stream is sender.main:  # this packet is newer than the ``afterwards`` of a waiting packet
             for other in sender.streams:
                 for place, once in enumerate(other.urgent):
                     if once.network_id == packet.network_id:
@@ -263,7 +264,7 @@ class PacketSchedule:
         stream.begin(now_s)
 
     def next_turn_s(self, arc: str, kind: str, now_s: float) -> float:
-        """Return the next turn of a packet of this kind that is sent once."""
+        """Return the time of the next turn for a packet of this kind that is sent once."""
         stream = self._senders[arc].stream_of(kind)
         if stream.first_s is None:
             return max(now_s, stream.earliest_s)
@@ -288,7 +289,7 @@ class PacketSchedule:
         sender = self._senders[arc]
         stream = sender.streams[number]
         packet, release_s = stream.take(now_s)
-        if packet.ticket and packet.afterwards:  # the packet repeated before might cancel it
+        if packet.ticket and packet.afterwards:  # the previously repeated packet might cancel it
             repeated = replace(packet, payload=packet.afterwards, afterwards=b"", kind=MAIN_KIND, ticket=0)
             sender.main.packets[packet.network_id] = repeated
             sender.main.begin(now_s)
@@ -302,12 +303,12 @@ class PacketSchedule:
             begun_s: Mission time of its begin.
 
         Returns:
-            Faults of this stream that occurred for the first time, for people.
+            Faults that this stream has for the first time, as text for people.
         """
         arc, number = sending.packet.arc, sending.number
         sender = self._senders.get(arc)
         if sender is None or not 0 <= number < len(sender.streams):
-            return []  # it was disconnected meanwhile
+            return []  # the ARC was disconnected meanwhile
         sender.worst_packet_s = max(sender.worst_packet_s, took_s)
         stream = sender.streams[number]
         what = f"{stream.usage.kind or 'its'} packets"

@@ -24,7 +24,7 @@ REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may firs
 
 
 class PlacedRequest:
-    """What an ARC asks for, and the set of RCs that was chosen for it.
+    """The request of an ARC, and the set of RCs that the RC manager chose.
 
     Attributes:
         request: The request; None until it is made.
@@ -41,7 +41,7 @@ class PlacedRequest:
         changed: Callable[[Mapping[str, object]], None],
         note: Callable[[str, str], object],
     ) -> None:
-        """Begin without a request.
+        """Create the record without a request.
 
         Args:
             bus: For the RC manager.
@@ -57,7 +57,7 @@ class PlacedRequest:
         self._bus, self._clock, self._arc, self._changed, self._note = bus, clock, arc, changed, note
 
     def make(self, request: SchedulingRequest, sets: list[dict[str, str]]) -> None:
-        """Ask for one of these sets."""
+        """Create the request for one of these sets."""
         self.request, self._sets = request, sets
 
     def choose(self, rcs: Iterable[str]) -> None:
@@ -69,7 +69,7 @@ class PlacedRequest:
         self.rcs = set_of(self._arc, self._sets, rcs)
 
     def rc_of(self, role: str) -> str:
-        """Return the name of the chosen RC of this role; empty: there is none."""
+        """Return the name of the chosen RC of this role; empty if no RC is chosen."""
         return self.rcs.get(role, "")
 
     async def send(self) -> Scheduled:
@@ -77,7 +77,7 @@ class PlacedRequest:
 
         Raises:
             Refusal: The RC manager refused the request.
-            LinkError: It did not answer.
+            LinkError: The RC manager did not answer.
         """
         request = self.request
         assert request is not None  # noqa: S101  made in connect
@@ -92,7 +92,7 @@ class PlacedRequest:
         )
 
     async def withdraw_all(self) -> bool:
-        """Withdraw the holds that the RC manager still counts; return False if it is gone: its successor asks."""
+        """Withdraw the holds that the RC manager has on record; return False if it is gone: the next one asks."""
         gone = Withdraw(self._arc, "lease")
         try:
             await ask_until_answered(
@@ -105,13 +105,13 @@ class PlacedRequest:
         return True
 
     def take_path(self, path: list[PathNode]) -> None:
-        """Ask by this path from now on."""
+        """Use this priority path from now on."""
         if self.request is not None:
             self.request = msgspec.structs.replace(self.request, path=path)
         self._changed({"path": [(node.name, node.priority) for node in path]})
 
     def current(self, epochs: Mapping[str, int], granted_s: float) -> CurrentRequest:
-        """Return the request and what is held by it, for an RC manager that recovers.
+        """Return the request and its holds, for the recovery of a restarted RC manager.
 
         Raises:
             UnknownRequest: There is no request yet.
@@ -121,11 +121,11 @@ class PlacedRequest:
         return CurrentRequest(self.request, list(self.rcs.values()), dict(epochs), granted_s)
 
     async def set_idle(self, idle: bool) -> None:
-        """Ask for no run time, or again for run time; see ``_change``."""
+        """Stop or resume the request for run time; see ``_change``."""
         await self._change(SetIdle(self._arc, idle), idle=idle)
 
     async def set_run_times(self, least_s: float, most_s: float) -> None:
-        """Ask for slices of this length; see ``_change``.
+        """Request slices of this length; see ``_change``.
 
         Raises:
             MissingRuntime: No slice can have these run times.
@@ -135,7 +135,7 @@ class PlacedRequest:
         await self._change(change, minimum_runtime_s=least_s, maximum_runtime_s=most_s)
 
     async def _change(self, wish: Message, **changed: bool | float) -> None:
-        """Change the request; the RC manager and its successors get the change.
+        """Change the request; the present RC manager and later ones get the change.
 
         Raises:
             Refusal: The RC manager refused; the request is unchanged.
@@ -155,7 +155,7 @@ class PlacedRequest:
         """Change request and parameters together, so that the parameters show the present request."""
         assert self.request is not None  # noqa: S101  made in connect
         if self.sending is not None:
-            self.sending.cancel()  # its run times are outdated
+            self.sending.cancel()  # the run times under way are outdated
         self.request = msgspec.structs.replace(self.request, **changed)
         self._changed(changed)
 
@@ -168,5 +168,5 @@ class PlacedRequest:
             await ask_until_answered(
                 self._bus, self._clock, RC_MANAGER, change, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
             )
-        except (Refusal, LinkError) as error:  # the next RC manager gets them with the request
+        except (Refusal, LinkError) as error:  # the next RC manager gets the run times with the request
             self._note(self._arc, f"the RC manager did not accept its run times: {error}")

@@ -15,9 +15,9 @@ class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     Attributes:
         driver: Name of the driver, or ``package.module:Class``.
         sharable: True if several ARCs may hold it.
-        capacity: Share of its time that it can give, 0 to 1.
+        capacity: Share of its time that can be granted, 0 to 1.
         links: Resources with which it can be combined: kind → names.
-        world: Simulated world that plays the hardware; only for simulated drivers.
+        world: Simulated world that stands in for the hardware; only for simulated drivers.
         options: Options of the driver: all parameters of the mission file that are not the RC's own. The driver's
             ``options_type`` checks them.
     """
@@ -31,7 +31,7 @@ class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 def sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:
-    """Return the launch with all parameters that are not the RC's own moved into the driver's options."""
+    """Return the launch, with every parameter that is not the RC's own moved into the driver's options."""
     own = {field.encode_name for field in msgspec.structs.fields(parameters_type)}
     given = launch.parameters
     options = {name: value for name, value in given.items() if name not in own}

@@ -1,4 +1,4 @@
-"""Readings of RCs: ask for the newest, or watch them."""
+"""Readings of RCs: ask for the newest ones, or subscribe to them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ REPLY_TIME_S = 1.0  # chosen: an RC answers from its memory
 
 
 async def ask_readings(bus: Bus, rc: str) -> Readings:
-    """Return the newest readings of an RC; its robot is not asked.
+    """Return the newest readings that an RC has; the RC does not ask its robot.
 
     Raises:
         UnknownMessage: The RC reads no replies.
@@ -23,6 +23,6 @@ async def ask_readings(bus: Bus, rc: str) -> Readings:
 
 
 def watch_readings(bus: Bus, listener: Callable[[Readings], None], rc: str = "*") -> Subscription:
-    """Call the listener with the readings of this RC, or of all, twice a second each at most."""
+    """Call the listener with the readings of this RC, or of all RCs, at most twice a second for each RC."""
     at = f"{Subsystem.RESOURCE_POOL}/{rc}"
     return bus.subscribe(at, Conversation.READINGS, Readings, lambda heard: listener(heard.body))

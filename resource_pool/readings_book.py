@@ -1,10 +1,10 @@
-"""Readings book: the newest readings of an RC, when they are published, and when a battery is low.
+"""Readings book: the newest readings of an RC, the times of publication, and the alarm of a low battery.
 
 Rules of this file:
 
-* Readings are published when a value has changed, and not within ``EVERY_S`` after the last publication. The newest
-  values are always published in the end.
-* A battery is low from the first charge below its alarm share until the first one ``RECHARGED_SHARE`` above it.
+* Readings are published when a value has changed, but not within ``EVERY_S`` after the last publication. The last
+  change is always published.
+* A battery is low from the first charge below its alarm share until the first charge ``RECHARGED_SHARE`` above it.
 
 Pure; times are mission seconds.
 """
@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from enum import Enum
 
 EVERY_S = 0.5  # chosen: a person reads a gauge no faster
-RECHARGED_SHARE = 0.05  # chosen: more than a meter wavers, less than a stop at a charger gives
+RECHARGED_SHARE = 0.05  # chosen: more than a gauge fluctuates, less than one charging adds
 
 Value = float | bool
 
@@ -38,12 +38,12 @@ class ReadingsBook:
         """Mission time of the newest values; negative: none yet."""
 
     def put(self, values: Mapping[str, Value], now_s: float) -> None:
-        """Take the newest values."""
+        """Record the newest values."""
         self.values, self.at_s = dict(values), now_s
 
     @property
     def due_s(self) -> float | None:
-        """When the newest values are to be published; None: they are."""
+        """Time at which the newest values are due for publication; None: they are already published."""
         return None if self.values == self._published else self._published_s + self._every_s
 
     def published(self, now_s: float) -> None:
@@ -71,7 +71,7 @@ class BatteryWatch:
         self._is_low = False
 
     def see(self, share: float) -> Charge:
-        """Return what is new with this charge, 0 to 1."""
+        """Return the event that this charge (0 to 1) causes."""
         if self._is_low and share >= min(1.0, self._alarm_share + RECHARGED_SHARE):
             self._is_low = False
             return Charge.CHARGED_AGAIN

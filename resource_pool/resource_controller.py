@@ -1,8 +1,7 @@
 """Resource controller (RC): the one component that controls a physical resource.
 
-It serves the ARCs that the RC manager connected, each under an epoch and while its lease lasts. It refuses and counts
-all other commands, which change nothing. At every end of a hold the resource goes to its safe state before the next
-connection.
+It serves the ARCs that the RC manager connected, each under an epoch and while its lease lasts. It rejects and counts
+all other commands. At every end of a hold the resource goes to its safe state before the next connection.
 
 Source: RAM 2002, "Resource Pool"; IROS 2001, section 3.2.
 """
@@ -74,11 +73,11 @@ class ResourceController(Component[R], Generic[R]):
     limits: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Field of its commands → smallest and largest value that the hardware obeys, if narrower than the field's."""
     reports: ClassVar[type[msgspec.Struct] | None] = None
-    """Struct of its reports; None: it reports nothing but its state."""
+    """Struct of its reports; None: it reports only its state."""
     body_class: ClassVar[str] = ""
     """Class path of a robot's body in simulated worlds, see ``scout_model.robot``; empty: mission files name one."""
     camera: ClassVar[CameraForm | None] = None
-    """A robot's camera, which lets consoles tell places in its picture; None: they cannot."""
+    """Model of a robot's camera, with which consoles convert points in a picture to places; None: not possible."""
     driver_kind: ClassVar[str] = ""
     """Kind of its driver; empty: it has no driver."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
@@ -87,9 +86,9 @@ class ResourceController(Component[R], Generic[R]):
     """Time for which the effect of a command may outlast the process, mission seconds. For this time a restarted RC
     confirms no disconnection of an earlier hold. 0: the effect ends with the process."""
     driver_field: ClassVar[str] = "driver"
-    """Its parameter that names the driver."""
+    """Name of the parameter that names the driver."""
     closed_most_s: ClassVar[float] = SAFE_WITHIN_S / 2
-    """Time for which its device may be closed in an exchange of the driver, because calls wait; machine seconds."""
+    """Longest time for which an exchange of the driver may close the device, while calls wait; machine seconds."""
     accepts: ClassVar[Accepts | None] = Connect | Disconnect | AskRc | SwapClass
 
     def __init_subclass__(cls, **kwargs: object) -> None:
@@ -113,7 +112,7 @@ class ResourceController(Component[R], Generic[R]):
 
     @classmethod
     def abilities(cls) -> Abilities:
-        """Return its commands and reports, see ``Component``."""
+        """Return the RC's commands and reports; see ``Component``."""
         return Abilities(
             is_robot=cls.is_robot,
             body_class=cls.body_class,
@@ -145,7 +144,7 @@ class ResourceController(Component[R], Generic[R]):
         """
 
     def permit(self, order: Command) -> None:
-        """Return if the resource may obey this command now. When: after its admission. What: raise a refusal if not."""
+        """Check that the resource may obey this command now. When: after admission. What: raise a refusal if not."""
 
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
         """Carry out a command.
@@ -168,12 +167,12 @@ class ResourceController(Component[R], Generic[R]):
     async def driver_exchanged(self) -> None:
         """Bring the driver to the state of this RC.
 
-        When: after another driver has taken the place, or the old one is back. What: repeat what stands: tune, hear,
-        brightness; by default, nothing. Not: what a command gives anyway.
+        When: after a new driver has taken over, or the old one is back. What: restore the driver's state, such as
+        tuning, subscriptions or brightness; by default nothing. Not: state that the next command sets anyway.
         """
 
     def ranked(self, arc: str, epoch: int) -> None:
-        """Apply the rank of this hold, if it is present. When: with each renewal."""
+        """Apply the rank of this hold, if the hold still exists. When: with each renewal."""
 
     def may_command(self, source: str, hold: Hold, order: Message) -> bool:  # noqa: ARG002
         """Return whether the source may send a command under this hold; True for the ARC that holds the RC."""
@@ -195,7 +194,7 @@ class ResourceController(Component[R], Generic[R]):
         )
 
     def make_driver(self, name: str = "") -> Any:
-        """Return a driver of this RC's kind, not open yet: of this name, or the mission file's.
+        """Return a driver for this RC, not open yet: the named driver, or by default the one in the mission file.
 
         Raises:
             UnknownDriver: No driver has this name.
@@ -259,13 +258,13 @@ class ResourceController(Component[R], Generic[R]):
                 await self._ends.end_all(over, "its lease is over")
 
     async def drain(self) -> None:
-        """End all holds, in the safe state if the hardware obeys."""
+        """End all holds; bring the resource into its safe state if the hardware obeys."""
         async with self._changing:
             ended = [self.holds.disconnect(hold.arc, hold.epoch) for hold in self.holds.holds()]
             await self._ends.end_all([hold for hold in ended if hold is not None], "the RC ends")
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer the RC manager, and carry out commands."""
+        """Answer the RC manager and carry out commands."""
         match asked.body:
             case Connect() | Disconnect() if asked.source != RC_MANAGER:
                 raise self._stranger(asked.source, f"{type(asked.body).__name__} {asked.body.arc}")
@@ -292,7 +291,7 @@ class ResourceController(Component[R], Generic[R]):
                 return await self.command(asked)
 
     def parameters_changed(self) -> None:
-        """Apply the new capacity and driver parameters; the RC manager gets the change with the news.
+        """Apply the new capacity and driver parameters; the RC manager gets the change with the published state.
 
         Raises:
             NeedsRestart: The running RC cannot change this parameter.
@@ -315,11 +314,11 @@ class ResourceController(Component[R], Generic[R]):
         self.changed()
 
     def has_driver(self, parameters: msgspec.Struct) -> None:
-        """Apply the parameters with another driver, which works already."""
+        """Apply the parameters, together with a new driver that already works."""
         self.parameters = self._in_force = self.with_parameters(msgspec.to_builtins(parameters))
 
     def publish_news(self) -> None:
-        """Publish the holders, too."""
+        """Also publish the holders."""
         super().publish_news()
         self.bus.publish(self.address, Conversation.TELEMETRY, self.rc_state())
 
@@ -346,7 +345,7 @@ class ResourceController(Component[R], Generic[R]):
             raise self._stranger(asked.source, f"{type(order).__name__} for {order.arc}")
 
     def _stranger(self, source: str, what: str) -> NotFromYou:
-        """Count and record an order from a wrong source; return the refusal."""
+        """Count and log an order from a wrong sender; return the refusal."""
         self.refused_strangers += 1
         self.story.note(self.name, f"{source} was refused: {what}")
         return NotFromYou(f"{self.name} does not take {what} from {source}", source=source)
@@ -355,7 +354,7 @@ class ResourceController(Component[R], Generic[R]):
         if not 0 < order.lease_s <= LONGEST_LEASE_S:
             raise ImpossibleUse(f"{self.name}: a lease of {order.lease_s} s for {order.arc}")
         async with self._changing:
-            # From the order's own time stamp, because the RC manager relies on the end, even if the order was slow.
+            # Count from the order's own time stamp: the RC manager relies on that end, even if the order arrived late.
             since_s = self.clock.now_s()
             lease_until_s = min(given_s, since_s) + order.lease_s
             hold = Hold(order.arc, order.epoch, since_s, lease_until_s, order.use, order.companions, order.rank)

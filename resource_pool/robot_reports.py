@@ -1,6 +1,6 @@
-"""Reports of one robot: its replies read, its readings published, its battery watched.
+"""Reports of one robot: decodes its replies, publishes its readings, watches its battery.
 
-A reply that cannot be read, or has a value out of its range, is counted and changes nothing.
+A reply that cannot be decoded, or has a value out of range, is counted and otherwise ignored.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ class Say(Protocol):
 
 
 class RobotReports:
-    """Hears the replies of one robot on its radio."""
+    """Receives the replies of one robot from its radio."""
 
     def __init__(
         self, rc: str, bus: Bus, clock: Clock, reader: ReplyReader | None, *, alarm_share: float, say: Say
     ) -> None:
-        """Hear nothing yet.
+        """Create the reports without a subscription.
 
         Args:
             rc: Name of the robot's RC.
             bus: Of the RC.
             clock: The mission's clock.
-            reader: The robot's protocol; None: it reads no replies.
+            reader: The robot's protocol; None: the protocol cannot decode replies.
             alarm_share: Charge of the battery below which there is an alarm.
             say: Publishes an event about the robot.
         """
@@ -53,11 +53,11 @@ class RobotReports:
 
     @property
     def are_read(self) -> bool:
-        """True if the robot's protocol reads replies."""
+        """True if the robot's protocol can decode replies."""
         return self._reader is not None
 
     def listen(self, radio: str, network_id: int) -> None:
-        """Read the replies of this network id from now on.
+        """Decode the replies of this network id from now on.
 
         Args:
             radio: Address of the robot's radio.
@@ -97,7 +97,7 @@ class RobotReports:
     def _take(self, reader: ReplyReader, payload: bytes) -> None:
         try:
             report = reader.read(payload)
-            msgspec.convert(msgspec.to_builtins(report), type(report))  # its ranges
+            msgspec.convert(msgspec.to_builtins(report), type(report))  # a value is out of range
         except (MalformedReply, msgspec.ValidationError):
             self._malformed += 1
             return

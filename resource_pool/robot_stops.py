@@ -10,11 +10,11 @@ from backbone.naming import Subsystem, address
 from backbone.wire import Message
 from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop, StopState
 
-REPLY_TIME_S = 1.0  # chosen: a command that takes longer justifies a stop
+REPLY_TIME_S = 1.0  # chosen: after a longer wait an operator has reason to press the emergency stop
 
 
 async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopState:
-    """Stop a robot, also one that an ARC holds; nothing moves it until ``lift_stop``, and the holder keeps its grant.
+    """Stop a robot, even if an ARC holds it; nothing moves it until ``lift_stop``, and the holder keeps its grant.
 
     A stop needs neither grant nor ARC nor RC manager; a second stop keeps the first one's author. For operators only.
 
@@ -51,7 +51,7 @@ async def ask_stop(bus: Bus, robot: str) -> StopState:
 
 
 def watch_stops(bus: Bus, listener: Callable[[StopState], None], robot: str = "*") -> Subscription:
-    """Call the listener whenever this robot, or any, is stopped or freed."""
+    """Call the listener whenever this robot (or any robot, if none is named) is stopped or freed."""
     at = f"{Subsystem.RESOURCE_POOL}/{robot}"
     return bus.subscribe(at, Conversation.EVENTS, StopState, lambda heard: listener(heard.body))
 

@@ -9,7 +9,7 @@ from backbone.scheduling.requests import LEASE_S
 
 
 class SetLease:
-    """Leases of the set, as far as the ARC has heard.
+    """Leases of the set, as known to the ARC.
 
     Attributes:
         until_s: Mission time at which the lease of the open set expires.
@@ -32,13 +32,13 @@ class SetLease:
         self.until_s = now_s + LEASE_S * self._rate
 
     def heard(self, leases: Leases, at_s: float, epochs: Mapping[str, int]) -> bool:
-        """Extend the lease if all RCs of the set were renewed; return whether the ARC must ask anew.
+        """Extend the lease if all RCs of the set were renewed; return whether the ARC must send its request again.
 
-        It must if the RC manager renews a hold for a whole lease that this ARC does not have. The hold may belong to an
-        earlier ARC of this name. For a shorter time it may be one that is about to open.
+        That is the case if the RC manager has renewed, for a whole lease time, a hold that this ARC does not have: an
+        earlier ARC of this name may have had it. For a shorter time the hold may be a connection that is about to open.
 
         Args:
-            leases: What the RC manager renews.
+            leases: Leases that the RC manager renews.
             at_s: Mission time of the renewal.
             epochs: RC → epoch of the ARC's connections; empty: none.
         """

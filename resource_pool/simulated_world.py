@@ -1,8 +1,8 @@
-"""The simulated world as hardware: radio packets in, replies and states of all bodies out.
+"""The simulated world as hardware: radio packets go in, replies and states of all bodies come out.
 
-It steps physics at the mission's pace and never skips a step. After a short delay it catches up. After a longer pause
-the world's time has not advanced, because robots would get no packet while it catches up, and stop by themselves.
-Other processes draw pictures from the state that it publishes once a frame.
+The world steps physics at the mission's pace and never skips a step. It catches up after a short delay, but not after a
+longer pause: then the world's time stays behind. While it caught up, robots would receive no packet and would stop by
+themselves. Once a frame the world publishes its state, from which other processes draw pictures.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from scout_model.radio_air import RadioAir, Sent
 from scout_model.radio_link import packet_bits
 from scout_model.world import World
 
-AWAY_S = 0.1  # chosen: three frames; with the usual pause between packets well below a robot's limit of silence
+AWAY_S = 0.1  # chosen: three frames; together with the usual packet interval well below a robot's time-out
 
 
 class WorldParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -51,7 +51,7 @@ class NoSuchBody(Refusal):
 
 
 class SimulatedWorld(Component[WorldParameters]):
-    """Plays robots and room for the simulated drivers, and audits the packets on the air."""
+    """Simulates robots and room for the simulated drivers, and audits the packets on the air."""
 
     parameters_type = WorldParameters
     shares_process = False
@@ -101,7 +101,7 @@ class SimulatedWorld(Component[WorldParameters]):
                 self.bus.publish(self.address, Conversation.REPLIES, on_air)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``AskWorld``, and what localizers are asked."""
+        """Answer ``AskWorld`` and the questions to localizers."""
         match asked.body:
             case AskWorld():
                 robots = {scout.name: scout.network_id for scout in self.parameters.world.robots}
@@ -161,7 +161,7 @@ class SimulatedWorld(Component[WorldParameters]):
         self._air.send(sent, self._away_m(packet.network_id))
 
     def _reply(self, asked: Sent, now_s: float) -> None:
-        """Put the robot's reply, if it has one, on the air at the rate of the packet that asked."""
+        """Send the robot's reply, if it has one, at the bit rate of the packet that asked."""
         payload = self._world.reply(asked.network_id)
         if payload:
             air_time_s = asked.air_time_s * packet_bits(payload) / packet_bits(asked.payload)

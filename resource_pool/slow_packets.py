@@ -1,10 +1,10 @@
-"""Slow packets: the longest time on the air of each ARC's packets of each kind, where it is longer than declared.
+"""Slow packets: for each ARC and kind of packet, the longest time on the air, if it is longer than declared.
 
 Rules of this file:
 
-* Times are rounded up to whole ``STEP_S``, so that a time that grows by little is told a few times only.
-* A longer time is told with the next packet of its kind, but not within ``EVERY_S`` after the last one.
-* What an ARC's packets took is forgotten with its connection; the RC manager remembers it until the ARC leaves.
+* Times are rounded up to multiples of ``STEP_S``, so that a slowly growing time is reported only a few times.
+* A longer time is reported with the next packet of its kind, but not within ``EVERY_S`` after the last report.
+* An ARC's times are deleted when it is disconnected; the RC manager remembers them until the ARC leaves.
 
 Pure; times are mission seconds.
 """
@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from backbone.rc_manager.messages import LONGEST_PACKET_S
 from backbone.scheduling.requests import MeasuredPackets
 
-EVERY_S = 1.0  # chosen: each longer time makes an ARC ask anew; no plan changes faster than slices end
+EVERY_S = 1.0  # chosen: each longer time changes an ARC's request; no plan changes faster than slices end
 STEP_S = 1e-4  # chosen: a byte on the air at 115.2 kbit/s
-ROUNDING = 1e-6  # chosen: of a step; far above that of a division, far below a measurement
+ROUNDING = 1e-6  # chosen: of a step; far above a division's rounding error, far below a measurement's resolution
 
 
 @dataclass(slots=True)
@@ -34,7 +34,7 @@ class SlowPackets:
     """The slow packets of one radio.
 
     Args:
-        every_s: Least time between two longer times of one kind.
+        every_s: Least time between two reports of one kind.
     """
 
     def __init__(self, every_s: float = EVERY_S) -> None:
@@ -42,9 +42,10 @@ class SlowPackets:
         self._arcs: dict[str, dict[str, _Kind]] = {}
 
     def took(self, arc: str, kind: str, declared_s: float, took_s: float, now_s: float) -> bool:
-        """Take in the time that a packet was on the air; return whether a longer time is to be told now.
+        """Record a packet's time on the air; return whether a longer time must be reported now.
 
-        A time that is not longer than declared changes nothing; above ``LONGEST_PACKET_S`` it counts as that.
+        A time that is not longer than declared is ignored. A time above ``LONGEST_PACKET_S`` counts as
+        ``LONGEST_PACKET_S``.
 
         Example:
             >>> packets = SlowPackets()
@@ -63,7 +64,7 @@ class SlowPackets:
         return True
 
     def told(self, arcs: Collection[str]) -> list[MeasuredPackets]:
-        """Return what was told of these ARCs."""
+        """Return the times reported for these ARCs."""
         return [
             MeasuredPackets(arc, kind, one.told_s)
             for arc in arcs
@@ -72,7 +73,7 @@ class SlowPackets:
         ]
 
     def forget(self, arc: str) -> None:
-        """Forget an ARC that was disconnected."""
+        """Delete the times of a disconnected ARC."""
         self._arcs.pop(arc, None)
 
 

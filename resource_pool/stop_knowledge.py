@@ -2,8 +2,8 @@
 
 Rules of this file: pure; no bus, no clock.
 
-A command that was given before a stop or before its lift may arrive after both. Its number distinguishes it from a
-later command: the robot's RC refuses every number but that of its last stop.
+A command sent before a stop, or before the stop was lifted, may arrive after both. Its number distinguishes it from a
+later command: the robot's RC rejects every number except that of its last stop.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class StopKnowledge:
     def number(self, robot: str) -> int:
         """Return the number for commands to this robot; 0: no stop is known."""
         number, is_lifted = self._last.get(robot, (0, True))
-        return number if is_lifted else number - 1  # a wrong number, also if the lift overtakes the command
+        return number if is_lifted else number - 1  # wrong number, even if the lift overtakes the command
 
     def heard(self, state: StopState) -> bool:
         """Record a robot's state; return whether it is news. A state older than the known one changes nothing."""

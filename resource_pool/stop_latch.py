@@ -1,11 +1,11 @@
-"""Emergency stop of one robot: it stays stopped until exactly this stop is lifted.
+"""Emergency stop of one robot: the robot stays stopped until exactly this stop is lifted.
 
 Rules of this file: pure; time is an argument; no bus.
 
 * A stop is always allowed and needs no grant. A second stop keeps the first one's author and reason, adds its own
   author, and has a number of its own.
 * A lift names the stop that the operator saw. If a newer stop comes meanwhile, the lift changes nothing.
-* The holder keeps the robot; its drives and jumps are refused with the author and the reason.
+* The ARC that holds the robot keeps it; its drives and jumps are refused with the author and the reason of the stop.
 * A command is refused if its sender did not know that the last stop was lifted.
 """
 
@@ -22,7 +22,7 @@ class StopLatch:
     """The stop of one robot.
 
     Args:
-        state: State before the RC's process began; None: it may move and was never stopped.
+        state: State before the RC's process began; None: the robot may move and was never stopped.
     """
 
     def __init__(self, rc: str, state: StopState | None = None) -> None:
@@ -30,7 +30,7 @@ class StopLatch:
         """The present state."""
 
     def stop(self, by: str, reason: str, now_s: float, console: str = "") -> bool:
-        """Stop the robot; return whether this is new: it could move, or this author had not stopped it yet.
+        """Stop the robot; return True if the robot could move, or if this author had not stopped it yet.
 
         Args:
             by: Name of the operator, for people.
@@ -46,12 +46,12 @@ class StopLatch:
         return is_new
 
     def confirm(self, is_confirmed: bool) -> None:
-        """Record whether the radio accepted the packet that stops the wheels, if the robot is still stopped."""
+        """If the robot is still stopped, record whether the radio accepted the packet that stops the wheels."""
         if self.state.is_stopped:
             self.state = msgspec.structs.replace(self.state, is_confirmed=is_confirmed)
 
     def lift(self, number: int, by: str, now_s: float) -> bool:
-        """Lift the stop; return whether this is new.
+        """Lift the stop; return True if it was in force.
 
         Raises:
             OtherStop: Another stop is in force.
@@ -69,7 +69,7 @@ class StopLatch:
         return True
 
     def require_moving(self, after_stop: int) -> None:
-        """Return if a command may move the robot.
+        """Check that a command may move the robot.
 
         Args:
             after_stop: Number of the last stop whose lift the sender knew.

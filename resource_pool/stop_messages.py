@@ -1,4 +1,4 @@
-"""Messages of emergency stops: operator → robot RC, past ARC and RC manager; robot RC → subscribers: ``StopState``.
+"""Messages of emergency stops: operator → robot RC, bypassing ARC and RC manager; robot RC → all: ``StopState``.
 
 A stop needs no grant.
 """
@@ -60,12 +60,12 @@ class Stopper(Message, frozen=True):
 
 
 class StopState(Message, frozen=True):
-    """Answer to the three questions before; also published as an event on every change.
+    """Answer to the three messages above; also published as an event on every change.
 
     Attributes:
         rc: The robot.
         is_stopped: True: drives and jumps are refused.
-        number: Number of the last order to stop; grows with each, also if the robot was stopped already.
+        number: Number of the last order to stop; grows with each order, even if the robot is already stopped.
         by: The operator who stopped it first, or who lifted the last stop.
         reason: The operator's reason.
         at_s: Mission time of the stop, or of its end.
@@ -96,18 +96,18 @@ class EmergencyStopped(Refusal):
     """
 
     code = "robot.emergency_stop"
-    remedy = "See that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
+    remedy = "Check that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
 
 
 class GivenBeforeStop(EmergencyStopped):
-    """The sender did not know the robot's last stop, which was lifted since; facts as ``EmergencyStopped``."""
+    """The sender did not know the robot's last stop, which has been lifted; facts as in ``EmergencyStopped``."""
 
     code = "robot.given_before_stop"
     remedy = "Give the command again, now that you know of the stop: let go of the control and press it again."
 
 
 class OtherStop(Refusal):
-    """Another stop than the one to lift is in force; facts: ``number``, ``by``. Nothing is changed."""
+    """The stop in force is not the one to lift; facts: ``number``, ``by``. Nothing is changed."""
 
     code = "robot.other_stop"
     remedy = "See which operator stopped the robot since, and lift that stop if the robot may move."

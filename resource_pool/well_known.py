@@ -1,4 +1,4 @@
-"""Pictures, poses and the floor in Foxglove's well-known schemas: cameras, and all robots in one room. Pure.
+"""Camera pictures, robots' poses and the floor plan in Foxglove's well-known schemas. Pure.
 
 Imported only where Foxglove's SDK is installed, by the entry point of ``backbone.foxglove.well_known``.
 """
@@ -44,7 +44,7 @@ SHAPES = {
 
 
 def picture(frame: Frame) -> Iterator[WellKnown]:
-    """Yield the picture, pixel for pixel, at a topic of the robot's camera."""
+    """Yield the picture, pixel for pixel, on the topic of the robot's camera."""
     image = RawImage(
         timestamp=moment(frame.captured_s),
         frame_id=frame.robot,
@@ -58,7 +58,7 @@ def picture(frame: Frame) -> Iterator[WellKnown]:
 
 
 def place(pose: Pose) -> Iterator[WellKnown]:
-    """Yield the frame of the body in the room, and an arrow with its name there."""
+    """Yield the body's coordinate frame in the room, and an arrow with its name."""
     at, where, turned = moment(pose.at_s), Vector3(x=pose.x_m, y=pose.y_m), _turned(pose.heading_rad)
     transform = FrameTransform(
         timestamp=at, parent_frame_id=ROOM, child_frame_id=pose.body, translation=where, rotation=turned
@@ -81,7 +81,7 @@ def place(pose: Pose) -> Iterator[WellKnown]:
 
 
 def floor(plan: FloorPlan) -> Iterator[WellKnown]:
-    """Yield the floor with what stands on it; it stays until another plan of it comes."""
+    """Yield the floor plan with its shapes; it is shown until another plan arrives."""
     ground = CubePrimitive(
         pose=Placed(position=Vector3(x=plan.width_m / 2, y=plan.depth_m / 2, z=-FLAT_M), orientation=_turned(0.0)),
         size=Vector3(x=plan.width_m, y=plan.depth_m, z=FLAT_M),

@@ -1,10 +1,10 @@
-"""A battery: capacity, and what is left of it while a robot draws power.
+"""A battery: its capacity, and its charge while a robot draws power.
 
 Rules:
 
-* The power drawn is constant between two calls of ``Battery.draw``, so any moment's charge is exact.
-* The charge is never below nothing and never above the capacity; while power is drawn it never grows.
-* World time is all it knows: the same draws at the same times leave the same charge.
+* The power is constant between two calls of ``Battery.draw``, so the charge at any moment is exact.
+* The charge stays between 0 and the capacity. While power is drawn, it never grows.
+* The charge depends only on world time: the same draws at the same times leave the same charge.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Consumption:
-    """What a robot draws from its battery, in watts.
+    """Power that a robot draws from its battery, in watts.
 
     Attributes:
-        idle_w: Always: processor, receiver, sensors.
-        transmitter_w: More while its video transmitter is on.
-        motors_w: More at full load of its motors.
+        idle_w: Constant part: processor, receiver, sensors.
+        transmitter_w: Additional while its video transmitter is on.
+        motors_w: Additional at full load of its motors.
     """
 
     idle_w: float
@@ -28,7 +28,7 @@ class Consumption:
     motors_w: float
 
     def power_w(self, load: float, *, is_transmitting: bool) -> float:
-        """Return what it draws now; ``load`` is that of its motors, 0 to 1.
+        """Return the total power; ``load`` is the load of the motors, 0 to 1.
 
         Example:
             >>> Consumption(1.0, 2.0, 4.0).power_w(0.5, is_transmitting=True)
@@ -38,7 +38,7 @@ class Consumption:
 
 
 class Battery:
-    """A battery that nothing is drawn from yet.
+    """A battery from which no power has been drawn yet.
 
     Raises:
         ValueError: The capacity is not positive and finite, or the share is not between 0 and 1.
@@ -48,7 +48,7 @@ class Battery:
         if not (0.0 < capacity_j < math.inf and 0.0 <= share <= 1.0):
             raise ValueError(f"a battery of {capacity_j} J, charged to {share}")
         self.capacity_j = capacity_j
-        """Energy that it holds when it is full."""
+        """Energy of the full battery."""
         self._charge_j = capacity_j * share
         self._power_w = 0.0
         self._since_s = 0.0
@@ -58,7 +58,7 @@ class Battery:
         """Draw this power from now on; a negative power charges.
 
         Args:
-            power_w: All power together, not more of it.
+            power_w: Total power; it replaces the power of the last call.
             now_s: World time, never before an earlier call's.
 
         Raises:
@@ -76,11 +76,11 @@ class Battery:
             self._empty_s = now_s + self._charge_j / power_w if power_w > 0.0 else math.inf
 
     def share(self, now_s: float) -> float:
-        """Return how full it is, 0 to 1."""
+        """Return the charge as a share of the capacity, 0 to 1."""
         return self._left_j(now_s) / self.capacity_j
 
     def is_empty(self, now_s: float) -> bool:
-        """Return whether nothing is left."""
+        """Return whether the charge is 0."""
         return now_s >= self._empty_s
 
     def _left_j(self, now_s: float) -> float:

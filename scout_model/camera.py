@@ -1,16 +1,15 @@
-"""The robots' cameras: pictures of a world, from its MJCF and its state.
+"""The robots' cameras: draw pictures of a world from its MJCF and its state.
 
 Two backends draw the same scene: ``gl`` renders with MuJoCo's classic OpenGL renderer, ``paint``
-needs no OpenGL (``scout_model.painter``).  Draw where a picture is wanted, not where physics runs:
+needs no OpenGL (``scout_model.painter``). Draw in the process that needs the picture, not in the one that runs physics:
 a state vector of a few hundred bytes is enough.
 
-A picture that was drawn before is not drawn again.  It is known by the poses of its camera and of
-everything that moves in the camera's view, so a robot elsewhere does not matter.  States are rounded
-before anything is drawn from them: what a picture shows depends on the rounded state alone, not on
-which of the states that round to it came first.
+A picture that was drawn before comes from a cache. The cache's key is the poses of the camera and of all moving bodies
+in its view, so a robot elsewhere does not matter. States are rounded before drawing: a picture depends only on the
+rounded state, not on the first of the states that round to it.
 
-For ``gl``, ``scout_model.gl_probe.prepare`` must have run in this process before anything imported
-mujoco, this module included.  A camera belongs to the thread that made it.
+For ``gl``, this process must call ``scout_model.gl_probe.prepare`` before it imports mujoco or this module. A camera
+may be used only in the thread that created it.
 """
 
 from __future__ import annotations
@@ -31,12 +30,12 @@ from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
 from scout_model.painter import Painter
 from scout_model.world import STATE
 
-MEMO_PICTURES = 256  # chosen: 20 MB; the scenes that a standing robot sees while nothing or little moves
+MEMO_PICTURES = 256  # chosen: 20 MB; the views of a standing robot while nothing or little moves
 
 _STATE_DECIMALS = 5  # chosen: a hundredth of a millimetre, a fiftieth of a pixel at the nearest
-_MARGIN_M = 0.002  # chosen: a line is drawn up to a pixel wider than it is
-_SEEN_GROUPS = 2  # the greatest geom group that is seen, see room.xml
-_DARK = "dark/"  # begins the names of the sites that are dark
+_MARGIN_M = 0.002  # chosen: a line is drawn up to a pixel wider than its true width
+_SEEN_GROUPS = 2  # the greatest visible geom group, see room.xml
+_DARK = "dark/"  # prefix of the names of dark sites
 
 
 class _Drawing(Protocol):
@@ -46,7 +45,7 @@ class _Drawing(Protocol):
 
 
 class _GlDrawing:
-    """Pictures by MuJoCo's classic renderer; what makes it fast stands in ``room.xml``."""
+    """Pictures by MuJoCo's classic renderer; the settings that make it fast are in ``room.xml``."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         if os.environ.get("MUJOCO_GL") not in ("egl", "osmesa"):
@@ -70,12 +69,12 @@ class _GlDrawing:
 
 
 class Camera:
-    """The cameras of all robots of one world, showing it as built until the first ``show``.
+    """The cameras of all robots of one world; until the first ``show`` they show the world as built.
 
     Args:
         mjcf: ``World.mjcf``.
         backend: ``gl`` or ``paint``.
-        memo_pictures: How many of the last different pictures are kept, 77 kB each; 0: each is drawn anew.
+        memo_pictures: Size of the cache in pictures of 77 kB; 0: no cache.
 
     Raises:
         RenderingUnavailable: ``gl``, but this process has no OpenGL.
@@ -119,17 +118,17 @@ class Camera:
         self.close()
 
     def show(self, state: NDArray[np.float64]) -> None:
-        """Let the following pictures show the world in this state.
+        """Set the state of the world for the following pictures.
 
         Args:
             state: ``World.state()`` of a world with this MJCF.
 
         Raises:
-            StateMismatch: It has not the length of this world's states.
+            StateMismatch: The vector's length is not that of this world's states.
         """
         if state.shape != (self._length,):
             raise StateMismatch(f"a state of shape {state.shape}, this world's have {self._length} numbers")
-        # Adding zero makes the negative zero, whose bits differ, an ordinary one.
+        # Adding zero turns a negative zero into a positive one, because their bits differ.
         rounded = np.round(state, _STATE_DECIMALS) + 0.0
         if (shown := rounded.tobytes()) == self._shown:
             return
@@ -141,7 +140,7 @@ class Camera:
         self._shade.fall(self._data)
 
     def picture(self, robot: str) -> NDArray[np.uint8]:
-        """Return what this robot's camera sees: grey levels 0 to 255, shape (240, 320), row 0 on top; not writable.
+        """Return the picture of this robot's camera: grey levels 0 to 255, shape (240, 320), row 0 on top; read-only.
 
         Raises:
             UnknownBody: No robot with a camera has this name.
@@ -169,7 +168,7 @@ class Camera:
         return picture
 
     def position_m(self, robot: str) -> tuple[float, float, float]:
-        """Return where this robot's camera is, x, y and z in metres.
+        """Return the position of this robot's camera: x, y, z in metres.
 
         Raises:
             UnknownBody: No robot with a camera has this name.
@@ -188,7 +187,7 @@ class Camera:
 
 
 class _Movers:
-    """The bodies that move and are seen, each in the ball that holds what is seen of it."""
+    """The visible moving bodies, each with a bounding sphere of its visible geoms."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         seen = model.geom_group <= _SEEN_GROUPS
@@ -208,7 +207,7 @@ class _Movers:
         self._across_rad = np.arctan(np.tan(down_rad) * PICTURE_WIDTH_PX / PICTURE_HEIGHT_PX)
 
     def seen(self, data: mujoco.MjData, camera: int, is_dark: NDArray[np.bool_]) -> bytes:
-        """Return bytes that are the same exactly if this camera and what moves in its view are where they were."""
+        """Return a cache key: equal exactly if this camera and the moving bodies in its view have the same poses."""
         bodies, eye_m, axes = self._bodies, data.cam_xpos[camera], data.cam_xmat[camera].reshape(3, 3)
         middles_m = np.einsum("nij,nj->ni", data.xmat[bodies].reshape(-1, 3, 3), self._middles_m) + data.xpos[bodies]
         right, up, back = ((middles_m - eye_m) @ axes).T
@@ -234,7 +233,7 @@ class _Movers:
 
 
 class _Shade:
-    """Darkens what moves while it is in a dark place; the room's own shade is in its MJCF."""
+    """Darkens moving bodies while they are in a dark place; the room's own shade is part of its MJCF."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
@@ -247,7 +246,7 @@ class _Shade:
         self.is_dark = np.zeros(model.nbody, np.bool_)
 
     def fall(self, data: mujoco.MjData) -> None:
-        """Let robots and targets look as dark as the place is where they are."""
+        """Make robots and targets as dark as their present place."""
         if not len(self._low_m):
             return
         middles_m = data.xpos[self._roots][:, np.newaxis]

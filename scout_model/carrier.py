@@ -1,8 +1,8 @@
-"""The carrier: a bigger robot that brings Scouts in and sets them down; pure functions of time.
+"""The carrier: a larger robot that brings Scouts in and sets them down; pure functions of time.
 
-It drives its path once (and back with ``there_and_back``), stops where each place it serves is nearest, and there
-an arm lifts the Scouts of this place off its deck, one after the other, and lowers them to the floor.
-Until a Scout stands on the floor it goes wherever the carrier holds it.
+The carrier drives its path once (and back with ``there_and_back``). It stops at the point nearest to each place that it
+serves. There its arm lifts the Scouts of this place off the deck, one after the other, and lowers them to the floor.
+Until a Scout stands on the floor, its pose is that at which the carrier holds it.
 
 Source: IROS 2001, section 5: Scouts are deployed into the environment by a human or another robot.
 """
@@ -28,18 +28,18 @@ from scout_model.errors import InvalidWorld
 from scout_model.targets import CARRIER, Route, TargetState, path_length_m
 
 _LIFT_M = 0.05  # chosen: clears the neighbor on the deck
-_LIFT_SHARE = 0.25  # chosen: of the time; as much to lower it, the rest to reach out
+_LIFT_SHARE = 0.25  # chosen: of the time; the same share to lower the Scout, the rest to reach out
 
 
 @dataclass(frozen=True, slots=True)
 class CarriedPose:
-    """Place of a carried Scout.
+    """Pose of a carried Scout.
 
     Attributes:
         x_m: Position of its axle's middle.
         y_m: Position.
         z_m: Above the floor.
-        heading_rad: Where its camera looks.
+        heading_rad: Direction of its camera.
     """
 
     x_m: float
@@ -56,37 +56,37 @@ class _Stop:
 
 
 class CarrierTrip:
-    """One carrier, what it carries, and where both are at any time.
+    """One carrier and its passengers: their poses at any time.
 
     Args:
         target: Of shape ``carrier``.
-        places: Where its passengers are to be set down, in the order of the mission file.
+        places: Places where its passengers are set down, in the order of the mission file.
     """
 
     def __init__(self, target: Target, places: list[RobotPlace]) -> None:
         self._target, self._route = target, Route(target)
         leg_s = path_length_m(target.path) / target.speed_m_s
-        # The first millimetre of a further lap would lead it back.
+        # One millimetre into a further lap would put the carrier back at the beginning.
         self._last_s = (2 * leg_s + target.rest_s if target.there_and_back else leg_s) - 1e-9
         served = sorted(
             ((_nearest(target, place)[1], place) for place in places), key=lambda stop: (stop[0], stop[1].name)
         )
         self._stops = {place.name: _Stop(at_m, place, slot) for slot, (at_m, place) in enumerate(served)}
         self.passengers = list(self._stops)
-        """Names of those it carries, in the order in which it sets them down."""
+        """Names of the carried Scouts, in the order in which the carrier sets them down."""
 
     def set_down_s(self, passenger: str) -> float:
-        """Return the world time at which this passenger stands on the floor and is free."""
+        """Return the world time from which this passenger stands on the floor and is free."""
         stop = self._stops[passenger]
         return self._target.begin_s + stop.at_m / self._target.speed_m_s + (stop.slot + 1) * SET_DOWN_S
 
     def pose(self, time_s: float) -> TargetState:
-        """Return where the carrier is at this world time."""
+        """Return the carrier's pose at this world time."""
         begin_s = self._target.begin_s
         return self._route.where(begin_s + min(self._driven_s(time_s - begin_s), self._last_s))
 
     def held(self, passenger: str, time_s: float) -> CarriedPose | None:
-        """Return where the carrier holds this passenger at this world time; None once it is set down."""
+        """Return the pose of this passenger at this world time; None once it is set down."""
         free_s = self.set_down_s(passenger)
         if time_s >= free_s:
             return None
@@ -96,7 +96,7 @@ class CarrierTrip:
         return aboard if share <= 0 else _between(aboard, stop.place, share)
 
     def _driven_s(self, elapsed_s: float) -> float:
-        """Return how long it has been driving: the time since its departure without its stops."""
+        """Return the driving time: the time since departure minus the stops."""
         driven_s = max(0.0, elapsed_s)
         for stop in self._stops.values():
             arrives_s = stop.at_m / self._target.speed_m_s
@@ -116,10 +116,10 @@ def trips(description: WorldDescription) -> dict[str, CarrierTrip]:
 
 
 def check_stops(description: WorldDescription) -> None:
-    """Return if every carried robot has a carrier with a free place that can reach where it is set down.
+    """Check that every carried robot has a carrier with a free slot that can reach the robot's place.
 
     Raises:
-        InvalidWorld: The first that has not.
+        InvalidWorld: A robot has no such carrier; the first such robot is named.
     """
     carriers = {target.name: target for target in description.targets if target.shape == CARRIER}
     aboard = dict.fromkeys(carriers, 0)
@@ -141,7 +141,7 @@ def check_stops(description: WorldDescription) -> None:
 
 
 def _nearest(target: Target, place: RobotPlace) -> tuple[float, float]:
-    """Return how far a place is from the path, and how far along the path that is, metres."""
+    """Return a place's distance from the path, and the way along the path to the nearest point, in metres."""
     best, behind_m = (math.inf, 0.0), 0.0
     for (ax, ay), (bx, by) in pairwise(target.path):
         length_m = math.dist((ax, ay), (bx, by))
@@ -156,7 +156,7 @@ def _nearest(target: Target, place: RobotPlace) -> tuple[float, float]:
 
 
 def _aboard(carrier: TargetState, slot: int) -> CarriedPose:
-    """Return the place of a slot on the deck: rows of two, the first to leave stand in the rear."""
+    """Return the place of a slot on the deck: rows of two; the Scouts that leave first are in the rear."""
     row, side = divmod(slot, 2)
     rows = CARRIER_PLACES // 2
     along_m = (row - (rows - 1) / 2) * CARRIER_LENGTH_M / rows
@@ -171,7 +171,7 @@ def _aboard(carrier: TargetState, slot: int) -> CarriedPose:
 
 
 def _between(aboard: CarriedPose, place: RobotPlace, share: float) -> CarriedPose:
-    """Return where the arm holds a Scout after this share, 0 to 1, of the time it takes to set it down."""
+    """Return the pose of a Scout in the arm after this share, 0 to 1, of the setting-down time."""
     reach = min(1.0, max(0.0, (share - _LIFT_SHARE) / (1 - 2 * _LIFT_SHARE)))
     top_m = aboard.z_m + _LIFT_M
     if share <= _LIFT_SHARE:

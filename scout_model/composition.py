@@ -1,8 +1,8 @@
-"""From a world's description to one MuJoCo model of room, furniture, robots and targets.
+"""Composes one MuJoCo model of room, furniture, robots and targets from a world's description.
 
 Names in the model: ``<robot>/<part>`` for the parts of a robot's own MJCF; ``<target>`` for a target's
-body, and ``<target>/left_leg`` and ``<target>/right_leg`` for a person's legs; ``dark/<name>`` for the
-sites that tell a camera where it is dark.
+body, and ``<target>/left_leg`` and ``<target>/right_leg`` for a person's legs; ``dark/<name>`` for the sites that mark
+dark places for cameras.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ from scout_model.targets import CARRIER, part_poses
 _TEXTS_KEPT = 4  # chosen: one experiment or a few by turns; some ten kilobytes each
 _WALL_THICKNESS_M = 0.1  # chosen: a Scout in flight does not pass through within one step
 _MARK_THICKNESS_M = 0.002  # chosen: enough to keep mark and surface apart in the depth buffer across the room
-_SHADE_THICKNESS_M = 0.004  # chosen: as much above a mark as that is above its surface
+_SHADE_THICKNESS_M = 0.004  # chosen: the height above a mark equals the mark's height above its surface
 _FLOOR_LEVEL = 0.45  # as in room.xml
-_AT_A_WALL_M = 0.05  # chosen: what ends so close to a wall darkens it
+_AT_A_WALL_M = 0.05  # chosen: a dark place that ends this close to a wall darkens the wall
 _MARKS, _THINGS = 1, 2  # geom groups, see room.xml
 _BOX, _CYLINDER, _SPHERE = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_SPHERE
 
@@ -67,7 +67,7 @@ def compose(description: WorldDescription) -> str:
     """Return the world as MJCF; the same description always gives the same text.
 
     Raises:
-        InvalidWorld: A name or network id is used twice, a number makes no sense, or a Scout stands outside.
+        InvalidWorld: A name or network id is used twice, a number is out of range, or a Scout stands outside the room.
     """
     check(description)
     # The model shows neither the air nor when a target departs after the beginning.
@@ -128,7 +128,7 @@ def _part(
     group: int = _THINGS,
     **more: list[float],
 ) -> None:
-    """Add a part that is seen and, unless it is a mark, touched; its size is as MuJoCo has it."""
+    """Add a visible part; unless it is a mark, bodies collide with it. The size follows MuJoCo's convention."""
     solid = int(group != _MARKS)
     parent.add_geom(
         name=name,
@@ -169,7 +169,7 @@ def _add_walls(spec: mujoco.MjSpec, description: WorldDescription) -> None:
 
 
 def _add_marks(spec: mujoco.MjSpec, description: WorldDescription) -> None:
-    """Put lines on the floor, and skirting boards and posters on the walls, so that a picture shows motion."""
+    """Put lines on the floor, and skirting boards and posters on the walls, so that motion is visible in a picture."""
     width_m, depth_m = description.width_m, description.depth_m
     rng = np.random.default_rng(description.seed)
     world = spec.worldbody
@@ -205,7 +205,7 @@ def _below_tables(description: WorldDescription) -> list[DarkPlace]:
 
 
 def _add_dark_place(spec: mujoco.MjSpec, dark: DarkPlace, description: WorldDescription) -> None:
-    """Darken floor and walls, and leave a site that tells cameras what else to darken."""
+    """Darken floor and walls, and add a site by which cameras darken bodies in this place."""
     world = spec.worldbody
     size_m = [dark.width_m, dark.depth_m, dark.height_m]
     world.add_site(
@@ -246,7 +246,7 @@ def _add_furniture(spec: mujoco.MjSpec, furniture: Furniture, dark_places: list[
     under_m = height_m - TABLE_TOP_M
     top_m = [furniture.width_m, furniture.depth_m, TABLE_TOP_M]
     _box(world, furniture.name, [x_m, y_m, height_m - TABLE_TOP_M / 2], top_m, 0.56, _THINGS)
-    # Its underside: just below the top and a little smaller, so that it is not seen from the side.
+    # The table's underside: just below the top and a little smaller, so that it is invisible from the side.
     inset_m = TABLE_LEG_M / 2
     underside_m = [furniture.width_m - inset_m, furniture.depth_m - inset_m, _MARK_THICKNESS_M]
     _box(world, f"{furniture.name}/underside", [x_m, y_m, under_m - _MARK_THICKNESS_M], underside_m, 0.1, _THINGS)
@@ -258,7 +258,7 @@ def _add_furniture(spec: mujoco.MjSpec, furniture: Furniture, dark_places: list[
 
 
 def _is_in(furniture: Furniture, dark: DarkPlace) -> bool:
-    """Return whether a piece of furniture stands in a dark place with all of its footprint and height."""
+    """Return whether a piece of furniture is entirely inside a dark place."""
     return (
         abs(furniture.x_m - dark.x_m) + furniture.width_m / 2 <= dark.width_m / 2
         and abs(furniture.y_m - dark.y_m) + furniture.depth_m / 2 <= dark.depth_m / 2
@@ -271,7 +271,7 @@ def _turned(heading_rad: float) -> list[float]:
 
 
 def _add_ramp(spec: mujoco.MjSpec, ramp: Ramp) -> None:
-    """Add a wedge. A tilted board would leave an edge at its foot, and be seen below the floor."""
+    """Add a wedge. A tilted board would leave an edge at its foot, and be visible below the floor."""
     half_m, across_m, height_m = ramp.length_m / 2, ramp.width_m / 2, ramp.height_m
     corners_m = [
         (along_m, side_m, up_m)
@@ -319,7 +319,7 @@ def _add_robot(spec: mujoco.MjSpec, place: RobotPlace, body_mjcf: str) -> None:
 
 
 def _add_target(spec: mujoco.MjSpec, target: Target) -> None:
-    # A mocap body must hang on the world, so each swinging leg of a person is a body of its own.
+    # A mocap body must be a child of the world body, so each swinging leg of a person is a body of its own.
     body, *legs = (
         spec.worldbody.add_body(name=part.body, mocap=True, pos=part.position_m, quat=part.quaternion)
         for part in part_poses(target, 0.0)

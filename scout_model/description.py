@@ -1,7 +1,7 @@
 """Description of a simulated world: plain data, from a mission file or a test. SI units, radians.
 
 The room's frame: origin in a corner of the floor, x along its width, y along its depth, z up.
-Headings: 0 looks along +x, counter-clockwise is positive.
+Headings: 0 is along +x, counter-clockwise is positive.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Offset = Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
 
 
 class Block(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What takes a box of the room, from the floor on.
+    """A box-shaped part of the room that begins on the floor.
 
     Attributes:
         name: Unique in the world.
@@ -36,7 +36,7 @@ class Block(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Furniture(Block, frozen=True, forbid_unknown_fields=True):
-    """Something that stands on the floor: a cupboard, a step, a table with a dark place beneath.
+    """A piece of furniture on the floor: a cupboard, a step, a table with a dark place beneath.
 
     Attributes:
         shape: ``box``, or ``table``: a top on four legs, with a dark place beneath it.
@@ -68,13 +68,13 @@ class Ramp(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Landmark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A board with the four-blob target, as on a home base; its numbers stand in ``dimensions``.
+    """A board with the four-blob target, as on a home base; its sizes are in ``dimensions``.
 
     Attributes:
         name: Unique in the world.
         x_m: Middle of its face.
         y_m: Middle of its face.
-        heading_rad: Where it faces; who stands there and looks back sees the pattern undistorted.
+        heading_rad: Direction that the board faces; from that direction the pattern appears undistorted.
     """
 
     name: str
@@ -91,11 +91,11 @@ class DarkPlace(Block, frozen=True, forbid_unknown_fields=True):
 
 
 SCOUT = "scout_model.scout:Scout"
-"""Class path of the robot of the papers."""
+"""Class path of the papers' robot."""
 
 
 class RobotPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Scout, or a robot of another kind, and where it begins.
+    """A Scout or a robot of another kind, with its start place.
 
     Attributes:
         network_id: Its address on the command radio, 1 to 254.
@@ -103,8 +103,9 @@ class RobotPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         y_m: Position.
         heading_rad: Where its camera looks.
         kind: Class path ``package.module:Class`` of its kind, a ``scout_model.robot.Robot``.
-        carried_by: Target of shape ``carrier`` that brings it and sets it down at this place; empty: it stands there.
-        battery_j: Capacity of its battery, full at the beginning; None: as its kind has it.
+        carried_by: Target of shape ``carrier`` that brings the robot and sets it down at this place; empty: it begins
+            there.
+        battery_j: Capacity of its battery, full at the beginning; None: the default of its kind.
     """
 
     name: str
@@ -118,7 +119,7 @@ class RobotPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A body that walks a path again and again; its position is a function of time alone.
+    """A body that walks a path repeatedly; its position depends only on time.
 
     A carrier walks its path once, and back with ``there_and_back``, and stops to set down its load.
 
@@ -129,7 +130,7 @@ class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         speed_m_s: Speed along the path.
         begin_s: World time of its first departure.
         rest_s: Pause at each end of the path.
-        there_and_back: True: it returns along the path; False: it is back at the beginning after the pause.
+        there_and_back: True: it returns along the path; False: after the pause it appears at the beginning again.
     """
 
     name: str
@@ -142,25 +143,26 @@ class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class AirDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Effects of the air on packets and pictures. The default is mild: a very good day in the papers' room.
+    """Effects of the air on packets and pictures. The defaults are mild: a very good day in the papers' room.
 
-    Scales go from 0, off, over 1, as the papers tell, to 10; ``noise`` multiplies the five next to it.
+    Scales go from 0 (off) to 10; 1 is the strength described in the papers. ``noise`` multiplies the next five.
 
     Attributes:
-        noise: Of all five kinds of noise in a picture.
+        noise: Scale of all five kinds of noise in a picture.
         white_noise: Grain of the receiver, stronger with distance.
-        tears: Horizontal lines, few by themselves, many while the robot's motors run.
+        tears: Horizontal lines: few in general, many while the robot's motors run.
         ghosts: Echoes of the picture a little to its right, from multipath.
-        fades: Moments in which multipath leaves too little signal to keep the rows in place.
-        partial_frames: Pictures whose lower rows the framegrabber did not get: black, noise, or those of an older one.
-        weak_signal: How much distance counts; 0: every robot is received as from ``scout_model.air.REFERENCE_M``.
-        settling: How long the picture rolls after transmitter or receiver were switched to a
-            frequency.
-        interference: Share of the rows that two transmitters on one frequency spoil; the rest is the nearer one's.
+        fades: Moments in which multipath makes the signal too weak to keep the rows in place.
+        partial_frames: Pictures whose lower rows the framegrabber missed: they are black, noise, or rows of an older
+            picture.
+        weak_signal: Influence of distance; 0: every robot is received as from ``scout_model.air.REFERENCE_M``.
+        settling: Duration for which the picture rolls after transmitter or receiver switched to a frequency.
+        interference: Share of the rows that two transmitters on one frequency spoil; the other rows show the nearer
+            one.
         snow: Contrast of the noise on an unused frequency; 0: gray.
-        radio_loss: Share of command packets lost wherever the robot is, besides those lost by distance.
-        radio_delay_s: From a packet's end on the air to the robot's having read it.
-        antenna_x_m: Of the base's one antenna for packets and pictures; None: the middle of the room.
+        radio_loss: Share of command packets lost at any distance, in addition to losses by distance.
+        radio_delay_s: Time from a packet's end on the air until the robot has read it.
+        antenna_x_m: Position of the base's antenna for packets and pictures; None: the middle of the room.
         antenna_y_m: Same.
         antenna_z_m: Above the floor.
     """
@@ -183,12 +185,12 @@ class AirDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 AS_THE_PAPERS = AirDescription(noise=1.0)
-"""Three quarters of the frames from ``REFERENCE_M`` are clean, the others come in bursts of 0.15 s on average."""
+"""At ``REFERENCE_M`` three quarters of the frames are clean; the others come in bursts of 0.15 s on average."""
 
 CLEAN_AIR = AirDescription(
     noise=0.0, weak_signal=0.0, settling=0.0, interference=0.0, snow=0.0, radio_loss=0.0, radio_delay_s=0.0
 )
-"""Every picture arrives as it was sent, every packet at once."""
+"""No noise, losses or delays."""
 
 
 class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -197,15 +199,15 @@ class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         width_m: Along x.
         depth_m: Along y.
-        seed: Of everything random in it.
-        furniture: What stands on the floor.
+        seed: Seed of all random processes.
+        furniture: Furniture on the floor.
         robots: Robots.
         targets: Moving bodies.
-        air: Between them and the base.
+        air: Air between robots and base.
         ramps: Slopes.
         landmarks: Boards with the four-blob target.
-        dark_places: Where there is little light.
-        mjcf: A room of one's own in place of the walls and their marks, as MJCF text; empty: none.
+        dark_places: Places with little light.
+        mjcf: The user's own room in place of walls and marks, as MJCF text; empty: none.
     """
 
     width_m: float

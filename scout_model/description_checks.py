@@ -1,4 +1,4 @@
-"""Checks of a world's description, before a model is made of it. Pure."""
+"""Checks of a world's description before its model is composed. Pure."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _FURNITURE_SHAPES = ("box", "table")
 
 
 def check(description: WorldDescription) -> None:
-    """Return if the world can be built.
+    """Check that the world can be built.
 
     Raises:
-        InvalidWorld: It cannot; the first reason.
+        InvalidWorld: The world cannot be built; the first reason is given.
     """
     width_m, depth_m = description.width_m, description.depth_m
     if not (0 < width_m < math.inf and 0 < depth_m < math.inf):

@@ -1,4 +1,4 @@
-"""Refusals of the simulated hardware. This package knows no bus, so it has a tree of its own."""
+"""Errors of the simulated hardware. This package does not depend on the bus, so it has its own exception tree."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class ScoutModelError(Exception):
 
     Attributes:
         code: Stable word for machines, ``subject.reason``.
-        remedy: What the caller can do about it.
+        remedy: Advice for the caller.
     """
 
     code: ClassVar[str] = "scout_model"
@@ -22,7 +22,7 @@ class ScoutModelError(Exception):
 
 
 class UnknownBody(ScoutModelError, KeyError):
-    """No body of this name is in the world."""
+    """The world has no body of this name."""
 
     code = "world.unknown_body"
     remedy = "Ask for a Scout or target named in the world's description."
@@ -36,21 +36,21 @@ class InvalidWorld(ScoutModelError, ValueError):
 
 
 class InvalidRoom(InvalidWorld):
-    """The MJCF of a room of one's own cannot be used."""
+    """The MJCF of the user's room cannot be used."""
 
     code = "world.room"
-    remedy = "Mend the room's MJCF file; 'python -m mujoco.viewer --mjcf=FILE' shows what MuJoCo makes of it."
+    remedy = "Correct the room's MJCF file; 'python -m mujoco.viewer --mjcf=FILE' shows the room in MuJoCo."
 
 
 class MalformedPacket(ScoutModelError, ValueError):
-    """These bytes, or these values, are no packet of the command radio."""
+    """These bytes or values do not form a packet of the command radio."""
 
     code = "radio.malformed"
     remedy = "Build packets with the encode functions of scout_model.radio_link."
 
 
 class StateMismatch(ScoutModelError, ValueError):
-    """The state belongs to another world than the camera's."""
+    """The state does not belong to the camera's world."""
 
     code = "camera.state"
     remedy = "Build the camera from the MJCF of the world whose state it shows."

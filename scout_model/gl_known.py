@@ -1,4 +1,4 @@
-"""The renderer that worked in the last trial, kept for all missions of this account while nothing of it changes.
+"""Cache of the last successful trial of a renderer, for all missions of this account until something changes.
 
 A trial takes half a second of the start of a mission. ``keep`` writes a success down together with what the trial
 depended on: the Python installation, the shared libraries that it loaded, the folders that name the vendors of OpenGL,
@@ -30,8 +30,8 @@ class Trial(msgspec.Struct, frozen=True):
     """A trial that drew a picture.
 
     Attributes:
-        renderer: The name that OpenGL gives itself.
-        libraries: Paths of the shared libraries that were loaded then.
+        renderer: The name that OpenGL reports.
+        libraries: Paths of the shared libraries loaded in the trial.
     """
 
     renderer: str
@@ -39,7 +39,7 @@ class Trial(msgspec.Struct, frozen=True):
 
 
 class KnownRenderer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A renderer that drew a picture, and what the trial depended on.
+    """A renderer that drew a picture, and the conditions of the trial.
 
     Attributes:
         backend: The OpenGL of the trial.
@@ -47,7 +47,7 @@ class KnownRenderer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         installation: Folder of the Python installation.
         files: Library or folder → size in bytes and time of the last change in ns; None: it does not exist.
         devices: Device → whether this account may use it.
-        environment: Variables by which the libraries choose.
+        environment: Environment variables that the libraries read.
     """
 
     backend: OpenGl
@@ -59,16 +59,16 @@ class KnownRenderer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def recall() -> KnownRenderer | None:
-    """Return the renderer of the last successful trial; None if there was none or something has changed since."""
+    """Return the renderer of the last successful trial; None if there was no success or a condition has changed."""
     try:
         known = msgspec.json.decode(_path().read_bytes(), type=KnownRenderer)
-    except (OSError, RuntimeError, msgspec.DecodeError):  # RuntimeError: the account has no home
+    except (OSError, RuntimeError, msgspec.DecodeError):  # RuntimeError: the account has no home directory
         return None
     return known if known == _as_of_now(known.backend, known.renderer, known.files) else None
 
 
 def keep(backend: OpenGl, trial: Trial) -> None:
-    """Keep the renderer of a successful trial; if the file cannot be written, the next mission makes a trial too."""
+    """Save the renderer of a successful trial; if the file cannot be written, the next mission makes a trial again."""
     with contextlib.suppress(OSError, RuntimeError):
         path = _path()
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -77,13 +77,13 @@ def keep(backend: OpenGl, trial: Trial) -> None:
 
 
 def forget() -> None:
-    """Keep no renderer any more."""
+    """Delete the saved renderer."""
     with contextlib.suppress(OSError, RuntimeError):
         _path().unlink()
 
 
 def _path() -> Path:
-    """Return where the XDG base directory specification has files that may be lost."""
+    """Return the path of the file in the cache folder of the XDG base directory specification."""
     caches = os.environ.get("XDG_CACHE_HOME", "")
     return (Path(caches) if os.path.isabs(caches) else Path.home() / ".cache") / "scout-backbone" / FILE
 

@@ -1,8 +1,8 @@
-"""Find out whether this machine can render, without importing mujoco here.
+"""Determine whether this machine can render, without importing mujoco in this process.
 
-Importing mujoco with a MUJOCO_GL that does not work raises errors of many kinds or ends the process,
-so each candidate is tried in a child.  Afterwards ``prepare`` sets this process up, before the first
-import of mujoco in it.
+If MUJOCO_GL names a backend that does not work, importing mujoco raises errors of many kinds or ends the process.
+Therefore each candidate is tried in a child process. Afterwards ``prepare`` sets this process up, before it imports
+mujoco.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ log = logging.getLogger(__name__)
 
 Backend = OpenGl | Literal["none"]
 
-MISSING_PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"  # measured on bare Debian 12: these three render, fewer do not
+MISSING_PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"  # measured on bare Debian 12: all three are needed
 TRIAL_TIME_S = 20.0  # chosen: a trial takes half a second; a hanging driver must not hang a mission
 
 FOUND_FILE = "gl_support.json"
 
-_CANDIDATES: tuple[OpenGl, ...] = ("egl", "osmesa")  # OSMesa last: newer Mesa has dropped it
+_CANDIDATES: tuple[OpenGl, ...] = ("egl", "osmesa")  # OSMesa last: newer Mesa versions lack it
 _MUJOCO_GL: dict[Backend, str] = {"egl": "egl", "osmesa": "osmesa", "none": "disable"}
 
 
 @dataclass(frozen=True, slots=True)
 class GlSupport:
-    """The means to draw on this machine.
+    """The OpenGL support of this machine.
 
     Attributes:
-        backend: Which OpenGL works; ``none``: none does.
-        renderer: Its own name, such as ``llvmpipe (LLVM 15.0.6, 256 bits)``; empty without OpenGL.
-        missing_packages: Debian packages that give the rendered picture; empty with OpenGL.
+        backend: The OpenGL backend that works; ``none``: no backend works.
+        renderer: Its name, such as ``llvmpipe (LLVM 15.0.6, 256 bits)``; empty without OpenGL.
+        missing_packages: Debian packages that make rendering possible; empty if OpenGL works.
     """
 
     backend: Backend
@@ -64,10 +64,10 @@ class GlSupport:
 
 
 def probe(trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
-    """Return what can draw on this machine.
+    """Return the OpenGL support of this machine.
 
-    What drew in an earlier mission is believed to draw, see ``gl_known``. Otherwise a trial blocks for about half a
-    second, at worst two trials block for their time limit.
+    A backend that worked in an earlier mission is used without a trial; see ``gl_known``. Otherwise a trial blocks for
+    about half a second; at worst, two trials block for their time limit.
     """
     if (known := gl_known.recall()) is not None:
         return GlSupport(known.backend, known.renderer, "")
@@ -79,12 +79,12 @@ def probe(trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
 
 
 def probe_once(folder: Path, trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
-    """Return what ``probe`` finds out; of all processes that ask with this folder one does, the others wait for it.
+    """Return the result of ``probe``; of all processes that use this folder, one probes and the others wait for it.
 
-    A folder that cannot be written into makes it only slower: every process finds out for itself.
+    If the folder is not writable, every process probes for itself, which is only slower.
 
     Args:
-        folder: Lives as long as the answer is to be believed: until the machine or its drivers may be others.
+        folder: Folder for the result; delete it when the machine or its drivers may have changed.
         trial_time_s: As for ``probe``.
     """
     try:
@@ -93,11 +93,11 @@ def probe_once(folder: Path, trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
         log.warning("what can draw here is not kept for others: %s", error)
         return probe(trial_time_s)
     with file:
-        fcntl.flock(file, fcntl.LOCK_EX)  # let go with the file, also by a process that dies
+        fcntl.flock(file, fcntl.LOCK_EX)  # released when the file is closed, even if the process dies
         file.seek(0)
         try:
             return msgspec.json.decode(file.read(), type=GlSupport)
-        except msgspec.DecodeError:  # no probe ran yet, or it died while writing, or the disk was full
+        except msgspec.DecodeError:  # no probe has run yet, or it died while writing, or the disk was full
             file.truncate(0)
         support = probe(trial_time_s)
         try:
@@ -108,7 +108,7 @@ def probe_once(folder: Path, trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
 
 
 def forget(folder: Path | None) -> None:
-    """Let the next probe try, because what was believed to draw does not; ``folder`` is that of ``probe_once``."""
+    """Make the next probe try again, because the saved backend no longer works; ``folder`` as for ``probe_once``."""
     gl_known.forget()
     if folder is not None:
         with contextlib.suppress(OSError):
@@ -119,7 +119,7 @@ def prepare(backend: Backend) -> None:
     """Set this process up to draw with this backend; call it before the first import of mujoco.
 
     Raises:
-        RenderingUnavailable: Mujoco is already imported here, set up for something else.
+        RenderingUnavailable: Mujoco is already imported in this process, with another backend.
     """
     wanted = _MUJOCO_GL[backend]
     if "mujoco" in sys.modules and backend != "none" and os.environ.get("MUJOCO_GL") != wanted:
@@ -130,15 +130,15 @@ def prepare(backend: Backend) -> None:
 def _environment(backend: Backend) -> dict[str, str]:
     return {
         "MUJOCO_GL": _MUJOCO_GL[backend],
-        "LP_NUM_THREADS": "0",  # the software renderer stays on one core, at the same cost
-        "OPENBLAS_NUM_THREADS": "1",  # numpy here handles vectors too small to share
+        "LP_NUM_THREADS": "0",  # keeps the software renderer on one core, at the same cost
+        "OPENBLAS_NUM_THREADS": "1",  # numpy handles only small vectors here; threads would not help
     }
 
 
 def _try(backend: OpenGl, trial_time_s: float) -> Trial | None:
-    """Return the trial of this backend, None if it did not draw."""
+    """Return the trial of this backend; None if it drew no picture."""
     environment = {**os.environ, **_environment(backend)}
-    environment.pop("PYOPENGL_PLATFORM", None)  # mujoco sets it, a child would inherit the wrong one
+    environment.pop("PYOPENGL_PLATFORM", None)  # mujoco sets it; a child process would inherit the wrong value
     try:
         trial = subprocess.run(
             [sys.executable, "-m", "scout_model.gl_trial"],
@@ -151,6 +151,6 @@ def _try(backend: OpenGl, trial_time_s: float) -> Trial | None:
     except subprocess.TimeoutExpired:
         return None
     for line in trial.stdout.splitlines() if trial.returncode == 0 else ():
-        with contextlib.suppress(msgspec.DecodeError):  # a driver may print lines of its own
+        with contextlib.suppress(msgspec.DecodeError):  # a driver may print its own lines
             return msgspec.json.decode(line, type=Trial)
     return None

@@ -1,7 +1,7 @@
 """Draw one picture with the OpenGL that MUJOCO_GL names; print the renderer and the libraries that it loaded.
 
-Run as a program, in a process of its own, by ``gl_probe``: where OpenGL is missing, importing
-mujoco raises or aborts the process.
+``gl_probe`` runs this program in a process of its own, because without OpenGL the import of mujoco raises or aborts the
+process.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def loaded_libraries() -> list[str]:
 
 
 def main() -> int:
-    """Print the renderer's name and the paths of its libraries as JSON; return 0 if something was drawn."""
+    """Print the renderer's name and the paths of its libraries as JSON; return 0 if a picture was drawn."""
     model = mujoco.MjModel.from_xml_string(_BALL)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -1,6 +1,6 @@
-"""How far a robot leans, from its accelerometer: the smoothed direction of what holds it up.
+"""Tilt of a robot, from its accelerometer: the smoothed direction of the supporting force.
 
-A reading counts until the next one, so that a robot whose readings stay the same need not be asked.
+A reading holds until the next one, so a robot whose readings stay the same needs no update.
 """
 
 from __future__ import annotations
@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-SMOOTHING_S = 0.25  # chosen: several frames, so that a bump is no fall; well below the time of falling over and lying
+SMOOTHING_S = 0.25  # chosen: several frames, so that a bump does not count as a fall; much shorter than a fall
 
-_WEIGHTLESS_M_S2 = 1.0  # chosen: a tenth of gravity; below it the direction says nothing
+_WEIGHTLESS_M_S2 = 1.0  # chosen: a tenth of gravity; below it the direction is meaningless
 
 
 class Inclinometer:
-    """Upright until its first reading."""
+    """The tilt sensor of one robot; it reports upright until the first reading."""
 
     def __init__(self) -> None:
         self._held_m_s2 = self._smooth_m_s2 = (0.0, 0.0, 9.81)
@@ -22,7 +22,7 @@ class Inclinometer:
         self._tilt_rad = 0.0
 
     def feel(self, acceleration_m_s2: Sequence[float], now_s: float) -> None:
-        """Take a reading.
+        """Record a reading.
 
         Args:
             acceleration_m_s2: As an accelerometer measures it, forward, left and up; 9.81 up at rest.
@@ -33,7 +33,7 @@ class Inclinometer:
         self._held_m_s2 = forward, left, up
 
     def tilt_rad(self, now_s: float) -> float:
-        """Return the angle between the robot's up and the vertical, 0 to pi; in free fall the last one."""
+        """Return the angle between the robot's up axis and the vertical, 0 to pi; in free fall, the last angle."""
         self._advance(now_s)
         forward, left, up = self._smooth_m_s2
         across = math.hypot(forward, left)

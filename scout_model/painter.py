@@ -1,14 +1,14 @@
 """Camera pictures without OpenGL: the painter's algorithm on OpenCV polygons.
 
-Geoms become convex polygons once; each picture projects them, drops those that face away, and
-paints the rest from far to near, shaded by the model's own lights.  Order of painting:
+Geoms are converted to convex polygons once. For each picture the painter projects them, drops the polygons that face
+away, and paints the rest from far to near, shaded by the model's lights. Order of painting:
 
 1. floor and walls (geom group 0), behind everything because the camera is inside the room,
 2. marks on them (group 1),
 3. things (group 2), body by body; a body's marks right after the body.
 
-Which of two bodies is in front is decided by an axis-aligned plane between their bounding boxes,
-not by distance: the near corner of a long table says nothing about what stands behind its far end.
+An axis-aligned plane between two bounding boxes decides which body is in front. Distance would be wrong: a body behind
+the far end of a long table may be nearer than the table's middle.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from scout_model.dimensions import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 
 _Floats = NDArray[np.float64]
 
-_SLICES = 16  # chosen: what the OpenGL renderer is told in room.xml
+_SLICES = 16  # chosen: as for the OpenGL renderer in room.xml
 _STACKS = 8  # chosen: same
-_FLOOR_REACH_M = 100.0  # chosen: an endless plane ends beyond every room
-_SOLIDS_KEPT = 512  # chosen: those of a few worlds, some kilobytes each
+_FLOOR_REACH_M = 100.0  # chosen: size of an endless plane, beyond every room
+_SOLIDS_KEPT = 512  # chosen: meshes of a few worlds, some kilobytes each
 _NEAR_M = 0.02  # chosen: as in room.xml
 _SUBPIXEL_BITS = 4  # chosen: edges move smoothly, a sixteenth of a pixel at a time
 _DISC_M = 0.002  # chosen: a mark is a disc on a surface, not a band around a body, if half its length is no more
-_FARTHEST_PX = 1e6  # chosen: OpenCV's fixed-point coordinates hold it
+_FARTHEST_PX = 1e6  # chosen: fits OpenCV's fixed-point coordinates
 _ROOM, _MARKS, _THINGS = 0, 1, 2  # geom groups, see room.xml
 _LUMA = np.array([0.299, 0.587, 0.114])  # as OpenCV's RGB to gray
 
@@ -82,7 +82,7 @@ class Painter:
         normals = np.einsum("nij,nj->ni", rotations[self._geom_of_polygon], self._normals)
         eye_m = data.cam_xpos[camera]
         view = _View(eye_m, data.cam_xmat[camera].reshape(3, 3), float(self._model.cam_fovy[camera]), corners)
-        # From the model at each picture: what is in a dark place gets darker.
+        # Read from the model for each picture, because colors change in a dark place.
         colors = 255 * self._model.geom_rgba[self._geoms, :3] @ _LUMA
         levels = np.clip(colors[self._geom_of_polygon] * self._brightness(data, normals), 0, 255)
         is_ahead = view.is_ahead[self._corners_in_turn]
@@ -104,7 +104,7 @@ class Painter:
                 paint(geom)
             self._remembered[camera] = self._background_key(data, camera), canvas.copy()
         own_body = self._model.body_rootid[self._model.cam_bodyid[camera]]
-        # What is out of the picture must not take part in the order either: a remembered picture does not know of it.
+        # A body outside the picture must not affect the order either, because the cache key ignores it.
         others = [
             thing
             for thing in self._things
@@ -121,15 +121,15 @@ class Painter:
         return canvas
 
     def close(self) -> None:
-        """Do nothing: OpenCV holds nothing."""
+        """Do nothing: OpenCV holds no resources."""
 
     def _background_as_before(self, data: mujoco.MjData, camera: int) -> NDArray[np.uint8] | None:
-        """Return a copy of the room as this camera saw it last; None if it would look different now."""
+        """Return a copy of this camera's last background; None if the room would look different now."""
         key, picture = self._remembered.get(camera, (b"", None))
         return picture.copy() if picture is not None and key == self._background_key(data, camera) else None
 
     def _background_key(self, data: mujoco.MjData, camera: int) -> bytes:
-        """Return bytes that are the same if the room looks the same: camera, lights and colors; it does not move."""
+        """Return a cache key for the room: camera, lights and colors; the room itself does not move."""
         seen = (data.cam_xpos[camera], data.cam_xmat[camera], data.light_xdir, self._model.geom_rgba[self._room_geoms])
         return b"".join(part.tobytes() for part in seen)
 
@@ -156,7 +156,7 @@ class Painter:
         )
 
     def _brightness(self, data: mujoco.MjData, normals: _Floats) -> _Floats:
-        """Return what share of its own color each polygon shows, as OpenGL's fixed lighting has it."""
+        """Return the brightness of each polygon as a share of its color, by OpenGL's fixed lighting model."""
         model = self._model
         brightness: _Floats = np.full(len(normals), float(model.vis.headlight.ambient @ _LUMA))
         for light in range(model.nlight):
@@ -167,7 +167,7 @@ class Painter:
 
 @dataclass(frozen=True, slots=True)
 class _Thing:
-    """A unit of painting: geoms with a body of their own, and the corners that bound them."""
+    """A unit of painting: the geoms of one body, and the corners of their bounding box."""
 
     solids: NDArray[np.intp]
     marks: list[int]
@@ -187,13 +187,13 @@ class _View:
         self._corners[:, 2] *= -1
         self.is_ahead = self._corners[:, 2] >= _NEAR_M
         right, up, ahead = self._corners.T
-        # A line is drawn up to a pixel wider than it is.
+        # A line is drawn up to a pixel wider than its true width.
         across, upwards = ((size / 2 + 2) / self._focal_px * ahead for size in (PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX))
         self._is_out = np.stack([~self.is_ahead, right > across, right < -across, up > upwards, up < -upwards])
         self._pixels = self._project(np.where(self.is_ahead[:, np.newaxis], self._corners, 1.0))
 
     def is_beside(self, corners: NDArray[np.intp]) -> bool:
-        """Return whether all these corners are behind the camera or beyond one and the same edge of the picture."""
+        """Return whether all these corners are behind the camera or beyond the same edge of the picture."""
         return bool(self._is_out[:, corners].all(axis=1).any())
 
     def fill(self, canvas: NDArray[np.uint8], polygon: NDArray[np.intp], level: float, *, is_whole: bool) -> None:
@@ -208,7 +208,7 @@ class _View:
 
     def _project(self, corners: _Floats) -> NDArray[np.int32]:
         scale = self._focal_px / corners[:, 2]
-        # OpenCV's whole coordinates are the middles of pixels.
+        # In OpenCV an integer coordinate is the middle of a pixel.
         columns = PICTURE_WIDTH_PX / 2 - 0.5 + corners[:, 0] * scale
         rows = PICTURE_HEIGHT_PX / 2 - 0.5 - corners[:, 1] * scale
         pixels = np.clip(np.stack([columns, rows], axis=1), -_FARTHEST_PX, _FARTHEST_PX)
@@ -216,7 +216,7 @@ class _View:
 
 
 def _clip_near(corners: _Floats) -> _Floats:
-    """Return the part of a convex polygon that lies beyond the near plane; some corner does."""
+    """Return the part of a convex polygon beyond the near plane; at least one corner must be beyond it."""
     kept: list[_Floats] = []
     for here, there in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if here[2] >= _NEAR_M:
@@ -227,12 +227,12 @@ def _clip_near(corners: _Floats) -> _Floats:
 
 
 def _far_to_near(lows: _Floats, highs: _Floats, eye_m: _Floats) -> list[int]:
-    """Return an order in which no box is painted over by one behind it, if there is such an order.
+    """Return an order in which no box is painted over by a box behind it, if such an order exists.
 
     Args:
         lows: Least corner of each box, shape (n, 3).
         highs: Greatest corner of each box.
-        eye_m: Where they are seen from.
+        eye_m: Position of the camera.
     """
     if len(lows) == 0:
         return []
@@ -244,7 +244,7 @@ def _far_to_near(lows: _Floats, highs: _Floats, eye_m: _Floats) -> list[int]:
     left = [int(number) for number in np.argsort(-distances_m, kind="stable")]
     order: list[int] = []
     while left:
-        # Boxes can hide each other in a ring; then distance decides.
+        # Boxes can hide each other in a cycle; then distance decides.
         free = next((number for number in left if not hides[number, left].any()), left[0])
         left.remove(free)
         order.append(free)
@@ -264,7 +264,7 @@ def _mesh(model: mujoco.MjModel, geom: int) -> _Mesh:
 
 @functools.lru_cache(maxsize=_SOLIDS_KEPT)
 def _solid(kind: mujoco.mjtGeom, size_m: tuple[float, float, float], *, is_mark: bool) -> _Mesh | None:
-    """Return a shape of this size, which only is read; None: of an unknown kind."""
+    """Return a shape of this size, read-only; None: the kind is unknown."""
     match kind:
         case mujoco.mjtGeom.mjGEOM_PLANE:
             reach = _FLOOR_REACH_M
@@ -274,7 +274,7 @@ def _solid(kind: mujoco.mjtGeom, size_m: tuple[float, float, float], *, is_mark:
             signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
             sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
             if is_mark:
-                # OpenCV paints a polygon's outline too, and a mark's thin edges would become lines.
+                # OpenCV also paints a polygon's outline, so a mark's thin edges would become lines.
                 thin = 2 * size_m.index(min(size_m))
                 sides = sides[thin : thin + 2]
             return _polyhedron(signs * np.array(size_m), sides)
@@ -303,7 +303,7 @@ def _polyhedron(corners: _Floats, polygons: list[list[int]]) -> _Mesh:
 
 
 def _cylinder(radius_m: float, half_length_m: float, *, has_lids: bool) -> _Mesh:
-    """Return a cylinder along z. The band that marks a body has no lids: they would cover what stands on it."""
+    """Return a cylinder along z. A band that marks a body has no lids, because they would cover things on the body."""
     angles = 2 * np.pi * np.arange(_SLICES) / _SLICES
     ring = np.stack([radius_m * np.cos(angles), radius_m * np.sin(angles)], axis=1)
     levels_m = np.repeat([-half_length_m, half_length_m], _SLICES)[:, np.newaxis]
@@ -316,7 +316,7 @@ def _cylinder(radius_m: float, half_length_m: float, *, has_lids: bool) -> _Mesh
 
 
 def _disc(radius_m: float, half_length_m: float) -> _Mesh:
-    """Return the lid at the end of a flat cylinder: a mark is seen from the side its surface is seen from."""
+    """Return the lid of a flat cylinder: a mark is visible from the same side as its surface."""
     angles = 2 * np.pi * np.arange(_SLICES) / _SLICES
     ring = [[radius_m * math.cos(angle), radius_m * math.sin(angle), half_length_m] for angle in angles]
     return _polyhedron(np.array(ring), [list(range(_SLICES))])

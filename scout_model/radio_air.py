@@ -1,9 +1,8 @@
-"""The command radio's air: which packets reach their robots, and when.
+"""The command radio's air: decides which packets reach their robots, and when.
 
 A packet arrives whole or not at all.  It is lost with a probability that grows with its length and the
-robot's distance.  Whether it is depends on seed, radio and the packet's number alone, so a packet more
-or less on one radio changes the fate of none on another.  Replies of robots fly in an air of
-their own, with other dice: a reply changes the fate of no packet.
+robot's distance. Besides that, a loss depends only on seed, radio and the packet's number, so an additional packet on
+one radio affects no packet on another. Replies have their own random numbers, so a reply affects no packet.
 
 IROS 2001, section 2: each robot has a network id of its own, which lets one radio serve many.
 """
@@ -30,11 +29,11 @@ class Sent:
     """A packet as it leaves a radio.
 
     Attributes:
-        number: Of the packet among those of its radio, 0 or more.
-        network_id: Robot it is for.
+        number: Number of the packet on its radio, 0 or more.
+        network_id: Network id of the receiving robot.
         payload: As ``scout_model.radio_link`` encodes it.
-        begun_s: When its first bit was sent.
-        air_time_s: How long its bits take, 0 or more.
+        begun_s: Time of its first bit.
+        air_time_s: Duration of its bits, 0 or more.
         asks: Whether it asks its robot for a reply.
     """
 
@@ -48,11 +47,11 @@ class Sent:
 
 
 class RadioAir:
-    """Packets between the base's antenna and the robots, one way.
+    """Packets in one direction between the base's antenna and the robots.
 
     Args:
         air: Delays and losses of packets.
-        way: Name of the way, which gives it dice of its own; empty: to the robots.
+        way: Name of the direction; each has its own random numbers. Empty: to the robots.
     """
 
     def __init__(self, seed: int, air: AirDescription, way: str = "") -> None:
@@ -89,13 +88,13 @@ class RadioAir:
         else:
             at_s = sent.begun_s + sent.air_time_s + away_m / LIGHT_M_PER_S + self._air.radio_delay_s
             last_s = self._last_s.get(sent.network_id, at_s)
-            if at_s < last_s <= at_s + COMMAND_TIMEOUT_S:  # a robot that waits longer has stopped by itself
+            if at_s < last_s <= at_s + COMMAND_TIMEOUT_S:  # after a longer wait a robot has stopped by itself
                 at_s = last_s
             self._last_s[sent.network_id] = at_s
             heapq.heappush(self._flying, (at_s, next(self._order), sent))
 
     def arrived(self, now_s: float) -> list[Sent]:
-        """Return the packets that have arrived by now and were not returned before, in the order of arrival."""
+        """Return the packets that have arrived since the last call, in order of arrival."""
         arrived = []
         while self._flying and self._flying[0][0] <= now_s:
             _, _, sent = heapq.heappop(self._flying)

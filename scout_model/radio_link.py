@@ -1,15 +1,14 @@
-"""The command radio's packets: what a Scout understands and answers, as bytes.
+"""The command radio's packets: encoding and decoding of a Scout's commands and replies.
 
-A packet is one byte that says which command it is, then the command's values in network byte order:
+A packet is one byte for the command, followed by the command's values in network byte order:
 
 * ``D`` drive: two 32-bit floats, left and right wheel in rad/s, forward is positive
-* ``H`` halt, ``J`` jump, ``S`` safe, ``X`` transmitter off: nothing more
+* ``H`` halt, ``J`` jump, ``S`` safe, ``X`` transmitter off: no values
 * ``V`` transmitter on: name of the video frequency, 1 to 15 ASCII characters
 
-Its answer is ``R``, then one byte each for the charge of its battery, its tilt (255 is upside down) and the load of
-its motors.
+The Scout's reply is ``R``, then one byte each for battery charge, tilt (255: upside down) and load of the motors.
 
-The network id that addresses a Scout is the radio's business and stands outside of the payload.
+The radio adds the network id of the addressed Scout outside of the payload.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ MAX_FREQUENCY_NAME_BYTES = 15  # chosen: a transmitter-on packet then has 16 byt
 HEAD_BYTES = 3  # chosen: network id and a check sum of two bytes
 BITS_PER_BYTE = 10  # chosen: serial, with a start and a stop bit
 FIRST_NETWORK_ID = 1
-LAST_NETWORK_ID = 254  # chosen: one byte, without all zeros and all ones
+LAST_NETWORK_ID = 254  # chosen: one byte, without 0 and 255
 
 _DRIVE = struct.Struct("!ff")
 _REPLY = struct.Struct("!cBBB")
@@ -45,7 +44,7 @@ class HaltPacket:
 
 @dataclass(frozen=True, slots=True)
 class JumpPacket:
-    """Lower the foot, kick, wind the spring again."""
+    """Lower the foot, kick, rewind the spring."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +66,12 @@ class Safe:
 
 @dataclass(frozen=True, slots=True)
 class ScoutReply:
-    """What a Scout answers.
+    """A Scout's reply.
 
     Attributes:
         battery: Charge of its battery, 0 to 1.
-        tilt_rad: Angle between its up and the vertical, 0 to pi.
-        load: How hard its motors work, 0 to 1.
+        tilt_rad: Angle between its up axis and the vertical, 0 to pi.
+        load: Load of its motors, 0 to 1.
     """
 
     battery: float
@@ -84,7 +83,7 @@ Packet = DrivePacket | HaltPacket | JumpPacket | TransmitterOn | TransmitterOff 
 
 
 def packet_bits(payload: bytes) -> int:
-    """Return how many bits a packet with this payload has on the air, its head included.
+    """Return the size in bits of a packet with this payload on the air, header included.
 
     Example:
         >>> packet_bits(encode_halt())
@@ -138,10 +137,10 @@ def encode_safe() -> bytes:
 
 
 def decode(payload: bytes) -> Packet:
-    """Return what the packet says.
+    """Decode a packet to a Scout.
 
     Raises:
-        MalformedPacket: The bytes are no packet.
+        MalformedPacket: The bytes are not a packet.
 
     Example:
         >>> decode(encode_drive(1.0, -1.0))
@@ -167,7 +166,7 @@ def decode(payload: bytes) -> Packet:
 
 
 def encode_reply(reply: ScoutReply) -> bytes:
-    """Return the answer as bytes; its numbers are rounded to a 255th of their range.
+    """Return the reply as bytes; each number is rounded to a 255th of its range.
 
     Raises:
         MalformedPacket: A number is outside its range.
@@ -178,10 +177,10 @@ def encode_reply(reply: ScoutReply) -> bytes:
 
 
 def decode_reply(payload: bytes) -> ScoutReply:
-    """Return what a Scout answered.
+    """Decode a Scout's reply.
 
     Raises:
-        MalformedPacket: The bytes are no answer of a Scout.
+        MalformedPacket: The bytes are not a reply of a Scout.
     """
     if len(payload) != _REPLY.size or payload[:1] != b"R":
         raise MalformedPacket(f"{payload!r} is no answer of a Scout")
@@ -193,7 +192,7 @@ def share_to_byte(share: float) -> int:
     """Return a share, 0 to 1, as a byte, 0 to 255.
 
     Raises:
-        MalformedPacket: It is no share.
+        MalformedPacket: The number is outside 0 to 1.
     """
     if not 0.0 <= share <= 1.0:
         raise MalformedPacket(f"{share} is not between 0 and 1")
@@ -201,7 +200,7 @@ def share_to_byte(share: float) -> int:
 
 
 def byte_to_share(byte: int) -> float:
-    """Return the share, 0 to 1, that a byte stands for."""
+    """Return the share, 0 to 1, that a byte encodes."""
     return byte / 255
 
 

@@ -1,7 +1,7 @@
-"""The sensors of the robots' bodies: from MuJoCo's array of all readings to the programs on board.
+"""The sensors of the robots' bodies: passes readings from MuJoCo's array to the on-board programs.
 
-Sensors cost time and change no motion, so they are computed in the last step of a frame only, and in a world where no
-robot feels never. A reading is of the moment before that step.
+Sensors cost time and change no motion. So they are computed only in the last step of a frame, and never in a world
+without a ``FeelingRobot``. A reading shows the moment before that step.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scout_model.robot import FeelingRobot, Robot
 
 
 class Senses:
-    """The sensors of all robots that feel; each felt those of its body once, as they read now."""
+    """The sensors of all feeling robots; the constructor passes the present readings to each robot once."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, programs: Mapping[str, Robot]) -> None:
         self._model, self._data, self._option = model, data, model.opt
@@ -31,7 +31,7 @@ class Senses:
         self._option.disableflags = self._off
 
     def step(self) -> None:
-        """Advance the world by one step, and compute what the sensors read at its beginning."""
+        """Advance the world by one step, and compute the sensor readings at the beginning of the step."""
         if not self._bodies:
             mujoco.mj_step(self._model, self._data)
             return
@@ -40,7 +40,7 @@ class Senses:
         self._option.disableflags = self._off
 
     def update(self, now_s: float) -> None:
-        """Let each robot feel its sensors, unless all of them read the same as before."""
+        """Pass the readings to each robot, unless all its readings are unchanged."""
         if not self._bodies:
             return
         readings = self._data.sensordata
@@ -53,7 +53,7 @@ class Senses:
 
 
 class _BodySenses:
-    """Where the readings of one robot's body are in MuJoCo's array."""
+    """Places of one robot's readings in MuJoCo's array."""
 
     def __init__(self, model: mujoco.MjModel, robot: str, program: FeelingRobot) -> None:
         prefix = f"{robot}/"

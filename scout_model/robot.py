@@ -1,7 +1,7 @@
-"""A kind of robot in the simulated world: one MJCF file and one class.
+"""Interface of a kind of robot in the simulated world: one MJCF file and one class.
 
-The class names the robot's body, receives its packets, and drives its actuators. A mission names
-it by its class path, so a new kind needs no change in this package.
+The class names the robot's body, receives its packets and drives its actuators. A mission file names the class path, so
+a new kind needs no change in this package.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ _CLASS_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 @runtime_checkable
 class Robot(Protocol):
-    """A robot's on-board program, made without arguments; time only grows from call to call."""
+    """A robot's on-board program. The constructor has no arguments; time never decreases between calls."""
 
     @classmethod
     def body_mjcf(cls) -> str:
         """Return the body as MJCF, without ``<option>`` and ``<visual>``.
 
-        Its root is a body ``body`` with a free joint ``free``; the origin is what the mission file places, on the
-        floor.  A camera ``camera``, if there is one, is what its transmitter sends.  Actuators have names.
+        Its root is a body ``body`` with a free joint ``free``; the mission file places the body's origin, on the floor.
+        The transmitter sends the picture of the camera ``camera``, if there is one. Actuators have names.
         """
 
     @property
@@ -36,24 +36,24 @@ class Robot(Protocol):
 
     @property
     def motors(self) -> float:
-        """How hard its motors are driven, 0 to 1; they disturb its own picture."""
+        """Load of its motors, 0 to 1; they disturb its own picture."""
 
     def hear(self, payload: bytes, now_s: float) -> None:
         """Obey one packet; ignore and count it if it is malformed."""
 
     def controls(self, now_s: float) -> Mapping[str, float]:
-        """Advance to this time; return actuator → what it shall do. All zero means that the robot may stand still."""
+        """Advance to this time; return actuator → control. If all controls are zero, the robot may stand still."""
 
     def counts(self) -> Mapping[str, int]:
-        """Return what it counted since it was switched on, by name."""
+        """Return the counts since power-on, by name."""
 
 
 @runtime_checkable
 class FeelingRobot(Robot, Protocol):
-    """A robot that feels the sensors of its body."""
+    """A robot that receives the readings of its body's sensors."""
 
     def feel(self, readings: Mapping[str, Sequence[float]], now_s: float) -> None:
-        """Take the newest reading of each MJCF sensor of its body, by the sensor's name there.
+        """Record the newest reading of each MJCF sensor of its body, by the sensor's name.
 
         Called at the beginning and after each frame, but not while all readings stay the same.
         """
@@ -61,15 +61,15 @@ class FeelingRobot(Robot, Protocol):
 
 @runtime_checkable
 class AnsweringRobot(Robot, Protocol):
-    """A robot that answers on the digital link."""
+    """A robot that replies on the digital link."""
 
     def reply(self, now_s: float) -> bytes:
-        """Return its answer to the packets it heard since its last answer; empty: nothing to say."""
+        """Return the reply to the packets since the last reply; empty: no reply."""
 
 
 @runtime_checkable
 class PoweredRobot(Robot, Protocol):
-    """A robot that lives on a battery, which a world may replace by one of another capacity before its first frame."""
+    """A robot with a battery; before the first frame, a world may replace it by one of another capacity."""
 
     battery: Battery
 
@@ -81,7 +81,7 @@ def robot_class(kind: str) -> type[Robot]:
         kind: Class path ``package.module:Class``.
 
     Raises:
-        InvalidWorld: There is no such class, or it is no kind of robot.
+        InvalidWorld: There is no such class, or it does not have the methods of ``Robot``.
     """
     if not _CLASS_PATH.fullmatch(kind):
         raise InvalidWorld(f"{kind!r} is no class path; write package.module:Class")

@@ -1,8 +1,8 @@
-"""A room of the user's own, from one MJCF file.
+"""The user's own room, from one MJCF file.
 
-What stands in it takes the place of walls and marks; a plane in it takes the place of the floor, a light
-in it that of the sun.  How fast and how exactly the world steps is not the room's business: ``<option>``
-and the like are passed over.  In the world's model the room's names begin with ``room/``.
+The bodies of the file replace walls and marks; a plane in it replaces the floor, a light in it replaces the sun.
+Settings of the simulation, such as ``<option>``, are ignored. In the world's model the room's names begin with
+``room/``.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ def add_room(spec: mujoco.MjSpec, mjcf: str) -> None:
 
     Args:
         spec: MuJoCo's specification of the world.
-        mjcf: The room; every file it needs must stand in it.
+        mjcf: The room, without references to other files.
 
     Raises:
-        InvalidRoom: MuJoCo cannot read or build it, or it has shapes that no camera draws.
+        InvalidRoom: MuJoCo cannot read or build the room, or it has shapes that no camera draws.
     """
     if "<mujoco" not in mjcf:
         raise InvalidRoom("the room's file is no MJCF: it has no <mujoco>")
@@ -49,7 +49,7 @@ def add_room(spec: mujoco.MjSpec, mjcf: str) -> None:
     for geom in room.geoms:
         if geom.type not in _SHOWN:
             raise InvalidRoom(f"no camera draws the room's geom {geom.name!r}; use boxes, cylinders or meshes")
-        # What a file does not say is in MuJoCo's group 0, which is painted behind everything.
+        # A geom without a group is in MuJoCo's group 0, which is painted behind everything.
         if geom.group == _ROOM and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
             geom.group = _THINGS
     if any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in room.geoms):

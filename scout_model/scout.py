@@ -1,13 +1,13 @@
 """The Scout's firmware: the robot's reactions to packets.
 
-Packets and time go in, positions of the actuators come out; physics is the world's business.
+Packets and time go in, actuator positions come out; the world computes the physics.
 
 Rules:
 
-* A packet that is none changes nothing, also not the watchdog.
-* Without a packet for ``COMMAND_TIMEOUT_S`` the wheels stop and the transmitter goes off.
-* A jump is preload, kick, rewind.  Until the spring is wound another jump is refused.  Halt, safe
-  and the watchdog stop a jump that has not kicked yet; a released spring cannot be stopped.
+* A malformed packet changes nothing and does not reset the watchdog.
+* If no packet arrives for ``COMMAND_TIMEOUT_S``, the wheels stop and the transmitter switches off.
+* A jump has three phases: preload, kick, rewind. Until the spring is wound, another jump is refused. Halt, safe and the
+watchdog stop a jump before its kick; a released spring cannot be stopped.
 
 Source: IROS 2001, section 2: the on-board processors do communications and actuator control only.
 """
@@ -69,8 +69,8 @@ class Actuation(NamedTuple):
     Attributes:
         left_rad_s: Left wheel, forward is positive, within ``WHEEL_SPEED_LIMIT_RAD_S``.
         right_rad_s: Right wheel.
-        kick: True while the latch of the spring is open.
-        winch_m: How far the winch lets the foot out, 0 to ``FOOT_STROKE_M``.
+        kick: True while the spring's latch is open.
+        winch_m: Length of line that the winch has paid out for the foot, 0 to ``FOOT_STROKE_M``.
     """
 
     left_rad_s: float
@@ -81,13 +81,13 @@ class Actuation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FirmwareStatistics:
-    """Counted since the robot was switched on.
+    """Counts since the robot was switched on.
 
     Attributes:
         heard: Packets obeyed.
-        malformed: Packets ignored because they were none.
-        refused_jumps: Jumps asked for while the spring was not wound.
-        timeouts: Times the watchdog stopped wheels or transmitter.
+        malformed: Packets ignored because they were malformed.
+        refused_jumps: Jumps refused because the spring was not wound.
+        timeouts: How often the watchdog stopped wheels or transmitter.
     """
 
     heard: int
@@ -97,7 +97,7 @@ class FirmwareStatistics:
 
 
 def clip_wheel_speed(speed_rad_s: float) -> float:
-    """Return the speed the wheel is really driven at when asked for this one.
+    """Return the wheel speed clipped to the motor's limit.
 
     Example:
         >>> clip_wheel_speed(-100.0)
@@ -107,7 +107,7 @@ def clip_wheel_speed(speed_rad_s: float) -> float:
 
 
 def wheels_rad_s(forward_m_s: float, turn_rad_s: float) -> tuple[float, float]:
-    """Return the speeds of the left and the right wheel that give this motion; left turns are positive.
+    """Return the speeds of the left and the right wheel for this motion; left turns are positive.
 
     Example:
         >>> wheels_rad_s(0.2, 0.0)
@@ -118,7 +118,7 @@ def wheels_rad_s(forward_m_s: float, turn_rad_s: float) -> tuple[float, float]:
 
 
 def motion_of_wheels(left_rad_s: float, right_rad_s: float) -> tuple[float, float]:
-    """Return the motion that these wheel speeds give: forward in meters, turning in radians a second.
+    """Return the motion of these wheel speeds: forward in meters, turning in radians a second.
 
     Example:
         >>> motion_of_wheels(10.0, 10.0)
@@ -181,7 +181,7 @@ class Firmware:
                 assert_never(packet)
 
     def tick(self, now_s: float) -> Actuation:
-        """Advance watchdog and jump to this time and return what the actuators shall do."""
+        """Advance watchdog and jump to this time and return the actuator controls."""
         is_active = self._left_rad_s or self._right_rad_s or self._frequency or self.spring is Spring.PRELOADING
         if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
             self._timeouts += 1
@@ -202,7 +202,7 @@ class Firmware:
         if self.spring is not Spring.WOUND:
             self._refused_jumps += 1
             return
-        # A body that rolls while its foot is on the floor trips over it.
+        # A body that rolls while its foot is on the floor trips over the foot.
         self._left_rad_s = self._right_rad_s = 0.0
         self._enter(Spring.PRELOADING, now_s)
 
@@ -214,7 +214,7 @@ class Firmware:
         self.spring, self._spring_since_s = spring, now_s
 
     def _advance_spring(self, now_s: float) -> float:
-        """Return how far the winch lets the foot out."""
+        """Advance the jump to this time and return the length paid out by the winch."""
         elapsed_s = now_s - self._spring_since_s
         match self.spring:
             case Spring.WOUND:
@@ -241,14 +241,14 @@ class Firmware:
 class Scout(Firmware):
     """The Scout as a kind of robot: the body of ``scout.xml``, its battery, and the firmware's actuation by actuator.
 
-    Once its battery is empty it hears nothing, its wheels are not driven and its transmitter is off; the winch and the
-    latch of its spring stay as they are.
+    If the battery is empty, the Scout receives nothing, its wheels are not driven and its transmitter is off; winch and
+    latch of the spring stay as they are.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.battery = Battery(BATTERY_J)
-        """What it lives on."""
+        """The battery."""
         self._inclinometer = Inclinometer()
         self._load = 0.0
         self._draws: tuple[float, bool] | None = None
@@ -262,29 +262,29 @@ class Scout(Firmware):
 
     @property
     def motors(self) -> float:
-        """How hard its motors are driven, 0 to 1."""
+        """Load of its motors, 0 to 1."""
         return max(abs(self._left_rad_s), abs(self._right_rad_s)) / WHEEL_SPEED_LIMIT_RAD_S
 
     def hear(self, payload: bytes, now_s: float) -> None:
-        """Obey one packet, as long as there is power; see ``Firmware.hear``."""
+        """Obey one packet unless the battery is empty; see ``Firmware.hear``."""
         if not self.battery.is_empty(now_s):
             super().hear(payload, now_s)
 
     def feel(self, readings: Mapping[str, Sequence[float]], now_s: float) -> None:
-        """Take the readings of accelerometer and motor currents."""
+        """Record the readings of accelerometer and motor currents."""
         self._inclinometer.feel(readings["accelerometer"], now_s)
         torque_n_m = abs(readings["left_torque"][0]) + abs(readings["right_torque"][0])
         self._load = min(1.0, torque_n_m / (2 * WHEEL_TORQUE_LIMIT_N_M))
 
     def reply(self, now_s: float) -> bytes:
-        """Return charge, tilt and load if it obeyed a packet since its last answer; else nothing."""
+        """Return charge, tilt and load as a packet; empty if the Scout obeyed no packet since its last reply."""
         if self._answered == self._heard or self.battery.is_empty(now_s):
             return b""
         self._answered = self._heard
         return encode_reply(ScoutReply(self.battery.share(now_s), self._inclinometer.tilt_rad(now_s), self._load))
 
     def controls(self, now_s: float) -> dict[str, float]:
-        """Advance to this time and return what the actuators shall do."""
+        """Advance to this time and return the actuator controls."""
         if self.battery.is_empty(now_s):
             self._safe(now_s)
             self._actuation = self._actuation._replace(left_rad_s=0.0, right_rad_s=0.0)

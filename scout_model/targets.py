@@ -1,4 +1,4 @@
-"""Place of a target: a pure function of time, so every trial meets the same target."""
+"""Pose of a target: a pure function of time, so the target moves the same in every trial."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ LEGS = ("left_leg", "right_leg")
 
 @dataclass(frozen=True, slots=True)
 class TargetState:
-    """A target at one time.
+    """The state of a target at one time.
 
     Attributes:
         x_m: Position.
         y_m: Position.
-        heading_rad: Direction of its last or next movement.
-        walked_m: Way behind it since the path's end it came from.
+        heading_rad: Direction of its present motion; at rest, of its last or next motion.
+        walked_m: Way since the end of the path that it left last.
     """
 
     x_m: float
@@ -33,11 +33,11 @@ class TargetState:
 
 @dataclass(frozen=True, slots=True)
 class PartPose:
-    """A body in the model that belongs to a target.
+    """The pose of one of the bodies that form a target.
 
     Attributes:
         body: Name: the target's, or ``<target>/left_leg`` and ``<target>/right_leg`` of a person.
-        position_m: Origin: on the floor, of a leg in the hip.
+        position_m: Origin: on the floor; for a leg, in the hip.
         quaternion: Orientation, real part first.
     """
 
@@ -52,7 +52,7 @@ def path_length_m(path: list[tuple[float, float]]) -> float:
 
 
 class Route:
-    """The way of one target, worked out once for many questions."""
+    """The route of one target, precomputed for many questions."""
 
     def __init__(self, target: Target) -> None:
         self._target = target
@@ -75,8 +75,8 @@ class Route:
 def where(target: Target, time_s: float) -> TargetState:
     """Return the target's pose at this world time.
 
-    Before ``begin_s`` it stands at the first point.  Then it moves to the last, rests, and comes
-    back along the path (and rests again) or is at the first point at once.
+    Before ``begin_s`` the target stands at the first point. Then it moves to the last point and rests. With
+    ``there_and_back`` it returns along the path and rests again; otherwise it appears at the first point at once.
 
     Example:
         >>> there = Target("p", "pioneer", [(0.0, 3.0), (9.0, 3.0)], speed_m_s=0.5, rest_s=2.0)
@@ -87,12 +87,12 @@ def where(target: Target, time_s: float) -> TargetState:
 
 
 def part_poses(target: Target, time_s: float) -> list[PartPose]:
-    """Return the poses of all bodies the target is made of at this world time, always in the same order."""
+    """Return the poses of all bodies of the target at this world time, always in the same order."""
     return parts(target, where(target, time_s))
 
 
 def parts(target: Target, pose: TargetState) -> list[PartPose]:
-    """Return the poses of all bodies the target is made of when it is here, always in the same order."""
+    """Return the poses of all bodies of the target in this state, always in the same order."""
     bodies = [PartPose(target.name, (pose.x_m, pose.y_m, 0.0), _turned(pose.heading_rad, 0.0))]
     if target.shape == "person":
         swing_rad = PERSON_SWING_RAD * math.sin(2 * math.pi * pose.walked_m / PERSON_STRIDE_M)

@@ -1,13 +1,11 @@
-"""The analog video link: what a receiver tuned to a frequency gets, and the framegrabber behind it hands over.
+"""The analog video link: the frames that a tuned receiver and its framegrabber deliver.
 
-IROS 2001, section 2: only one robot can transmit on a frequency at a time; signals of several
-interfere with each other and become useless.  Without a transmitter there is snow.  RAM 2002, "Visual
-Servoing" and "Distributed Surveillance Task": motors tear lines, multipath makes ghosts, weak signals
-leave partial images.
+IROS 2001, section 2: only one robot can transmit on a frequency at a time; several signals interfere with each other
+and become useless. Without a transmitter there is snow. RAM 2002, "Visual Servoing" and "Distributed Surveillance
+Task": motors tear lines, multipath makes ghosts, weak signals leave partial images.
 
-Rule: what becomes of a frame depends on the receiver's seed, frequency and air, on the frame's number
-and signals, and on what was received since the receiver was tuned; nothing else.  Each effect has
-random numbers of its own, so that switching one off changes no other.
+Rule: a received frame depends only on the receiver's seed, frequency and air, on the frame's number and signals, and on
+the frames received since tuning. Each effect has its own random numbers, so switching one effect off changes no other.
 """
 
 from __future__ import annotations
@@ -27,23 +25,23 @@ from scout_model.description import AirDescription
 from scout_model.dimensions import FRAMES_PER_S, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from scout_model.grain import Grain, Picture
 
-SETTLING_S = 0.25  # chosen: with the 0.3 s a mission gives a frequency to connect, the first picture used is still
+SETTLING_S = 0.25  # chosen: with a mission's 0.3 s for connecting a frequency, the first picture used is steady
 SNOW_LEVELS = 70.0  # chosen: standard deviation in grey levels; black and white specks all over
 FAINTEST_LEVELS = 0.1  # chosen: a weaker grain is rounded away
 WEAK_DB = 16.0  # chosen: below, contrast fades towards gray
 TEARS = 5.0  # chosen: lines in a frame while both motors run at full speed
-STRAY_TEARS = 0.01  # chosen: lines in a frame while they stand still, from other people's switches
-GHOST = 0.08  # chosen: power of the echoes makes them this strong on average, of the picture
-GHOST_SEEN = 0.2  # chosen: a fainter one is no reason to call a frame unclean
-GHOST_SHIFT_PX = 9  # chosen: 1.5 microseconds later, an echo from 250 m more of way, or one inside the receiver
+STRAY_TEARS = 0.01  # chosen: lines in a frame while the motors stand still, from other electrical devices
+GHOST = 0.08  # chosen: average strength of the echoes, as a share of the picture's
+GHOST_SEEN = 0.2  # chosen: a frame with a fainter ghost still counts as clean
+GHOST_SHIFT_PX = 9  # chosen: 1.5 microseconds: an echo with a detour of 250 m, or a reflection inside the receiver
 PARTIAL = 0.01  # chosen: share of frames the framegrabber leaves incomplete while the signal is good
-PARTIAL_IN_FADE = 0.5  # chosen: RAM 2002 blames partial images on signals that are "bad enough"
+PARTIAL_IN_FADE = 0.5  # chosen: RAM 2002 attributes partial images to signals that are "bad enough"
 
 _BANK_MARGIN_PX = 128  # chosen: 16 384 different windows into the noise, drawn once instead of every frame
 _GARBAGE_SHIFT_PX = 60  # chosen: rows tear by up to a fifth of the picture's width
-_SLIP_PX = (2.0, 10.0)  # chosen: how far a row slips past the one above, at the edge and in the depth of a fade
-_OFF_LEVELS = (60.0, 120.0)  # chosen: how far black is off in a fade; RAM 2002: whole rows look "drastically different"
-_CLAMP_ROWS = 6  # chosen: so many rows until the receiver tries to find black again
+_SLIP_PX = (2.0, 10.0)  # chosen: shift of a row against the row above, at the edge and in the depth of a fade
+_OFF_LEVELS = (60.0, 120.0)  # chosen: error of black in a fade; RAM 2002: whole rows look "drastically different"
+_CLAMP_ROWS = 6  # chosen: rows until the receiver determines the black level again
 _LONG_AGO = -1_000_000
 
 
@@ -67,7 +65,7 @@ class Signal:
     Attributes:
         picture: Of its camera: grey levels 0 to 255, shape (240, 320), row 0 on top. It is only read.
         distance_m: From the receiver's antenna, above 0.
-        motors: How fast its wheels turn, 0 to 1 of their limit, both on average.
+        motors: Average speed of both wheels, 0 to 1 of their limit.
         on_since_frame: First frame in which its transmitter was on at this frequency.
     """
 
@@ -84,8 +82,8 @@ class Reception:
 
     Attributes:
         picture: Grey levels 0 to 255, shape (240, 320), row 0 on top.
-        transmitters: How many robots sent on the frequency; the picture means something only if it is 1.
-        kind: What is worst about it.
+        transmitters: Number of robots that transmit on the frequency; the picture is meaningful only if it is 1.
+        kind: Worst fault of the frame.
     """
 
     picture: Picture
@@ -94,7 +92,7 @@ class Reception:
 
 
 class _Effect(IntEnum):
-    """Which random numbers."""
+    """Streams of random numbers, one for each effect."""
 
     WHETHER = 0
     TEARS = 1
@@ -107,7 +105,7 @@ class _Effect(IntEnum):
 
 
 class _Dice:
-    """What is drawn for every frame, whether an effect is on or not; what an effect then needs it draws by itself."""
+    """Random numbers drawn for every frame, whether an effect is on or off; effects draw further ones themselves."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._top, self._left = rng.integers(0, _BANK_MARGIN_PX, 2)
@@ -122,7 +120,7 @@ class _Dice:
         return Grain(bank.brighter[rows, columns], bank.darker[rows, columns])
 
     def tears(self, expected: float) -> int:
-        """Return how many lines there are; to be called once, as the last die of the frame."""
+        """Return the number of torn lines; call it once, as the last random number of the frame."""
         return int(self._rng.poisson(expected))
 
 
@@ -130,7 +128,7 @@ class Receiver:
     """A video receiver tuned to one frequency, with its framegrabber.
 
     Args:
-        air: Which effects there are, and how strong.
+        air: Effects and their strengths.
     """
 
     def __init__(self, seed: int, frequency: str, air: AirDescription | None = None) -> None:
@@ -144,14 +142,14 @@ class Receiver:
         self._last: Picture | None = None
 
     def tune(self) -> None:
-        """Forget what was received; the picture settles anew from the next frame on."""
+        """Clear the receiver's state; the picture settles again from the next frame on."""
         self._tuned_frame = self._last = None
 
     def receive(self, signals: Sequence[Signal], frame: int) -> Reception:
-        """Return what comes out of the receiver.
+        """Return the received frame.
 
         Args:
-            signals: One from each robot that transmits on the frequency.
+            signals: The signal of each robot that transmits on the frequency.
             frame: Number of the frame, 0 or more, larger than at the call before.
 
         Raises:
@@ -173,7 +171,7 @@ class Receiver:
             reception = Reception(picture, len(signals), kind)
         else:
             reception = Reception(self._garbage(signals, frame, dice), len(signals), FrameKind.GARBAGE)
-        self._last = reception.picture.copy()  # who gets the picture may paint on it
+        self._last = reception.picture.copy()  # the caller may paint on the picture
         return reception
 
     def _receive_one(self, signal: Signal, frame: int, tuned_frame: int, dice: _Dice) -> tuple[Picture, FrameKind]:
@@ -209,7 +207,7 @@ class Receiver:
         return np.random.default_rng(np.array(words, np.uint32))
 
     def _fade(self, robot: str, away_m: float, frame: int) -> tuple[float, float]:
-        """Return the signal's power, as a part of its mean, and how deep the frame is in a fade, 0 to 1."""
+        """Return the signal's power as a share of its mean, and the depth of the fade, 0 to 1."""
         level = self._air.noise * self._air.fades * fade_level(away_m)
         if level == 0:
             return 1.0, 0.0
@@ -242,7 +240,7 @@ class Receiver:
         return dice.window(SNOW_LEVELS * self._air.snow).on(gray)
 
     def _partial(self, picture: Picture, dice: _Dice, rng: np.random.Generator) -> Picture:
-        """Return the picture whose lower rows are an older one's, black, or noise."""
+        """Return the picture with its lower rows replaced by rows of an older picture, black or noise."""
         first_row = int(rng.integers(8, PICTURE_HEIGHT_PX - 8))
         partial = picture.copy()
         match int(rng.integers(3)):
@@ -256,13 +254,13 @@ class Receiver:
         return partial
 
     def _garbage(self, signals: Sequence[Signal], frame: int, dice: _Dice) -> Picture:
-        """Return a picture whose rows come from any of the transmitters, each torn sideways."""
+        """Return a picture whose rows come from random transmitters, each shifted sideways."""
         rng = self._random(_Effect.GARBAGE, frame)
         nearest = min(signals, key=lambda signal: signal.distance_m)
         sources = rng.integers(0, len(signals), PICTURE_HEIGHT_PX)
         shifts_px = rng.integers(0, _GARBAGE_SHIFT_PX + 1, PICTURE_HEIGHT_PX)
         spoiled = rng.random(PICTURE_HEIGHT_PX) < self._air.interference
-        # Row by row from pictures that begin again at their right edge: faster than one index for all pixels.
+        # Row by row from pictures that wrap around at the right edge: faster than one index for all pixels.
         endless = [_endless(signal.picture) for signal in signals]
         mixed = nearest.picture.copy()
         for row in np.flatnonzero(spoiled).tolist():
@@ -286,7 +284,7 @@ def _grain() -> NDArray[np.float32]:
     """Return noise of standard deviation 1, larger than a picture; the same in every run."""
     shape = (PICTURE_HEIGHT_PX + _BANK_MARGIN_PX, PICTURE_WIDTH_PX + _BANK_MARGIN_PX)
     white = np.random.default_rng(0).standard_normal(shape, np.float32)
-    # A video amplifier has less bandwidth than the picture has columns: noise is smeared along its rows.
+    # The bandwidth of a video amplifier is smaller than the column rate, so noise is smeared along the rows.
     smeared = np.asarray(cv2.GaussianBlur(white, (5, 1), 0), np.float32)
     return np.asarray(smeared / smeared.std(), np.float32)
 
@@ -297,7 +295,7 @@ def _bank(level_db: int) -> Grain:
 
 
 def _with_ghost(picture: Picture, strength: float) -> Picture:
-    """Return the picture and its echo, together as bright as before."""
+    """Return the picture with its echo; the brightness stays the same."""
     ghosted = picture.copy()
     share = strength / (1.0 + strength)
     late, early = picture[:, GHOST_SHIFT_PX:], picture[:, :-GHOST_SHIFT_PX]
@@ -323,7 +321,7 @@ def _with_tears(picture: Picture, count: int, rng: np.random.Generator) -> Pictu
 
 
 def _slipping(picture: Picture, depth: float, rng: np.random.Generator) -> Picture:
-    """Return the picture out of step: each row slips past the one above, and black is lost every few rows."""
+    """Return the picture without sync: each row is shifted against the last, and black is lost every few rows."""
     step_px = _SLIP_PX[0] + (_SLIP_PX[1] - _SLIP_PX[0]) * depth
     slipped = _shifted(picture, np.cumsum(rng.normal(0.0, step_px, PICTURE_HEIGHT_PX)))
     bands = PICTURE_HEIGHT_PX // _CLAMP_ROWS
@@ -333,14 +331,14 @@ def _slipping(picture: Picture, depth: float, rng: np.random.Generator) -> Pictu
 
 
 def _rolling(picture: Picture, unlocked: float, rng: np.random.Generator) -> Picture:
-    """Return the picture on its way to stand still: rolled up and slanted, the less the more it has settled."""
+    """Return the picture while it settles: rolled up and slanted, less and less."""
     slant_px = rng.normal(0.0, 200.0) * unlocked * np.linspace(0.0, 1.0, PICTURE_HEIGHT_PX)
     slanted = _shifted(picture, slant_px + rng.normal(0.0, 1.0 + 4.0 * unlocked, PICTURE_HEIGHT_PX))
     return np.roll(slanted, int(rng.integers(PICTURE_HEIGHT_PX) * unlocked), axis=0)
 
 
 def _shifted(picture: Picture, shifts_px: NDArray[np.float64]) -> Picture:
-    """Return the picture with each row turned to the right by its own shift."""
+    """Return the picture with each row rotated to the right by its own shift."""
     endless = np.concatenate([picture, picture], axis=1)
     lefts = np.mod(-np.rint(shifts_px), PICTURE_WIDTH_PX).astype(np.intp)
     # As NumPy's sliding_window_view, which takes longer than the copy.

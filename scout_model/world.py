@@ -1,11 +1,10 @@
-"""The simulated world: a room, robots that obey their radio, and targets that walk their paths.
+"""The simulated world: a room, robots that obey radio packets, and targets that walk along paths.
 
-It steps physics and nothing else: pictures are drawn by ``scout_model.camera``, elsewhere, from the
-world's MJCF and state.  The same description and the same packets at the same frames give the same
-state, bit for bit, on the same machine.
+The world only steps physics; ``scout_model.camera`` draws pictures from its MJCF and state, in other processes. The
+same description and the same packets at the same frames give the same state, bit for bit, on the same machine.
 
-A robot that stands still is asleep: it costs no time, and its part of the state stays the same, bit
-for bit, until something touches it or its actuators shall do something.
+A robot that stands still is asleep: it costs no time, and its part of the state stays the same, bit for bit, until a
+body touches it or an actuator gets a control other than 0.
 """
 
 from __future__ import annotations
@@ -40,12 +39,12 @@ _VELOCITIES = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
 
 @dataclass(frozen=True, slots=True)
 class _Body:
-    """A robot's program, and where its parts are in MuJoCo's arrays.
+    """A robot's program, and the places of its parts in MuJoCo's arrays.
 
     Attributes:
         kind: Class path, for refusals.
-        program: What runs on board.
-        answers: The same, if it is one that answers.
+        program: The on-board program.
+        answers: The same program, if it is an ``AnsweringRobot``.
         actuators: Name → index of its control.
         free: First of the seven numbers of its position.
         positions: Its part of the positions.
@@ -73,7 +72,7 @@ class World:
     def __init__(self, description: WorldDescription) -> None:
         self.mjcf = compose(description)
         """The world's model, from which ``Camera`` builds an identical one."""
-        # From the text, not from the composed model: the world steps the very model its viewers draw.
+        # From the text, not from the composed model, so that the world steps exactly the model that viewers draw.
         self._model = mujoco.MjModel.from_xml_string(self.mjcf)
         self._data = mujoco.MjData(self._model)
         # MuJoCo's arrays stay where they are; each look-up of one in its data makes a new array of it.
@@ -111,7 +110,7 @@ class World:
         return self.frame / FRAMES_PER_S
 
     def hear(self, network_id: int, payload: bytes) -> None:
-        """Let a radio packet reach the robots: the one with this id obeys from the next frame on, others never.
+        """Deliver a radio packet: the robot with this id obeys it from the next frame on.
 
         A packet to an unknown id is lost; a robot ignores and counts malformed bytes.
         """
@@ -120,9 +119,9 @@ class World:
             robot.program.hear(payload, self.time_s)
 
     def reply(self, network_id: int) -> bytes:
-        """Return what the robot with this id answers to the packets it heard since its last answer.
+        """Return the reply of the robot with this id to the packets since its last reply.
 
-        Empty if it has nothing to say, is of a kind that never answers, or is not there.
+        Empty if there is no reply, if the kind of robot never replies, or if no robot has this id.
         """
         robot = self._by_network_id.get(network_id)
         if robot is None or not robot.answers:
@@ -132,10 +131,10 @@ class World:
     def strike(
         self, robot: str, velocity_m_s: tuple[float, float, float], spin_rad_s: tuple[float, float, float]
     ) -> None:
-        """Give a robot a blow: its body moves and spins faster by this much from now on.
+        """Give a robot a blow: add these velocities to those of its body.
 
         Args:
-            robot: Its name; a blow to one that is carried has no effect.
+            robot: Its name; a blow to a carried robot has no effect.
             velocity_m_s: Added along the room's x, y, z.
             spin_rad_s: Added about the body's own axes: forward, left, up.
 
@@ -153,7 +152,7 @@ class World:
         """Advance by one frame, a thirtieth of a second."""
         driven = [self._drive(robot) for robot in self._robots.values()]
         if not any(driven) and not self._carried and self._is_all_asleep():
-            # Nothing to integrate: one step detects robots that a target touches, and wakes them.
+            # No robot moves: one step is enough to detect robots that a target touches, and to wake them.
             self._step += STEPS_PER_FRAME
             self._place_targets()
             self._senses.step()
@@ -170,7 +169,7 @@ class World:
         self._senses.update(self.time_s)
 
     def transmitting(self) -> dict[str, str]:
-        """Return robot → video frequency, of the robots whose transmitter is on."""
+        """Return robot → video frequency, for robots whose transmitter is on."""
         return {name: robot.program.frequency for name, robot in self._robots.items() if robot.program.frequency}
 
     def state(self) -> NDArray[np.float64]:
@@ -180,7 +179,7 @@ class World:
         return state
 
     def pose(self, body: str) -> tuple[float, float, float]:
-        """Return where a Scout or target is: x and y in metres, heading in radians, -pi to pi.
+        """Return the pose of a Scout or target: x and y in metres, heading in radians, -pi to pi.
 
         Raises:
             UnknownBody: No Scout or target has this name.
@@ -205,7 +204,7 @@ class World:
         return float(x_m), float(y_m), float(z_m)
 
     def wheel_speeds(self, robot: str) -> tuple[float, float]:
-        """Return how fast a Scout's wheels turn, left and right, rad/s, forward is positive.
+        """Return the speeds of a Scout's left and right wheel in rad/s; forward is positive.
 
         Raises:
             UnknownBody: No Scout has this name.
@@ -215,7 +214,7 @@ class World:
         return float(self._data.qvel[left]), float(self._data.qvel[right])
 
     def motors(self, robot: str) -> float:
-        """Return how hard a robot's motors are driven, 0 to 1; they disturb its own picture.
+        """Return the load of a robot's motors, 0 to 1; they disturb its own picture.
 
         Raises:
             UnknownBody: No robot has this name.
@@ -223,7 +222,7 @@ class World:
         return self._robot(robot).program.motors
 
     def is_asleep(self, robot: str) -> bool:
-        """Return whether a robot stands so still that it is frozen until something touches or drives it.
+        """Return whether a robot is asleep: it is frozen until a body touches it or its actuators move it.
 
         Raises:
             UnknownBody: No robot has this name.
@@ -232,7 +231,7 @@ class World:
         return bool(self._data.tree_asleep[self._model.body_treeid[self._model.body(f"{robot}/body").id]] >= 0)
 
     def is_upright(self, robot: str) -> bool:
-        """Return whether a robot's upper side is above its lower one.
+        """Return whether a robot's upper side is up.
 
         Raises:
             UnknownBody: No robot has this name.
@@ -252,7 +251,7 @@ class World:
         return robot in self._carried
 
     def spring(self, robot: str) -> Spring:
-        """Return where a Scout's spring foot is in its jump.
+        """Return the phase of a Scout's spring foot.
 
         Raises:
             UnknownBody: No Scout has this name.
@@ -260,7 +259,7 @@ class World:
         return self._scout(robot).spring
 
     def firmware_statistics(self, robot: str) -> FirmwareStatistics:
-        """Return what a Scout's firmware counted.
+        """Return the counts of a Scout's firmware.
 
         Raises:
             UnknownBody: No Scout has this name.
@@ -321,7 +320,7 @@ class World:
             robot.controls.update(controls)
         is_driven = any(controls.values())
         if is_driven:
-            # Controls do not wake a sleeping body, but any bit in its velocity does: the zero that has one.
+            # Controls do not wake a sleeping body, but any bit in its velocity does: the negative zero has one.
             first = robot.velocities.start
             if self._velocities[first] == 0.0:
                 self._velocities[first] = -0.0

@@ -1,1 +1,1 @@
-"""Consoles for people."""
+"""Consoles for operators: terminal, web page, designer."""

@@ -1,4 +1,4 @@
-"""``scout-console``: take over a robot, or watch."""
+"""``scout-console``: take over a robot, or watch a mission."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIGHTS = {Profile.TERMINAL: Sight.PICTURES, Profile.PENDANT: Sight.BROADCAST, Pr
 """With a screen, pictures come to this machine; a person without one looks at a video monitor, or at the robot."""
 
 WEB_PORT = 8420  # chosen: free on most machines
-AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
+AWAY_AFTER_S = 120.0  # chosen: longer than a short distraction; afterwards the robot continues with useful work
 
 app = typer.Typer(
     cls=CommandTable,
@@ -32,7 +32,7 @@ app = typer.Typer(
 
 @app.callback()
 def _before_each_command(version: Version = False) -> None:
-    """Read the options that go before a command."""
+    """Read the options before a command."""
 
 
 @app.command()
@@ -91,7 +91,7 @@ def monitor(
     connect: words.Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
+    """Watch holders, waiting requests, reasons and events; claim no robot, but stop robots in an emergency."""
     if recording is not None:
         names_mission = mission is not None or connect is not None
         _watch_recording(recording, user or _user(), names_mission=names_mission, for_programs=as_json or once)
@@ -114,7 +114,7 @@ def look(
     connect: words.Connect = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Look into a behavior: the pictures and values that it goes by, live; it makes them only while you look."""
+    """Watch a behavior's intermediate pictures and values live; it makes them only while you watch."""
     where = chosen(mission, connect, secret_file)
     if save is not None and not view:
         raise _usage("--save needs a view")
@@ -183,7 +183,7 @@ def main() -> None:
 
 
 def _missions_to_serve(mission: list[str] | None, *, is_elsewhere: bool, is_file: bool) -> list[str | None]:
-    """Return the names of the missions; None: the only one that is up."""
+    """Return the names of the missions; None: the only running mission."""
     if is_file and (mission or is_elsewhere):
         raise _usage("--design and --recording serve a file; --mission and --connect are for missions that are up")
     names: list[str | None] = list(mission) if mission else [None]
@@ -215,7 +215,7 @@ def _watch_recording(path: Path, user: str, *, names_mission: bool, for_programs
 
 
 def _usage(complaint: str) -> typer.Exit:
-    """Print what is wrong with the words of the command, and return what ends it."""
+    """Print the fault in the command's arguments, and return the exception that ends the command."""
     say(complaint)
     return typer.Exit(ExitCode.USAGE)
 
@@ -226,7 +226,7 @@ def _need_a_terminal(command: str, instead: str) -> None:
 
 
 def _user() -> str:
-    """Return who is logged in, as far as the system knows."""
+    """Return the name of the logged-in user, as far as the system knows it."""
     from backbone.mission_log.operators import login_name
 
     return login_name()

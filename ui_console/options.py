@@ -17,7 +17,7 @@ SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
 
 
 def complete_robot(ctx: typer.Context) -> list[str]:
-    """Return the robots of the mission that is up, for a shell."""
+    """Return the robots of the running mission, for shell completion."""
     names = names_for(ctx)
     return names.robots if names is not None else []
 

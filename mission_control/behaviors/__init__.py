@@ -1,1 +1,1 @@
-"""One behavior a file."""
+"""The shipped behaviors, one in each file."""

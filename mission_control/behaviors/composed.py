@@ -1,7 +1,7 @@
-"""Composed: base of the behaviors that a mission file composes of others.
+"""Composed: base class of behaviors that a mission file composes of other behaviors.
 
-They hold no ARC and decide nothing of their own: ``mission_control.composites`` has their rules, whose settings are the
-parameters. Order is that of the mission file; priorities stay what they are, a matter of scheduling.
+They hold no ARC. ``mission_control.composites`` has their rules; the parameters are the settings of these rules.
+Children run in the order of the mission file; priorities matter only for scheduling.
 
 Source: BehaviorTree.CPP 4, "Nodes Library": Sequence, Fallback, Parallel, RetryUntilSuccessful, Repeat, Timeout, Sleep.
 """
@@ -19,27 +19,27 @@ from mission_control.behaviors.motion import MOST_TIMES
 from mission_control.children import BRANCH
 from mission_control.composites import ENDLESS, Composite, WhileSuspended
 
-MOST_CHILDREN = 256  # chosen: as many as a path may have steps; a mission has a dozen
-PAUSE_S = 1.0  # chosen: ten times the start of a process, so that a child that fails at once costs little
+MOST_CHILDREN = 256  # chosen: the largest length of a path; a mission has a dozen children
+PAUSE_S = 1.0  # chosen: ten times the start time of a process, so that a child that fails at once costs little
 PATIENCE_S = 10.0  # chosen: two of the papers' slices
 
 
 Seconds = Annotated[float, msgspec.Meta(gt=0, le=A_DAY_S)]
-"""A mission time that is over at some time."""
+"""A finite duration in mission time."""
 Pause = Annotated[float, msgspec.Meta(ge=0, le=A_DAY_S)]
-"""A mission time that may be none."""
+"""A finite duration in mission time, or 0."""
 Times = Annotated[int, msgspec.Meta(ge=ENDLESS, le=MOST_TIMES)]
-"""How often, or without end."""
+"""A number of repetitions, or without end."""
 Threshold = Annotated[int, msgspec.Meta(ge=-MOST_CHILDREN, le=MOST_CHILDREN)]
-"""How many children; negative: counted from all of them, which are -1."""
+"""A number of children; negative: counted from the number of all children, -1 being all."""
 
-_SETTINGS = {"num_cycles": "most", "num_attempts": "most"}  # parameter → setting of the rules, where names differ
+_SETTINGS = {"num_cycles": "most", "num_attempts": "most"}  # parameter → setting of the rules, if the names differ
 
 P = TypeVar("P", bound=BehaviorParameters)
 
 
 class Composed(Behavior[P]):
-    """A parent that decides by rule, and reports which branch runs and why: to people, and to its own parent."""
+    """A parent that decides by rules, and reports to people and to its own parent which branch runs, and why."""
 
     rules_type: ClassVar[type[Composite]]
     children_allowed = (1, MOST_CHILDREN)
@@ -50,13 +50,13 @@ class Composed(Behavior[P]):
         return self.rules_type(children, **self._settings())
 
     def parameters_changed(self) -> None:
-        """Apply them from now on, also to times and counts that are under way."""
+        """Apply the new settings from now on, also to running times and counts."""
         for name, value in self._settings().items():
             setattr(self._children.rules, name, value)
         self._children.look_again()
 
     def _settings(self) -> dict[str, Any]:
-        """Return the parameters that the tree does not give."""
+        """Return the parameters that do not come from the tree."""
         own = [name for name in self.parameters.__struct_fields__ if name not in BehaviorParameters.__struct_fields__]
         settings = {_SETTINGS.get(name, name): getattr(self.parameters, name) for name in own}
         if "while_suspended" in settings:

@@ -1,10 +1,11 @@
-"""Condition: whether an event, a report or a measured value is as the mission file says, as a leaf of the tree.
+"""Condition: a leaf of the tree that tests an event, a report or a measured value against the mission file.
 
 An *event* is a message that a component publishes when something happens: one of ``EVENTS``, or one of your own. A
-*report* is a behavior's progress; the condition asks for it. *Readings* are what the hardware of an RC measured last,
-as the charge of a robot's battery; the condition asks for the newest, and hears of every change.
+*report* is a behavior's progress; the condition asks for it. *Readings* are the newest measurements of an RC's
+hardware, such as the charge of a robot's battery; the condition asks for the newest ones and subscribes to changes.
 
-Source: BehaviorTree.CPP 4, "ScriptCondition"; ``wait`` is ours, because here nothing ticks a condition again and again.
+Source: BehaviorTree.CPP 4, "ScriptCondition"; ``wait`` is an addition, because here nothing ticks a condition
+repeatedly.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ from resource_pool.arc_client import Readings, StopState, ask_readings, watch_re
 log = logging.getLogger(__name__)
 
 EVENTS = (MotionSeen, WaypointReached, StopState, Appeared, Disappeared, ProcessFell, TraceLine)
-"""Every event that the project's own components publish."""
+"""All events that the project's own components publish."""
 NAMED: Mapping[str, type[Message]] = {kind.__name__: kind for kind in (*EVENTS, BehaviorState, Readings)}
 ANY = "*"
 ASKED_FOR = {BehaviorState: Subsystem.MISSION_CONTROL, Readings: Subsystem.RESOURCE_POOL}
-"""Messages that are asked for → the subsystem whose components answer."""
-ASK_AGAIN_S = 1.0  # chosen: mission time; a report changes with a way point or a turn, not faster
+"""Answer that the condition asks for → subsystem whose components answer."""
+ASK_AGAIN_S = 1.0  # chosen: mission time; a report changes with a way point or a turn, no faster
 FIRST_READINGS_S = 5.0  # chosen: mission time; a robot that has just been granted answers within a second
 REPLY_TIME_S = 1.0  # chosen: behaviors answer in milliseconds
 _ABSENT = object()
@@ -46,13 +47,13 @@ _ABSENT = object()
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What a message must be like. Pure.
+    """A test of a message. Pure.
 
     Attributes:
         field: Path to a field, names separated by dots; empty: every message will do.
         above: Lower limit of a number, excluded.
         below: Upper limit of a number, excluded.
-        equals: The value itself.
+        equals: Required value.
     """
 
     field: str = ""
@@ -61,7 +62,7 @@ class Comparison:
     equals: str | float | bool | None = None
 
     def holds_for(self, message: Message) -> bool:
-        """Return whether the message is like that; a message without the field is not.
+        """Return whether the message passes the test; a message without the field does not.
 
         Example:
             >>> seen = WaypointReached(12.0, "scout1", 3, 0)
@@ -81,7 +82,7 @@ class Comparison:
         return is_number and (self.above is None or value > self.above) and (self.below is None or value < self.below)
 
     def finding(self, message: Message) -> str:
-        """Return the value that was judged, for people."""
+        """Return the tested value, for people."""
         value = self._value(message)
         if not self.field:
             return "it came"
@@ -138,14 +139,14 @@ class MessageConditionParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class MessageCondition(Behavior[MessageConditionParameters]):
-    """Succeeds if an event, report or reading is as stated; ``check`` fails if it is not, ``wait`` goes on waiting."""
+    """Succeeds if a message passes the test. Otherwise ``check`` fails, and ``wait`` waits for the next message."""
 
     parameters_type = MessageConditionParameters
     children_allowed = (0, 0)
     may_claim = False
 
     async def start(self) -> None:
-        """Subscribe, or begin to ask."""
+        """Subscribe to the event, or begin to ask for reports."""
         given = self.parameters
         self._comparison = Comparison(given.field, given.above, given.below, given.equals)
         self._kind = message_class(given.message)
@@ -158,7 +159,7 @@ class MessageCondition(Behavior[MessageConditionParameters]):
         self.bus.subscribe(source, Conversation.EVENTS, known, self._heard)
 
     def parameters_changed(self) -> None:
-        """Judge by the new comparison from now on; another source or message needs a new start."""
+        """Use the new comparison from now on; a change of source or message needs a new start."""
         given = self.parameters
         self._comparison = Comparison(given.field, given.above, given.below, given.equals)
 
@@ -176,7 +177,7 @@ class MessageCondition(Behavior[MessageConditionParameters]):
             self.start_task(self._give_up(rc), "give up")
 
     async def _ask(self, source: str, ask: Callable[[], Awaitable[Message]]) -> None:
-        """Judge the answer, again and again until one is final."""
+        """Ask and test the answer repeatedly, until a result is final."""
         while not self.status.is_final:
             try:
                 self._judge(await ask())
@@ -187,7 +188,7 @@ class MessageCondition(Behavior[MessageConditionParameters]):
             await self.clock.sleep_s(ASK_AGAIN_S)
 
     async def _give_up(self, rc: str) -> None:
-        """Fail if nothing was read until then, so that a tree does not wait for a robot that no ARC holds."""
+        """Fail if no readings have arrived by then, so that a tree does not wait for a robot that no ARC holds."""
         await self.clock.sleep_s(FIRST_READINGS_S)
         self.finish(BehaviorStatus.FAILURE, {"detail": f"{rc} had no readings within {FIRST_READINGS_S:g} s"})
 
@@ -197,7 +198,7 @@ class MessageCondition(Behavior[MessageConditionParameters]):
 
     def _judge(self, message: Message) -> None:
         if isinstance(message, Readings) and message.at_s < 0.0:
-            return  # the RC has heard nothing of its hardware yet
+            return  # the RC has no readings of its hardware yet
         finding = self._comparison.finding(message)
         if self._comparison.holds_for(message):
             self.finish(BehaviorStatus.SUCCESS, {"detail": finding})
@@ -206,10 +207,10 @@ class MessageCondition(Behavior[MessageConditionParameters]):
 
 
 def message_class(name: str) -> type[Message]:
-    """Return the message of this name, or of this class path.
+    """Return the message class of this name or class path.
 
     Raises:
-        ValueError: There is none.
+        ValueError: There is no such class.
     """
     if name in NAMED:
         return NAMED[name]
@@ -226,6 +227,6 @@ def message_class(name: str) -> type[Message]:
 
 
 def _asked_at(kind: type[Message], source: str) -> str | None:
-    """Return the address of who answers; None: no component there does."""
+    """Return the address of the component that answers; None: no component of that kind answers."""
     given = source if "/" in source else f"{ASKED_FOR[kind]}/{source}"
     return given if given.startswith(f"{ASKED_FOR[kind]}/") else None

@@ -1,13 +1,13 @@
-"""Dark search: look around for the darkest direction, go there a little, look again; stop where all around is dark.
+"""Dark search: look around for the darkest direction, drive a leg there, look again; stop where it is dark all around.
 
 Rules of this file: no bus, no clock. Pictures and mission time go in, motions come out.
 
-A Scout has no odometry: directions are relative to the begin of the look around, by the commanded turn, and are dropped
-at the next look around. A view from before an interruption shows whether the robot still stands at its place; if so,
-the look around continues, otherwise it begins again.
+A Scout has no odometry: directions are relative to the begin of the look around, computed from the commanded turn, and
+dropped at the next look around. After an interruption, a comparison with earlier views shows whether the robot still
+stands at its place. If so, the look around continues; otherwise it begins again.
 
-Source: the behaviors that RAM 2002, "Visual Servoing", reports as earlier work: they navigated by patches of light and
-dark. Numbers: chosen in simulated rooms with a dark corner and with a table.
+Source: RAM 2002, "Visual Servoing", on earlier work: behaviors that navigated by patches of light and dark. Numbers:
+chosen in simulated rooms with a dark corner and with a table.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from mission_control.behaviors.motion import STILL, Motion, turned
 Picture = NDArray[np.uint8]
 
 TURN_RAD_S = 0.8  # chosen: a look around takes eight seconds
-SECTORS = 18  # chosen: 20 degrees, half of what the camera sees
-NEAREST_M, FARTHEST_M = 0.25, 2.0  # chosen: the floor between them fills 40 of 240 rows
+SECTORS = 18  # chosen: 20 degrees, half of the camera's angle of view
+NEAREST_M, FARTHEST_M = 0.25, 2.0  # chosen: rows that show the floor; 40 of 240
 NEAR_ROWS = 0.12  # chosen: the lowest rows show the floor 15 to 20 cm before the robot
 AHEAD_COLUMNS = (1 / 3, 2 / 3)  # chosen: 13 degrees, less than a sector
 HORIZON, CAMERA_HEIGHT = 150.2 / 240, 11.4 / 240  # the Scout's camera: rows of the horizon and of a meter's floor
-ALL_AROUND = 0.75  # chosen: legs of furniture and the way out may look bright
-IN_M, BACK_M = 0.35, 0.12  # chosen: three bodies into the dark; a body length away from a possible obstacle
+ALL_AROUND = 0.75  # chosen: legs of furniture and the way out may be bright
+IN_M, BACK_M = 0.35, 0.12  # chosen: three body lengths into the dark; one body length before a possible obstacle
 CERTAIN_PICTURES = 4  # chosen: torn pictures come two or three in a row
 CHOICES = 4  # chosen: the darkest direction is often a shadow line; then other directions are tried
-BARRED_RAD = math.radians(60.0)  # chosen: no way back to the last place
-LONGEST_STEP_S = 0.2  # chosen: between pictures that are further apart the robot may have stood still
+BARRED_RAD = math.radians(60.0)  # chosen: excludes the way back to the last place
+LONGEST_STEP_S = 0.2  # chosen: if pictures are further apart, the robot may have stood still in between
 SAME_VIEW, VIEW_COLUMNS, VIEW_ROWS = 9.0, 40, 15  # chosen: grey levels between views of 8 by 16 pixels
-SHIFTS = 8  # chosen: columns of such a view, 8 degrees; a robot that was stopped in a turn runs on less than that
-COMPARED = 10  # chosen: the first pictures after a switch roll
+SHIFTS = 8  # chosen: columns of such a view, 8 degrees; a robot stopped in a turn coasts less than that
+COMPARED = 10  # chosen: the first pictures after switching on roll
 
 
 class SearchStage(StrEnum):
@@ -59,7 +59,7 @@ class Glimpse:
     """Light in a picture.
 
     Attributes:
-        ahead: Mean brightness straight ahead, near and far counting alike, 0 to 255.
+        ahead: Mean brightness straight ahead, with equal weight for near and far, 0 to 255.
         ground: Mean brightness of the floor right before the robot.
         view: The picture in coarse blocks, shape (``VIEW_ROWS``, ``VIEW_COLUMNS``).
     """
@@ -92,7 +92,7 @@ def glimpse(picture: Picture) -> Glimpse:
 
 
 def is_same_view(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
-    """Return True if both may have been taken from one place, the robot having turned a few degrees at most."""
+    """Return True if both views may come from one place, with a turn of a few degrees at most."""
     width = before.shape[1]
     for shift in range(-SHIFTS, SHIFTS + 1):
         here = before[:, max(0, shift) : width + min(0, shift)]
@@ -109,7 +109,7 @@ class DarkSearch:
         dark_level: Floor darker than this is dark, 0 to 255.
         leg_m: Distance to drive before the next look around.
         speed_m_s: Speed of driving.
-        looks: Number of looks around after which it gives up; 0: never.
+        looks: Number of looks around after which the search gives up; 0: never.
     """
 
     def __init__(self, *, dark_level: float, leg_m: float, speed_m_s: float, looks: int) -> None:
@@ -131,7 +131,7 @@ class DarkSearch:
 
     @property
     def is_final(self) -> bool:
-        """True when it is hidden, or has given up."""
+        """True when the robot is hidden, or the search has given up."""
         return self.stage in (SearchStage.HIDDEN, SearchStage.FAILED)
 
     def interrupt(self) -> None:
@@ -158,7 +158,7 @@ class DarkSearch:
         return self._last
 
     def _is_back(self, seen: Glimpse) -> bool:
-        """Return whether the first pictures after an interruption suffice; begin again if the robot was moved."""
+        """Return whether the pictures since an interruption are enough; begin again if the robot was moved."""
         assert self._view is not None  # noqa: S101  asked only then
         self._to_compare -= 1
         if is_same_view(self._view, seen.view):
@@ -169,7 +169,7 @@ class DarkSearch:
         return not self._to_compare
 
     def _take_in(self, seen: Glimpse, passed_s: float) -> None:
-        """Add the last motion's effect, and go to the next stage when this one is finished."""
+        """Add the effect of the last motion; enter the next stage when the present one is finished."""
         turned_rad, gone_m = self._last.turn_rad_s * passed_s, abs(self._last.forward_m_s) * passed_s
         self._turned_rad += turned_rad
         self._dark_pictures = self._dark_pictures + 1 if seen.ground < self._dark_level else 0
@@ -219,7 +219,7 @@ class DarkSearch:
             self._enter(SearchStage.HIDDEN, 0.0)
         else:
             self._enter(SearchStage.GO, self._leg_m)
-            self._barred_rad = math.pi  # relative to the next look around, which begins straight ahead
+            self._barred_rad = math.pi  # relative to the next look around, whose begin is straight ahead
 
     def _begin_look(self) -> None:
         self._seen, self._turned_rad = [], 0.0
@@ -243,7 +243,7 @@ class DarkSearch:
 
 
 def sectors(seen: Sequence[tuple[float, float, float]], *, brightest: bool = False) -> list[float]:
-    """Return the directions of all sectors that were seen, the darkest first, or the brightest.
+    """Return the directions of all observed sectors, darkest first or brightest first.
 
     Args:
         seen: Direction in radians, brightness ahead, and brightness of the ground, of each picture.

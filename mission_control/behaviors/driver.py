@@ -1,4 +1,4 @@
-"""Driver: base class of behaviors that drive a robot. This file has the loop; pure files have the decisions."""
+"""Driver: base class of behaviors that drive a robot. This file has the loop; the decisions are in pure files."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from resource_pool.arc_client import (
 
 log = logging.getLogger(__name__)
 
-DECIDE_EVERY_S = 0.1  # chosen: commands last half a second, and ten a second of 2 ms are a fiftieth of a radio
+DECIDE_EVERY_S = 0.1  # chosen: commands expire after half a second; ten a second of 2 ms use a fiftieth of a radio
 LOCALIZE_WITHIN_S = 0.3  # chosen: an older position is useless for steering; wheels stop by themselves after 0.5 s
-LOST_M = 5.0  # chosen: half a room; nearer, a robot that is off its way is still worth watching
-LOST_RAD = math.radians(100.0)  # chosen: it may go away from where it should; one jump leaves less
-AGAIN_AFTER_S = 1.0  # chosen: hardware that refused needs a moment; mission seconds
+LOST_M = 5.0  # chosen: half a room; with less spread, driving on is still useful
+LOST_RAD = math.radians(100.0)  # chosen: with more spread it may drive in a wrong direction; one jump causes less
+AGAIN_AFTER_S = 1.0  # chosen: hardware needs a moment after a refusal; mission seconds
 
 D = TypeVar("D", bound=BehaviorParameters)
 
 
 class Lost(Refusal):
-    """The localizer does not know where the robot is, or where it looks, well enough to drive it."""
+    """The localizer's estimate of the robot's place or heading is too uncertain for driving."""
 
     code = "behavior.lost"
-    remedy = "Show the robot a landmark, or take it over and look where it is."
+    remedy = "Bring a landmark into the robot's view, or take the robot over and check where it is."
 
 
 class NeedsArc(Refusal):
@@ -50,17 +50,17 @@ class NeedsArc(Refusal):
 
 
 class Driver(Behavior[D]):
-    """Drives during grants, stops the robot before the end of a grant, and fails with the reason if it never can drive.
+    """Drives during grants, stops the robot before the end of a grant, and fails if it never can drive.
 
     Derive, override ``drive_on`` instead of ``act``, and keep all progress on ``self`` or in a plain object there.
     """
 
     needs_arc: ClassVar[str] = "drive"
-    """Kind of ARC that the refusal names if there is none."""
+    """Kind of ARC that the refusal names if the behavior has none."""
     never: ClassVar[frozenset[str]] = frozenset({"world.unknown_body", "localizer.unknown_body", "wire.unknown"})
-    """Codes of refusals that every further attempt would get again."""
+    """Codes of permanent refusals: a retry would fail again."""
     spread_m = 0.0
-    """Standard deviation of the place that the localizer told last."""
+    """Standard deviation of the place in the localizer's last answer."""
 
     async def drive_on(self, robot: str) -> None:
         """Continue the work.
@@ -75,25 +75,25 @@ class Driver(Behavior[D]):
         """The client of its ARC.
 
         Raises:
-            NeedsArc: It claims no ARC.
+            NeedsArc: The behavior claims no ARC.
         """
         if self.arc is None:
             raise NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}")
         return self.arc
 
     async def move(self, motion: Motion) -> None:
-        """Move like this, until the next call or for half a second."""
+        """Move at these speeds until the next call, for at most half a second."""
         await self.held.move(motion.forward_m_s, motion.turn_rad_s)
 
     async def locate(self, localizer: str, robot: str) -> Position:
-        """Return the position of the robot, or of another body, as the localizer believes it.
+        """Return the localizer's estimate of the position of the robot or another body.
 
         Args:
             localizer: Name or address of the tracking component.
 
         Raises:
-            Lost: The localizer is too unsure of it.
-            Refusal: The localizer does not know the robot, or is no localizer.
+            Lost: The estimate is too uncertain.
+            Refusal: The localizer does not know the body, or the component is not a localizer.
             LinkError: The localizer did not answer.
         """
         pose = await self._ask_localizer(localizer, AskPose(robot))
@@ -104,12 +104,12 @@ class Driver(Behavior[D]):
         return Position(pose.x_m, pose.y_m, pose.heading_rad)
 
     async def locate_home(self, localizer: str, robot: str) -> FloorPoint:
-        """Return where the robot stood when the localizer first knew it; raises as ``locate``."""
+        """Return the robot's first known position; raises as ``locate``."""
         home = await self._ask_localizer(localizer, AskHome(robot))
         return FloorPoint(home.x_m, home.y_m)
 
     async def room(self, localizer: str) -> FloorPlan | None:
-        """Return the plan of the floor; None: the localizer has none; raises ``LinkError`` as ``locate``."""
+        """Return the plan of the floor; None: the localizer has no plan; raises ``LinkError`` as ``locate``."""
         try:
             return await self.bus.ask(_tracker(localizer), AskFloorPlan(), FloorPlan, within_s=LOCALIZE_WITHIN_S)
         except UnknownMessage:
@@ -124,7 +124,7 @@ class Driver(Behavior[D]):
             self.give_up(NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}"))
 
     async def act(self) -> None:
-        """Drive; fail after a refusal that would repeat, try again after other refusals."""
+        """Drive; after a permanent refusal fail, after other refusals retry."""
         while True:
             try:
                 return await self.drive_on(self.robot)
@@ -140,11 +140,11 @@ class Driver(Behavior[D]):
                 self.report(f"stands: {refusal}")
             await self.clock.sleep_s(AGAIN_AFTER_S)
 
-    async def suspending(self, deadline_s: float) -> None:  # noqa: ARG002  a halt takes milliseconds
+    async def suspending(self, deadline_s: float) -> None:  # noqa: ARG002  a halt takes only milliseconds
         """Bring the robot to rest."""
         try:
             await self.held.halt()
-        except (Refusal, LinkError) as error:  # the radio's last packet stops the robot too
+        except (Refusal, LinkError) as error:  # the radio's last packet also stops the robot
             log.info("%s could not be halted: %s", self.name, error)
 
     def give_up(self, refusal: Refusal) -> None:

@@ -13,9 +13,10 @@ class FallbackParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Fallback``.
 
     Attributes:
-        while_suspended: What a suspended child means. wait: it stands still, and the fallback waits. next: it is not
-            available, and the next child runs until it is at work again. fail: it counts as failed for good.
-        patience_s: With next or fail, the mission time for which a child may be suspended before; with fail above 0.
+        while_suspended: Effect of a suspended child. wait: the fallback waits for it. next: the next child runs until
+            the suspended child is at work again. fail: it counts as failed for good.
+        patience_s: With next or fail, the mission time for which a child may be suspended before that; with fail above
+            0.
     """
 
     while_suspended: Literal["wait", "next", "fail"] = "wait"

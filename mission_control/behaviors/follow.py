@@ -1,7 +1,7 @@
-"""Follow: keep a robot at a distance from another body that the same localizer knows, facing it.
+"""Follow: keep a robot at a distance from another body, facing it; the same localizer must know both.
 
-It goes straight towards the body, backs off if that comes nearer, and ends only by an order, or if the localizer knows
-one of the two no more.
+The robot drives straight towards the body, and backs off if the body comes nearer. The behavior ends only by an order,
+or if the localizer no longer knows one of the two.
 
 In mission.xml: an ARC of kind ``drive`` (or more), the localizer's name, and the body's.
 """
@@ -20,7 +20,7 @@ from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver, Lost
 from mission_control.behaviors.motion import DrivingSpeed, FloorPoint, NamedComponent
 from mission_control.behaviors.way import keep_distance
 
-TOLERANCE_SHARE = 0.1  # chosen: of the distance; less would have the robot move all the time
+TOLERANCE_SHARE = 0.1  # chosen: of the distance; with less the robot would move all the time
 
 
 class FollowsItself(Refusal):
@@ -34,9 +34,9 @@ class FollowParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Follow``.
 
     Attributes:
-        target: Body to follow, as the localizer names it: another robot, in a simulated room a person, too.
+        target: The localizer's name of the body to follow: another robot, or in a simulated room also a person.
         localizer: Component that tracks both: its name if it is in the resource pool, else its address.
-        distance_m: Distance between the middles of the two that it keeps.
+        distance_m: Distance to keep between the middles of the two.
         speed_m_s: Fastest speed.
     """
 
@@ -74,7 +74,7 @@ class Follow(Driver[FollowParameters]):
             await self.clock.sleep_s(DECIDE_EVERY_S)
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Keep nothing: what counts is where both are then."""
+        """Keep no state: after the suspension only the positions at that time matter."""
         self.report(f"suspended: {suspended_because(reason, by)}")
 
     def statistics(self) -> dict[str, float]:

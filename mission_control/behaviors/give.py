@@ -1,4 +1,4 @@
-"""Give: one command of its ARC, by its word, for as long as stated.
+"""Give: sends one command of its ARC, named by its word, and holds the ARC for a stated time.
 
 In mission.xml: an ARC of any kind that has the command; ``scout-backbone components`` lists the commands of each kind.
 """
@@ -26,9 +26,9 @@ class GiveParameters(BehaviorParameters, frozen=True, kw_only=True):
     Attributes:
         word: The command.
         values: Its fields, ``name=value`` separated by blanks.
-        role: Role of the RC that obeys, if several can.
-        for_s: Time for which it holds its ARC; 0: until the command was applied.
-        again_s: Time after which it repeats the command; 0: it repeats it only after an interruption.
+        role: Role of the RC that obeys, if several RCs can.
+        for_s: Time for which the behavior holds its ARC; 0: until the command was applied.
+        again_s: Time after which the command is repeated; 0: only after an interruption.
     """
 
     word: str
@@ -78,11 +78,11 @@ class Give(Driver[GiveParameters]):
         self._values: Mapping[str, object] = read_values(self.parameters.values)
 
     def parameters_changed(self) -> None:
-        """Give the new command at the next repetition or grant."""
+        """Send the new command at the next repetition or grant."""
         self._values = read_values(self.parameters.values)
 
     async def drive_on(self, robot: str) -> None:
-        """Give it, and hold the ARC."""
+        """Send the command, and hold the ARC."""
         while True:
             wanted = self.parameters
             await self.held.give(wanted.word, self._values, wanted.role)

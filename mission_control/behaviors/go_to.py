@@ -1,7 +1,7 @@
-"""Go to: drive a robot to a place, straight, as a localizer tells where it is.
+"""Go to: drive a robot straight to a place, guided by a localizer.
 
-There is no way around obstacles; choose places that can be reached straight. Any kind of robot that moves will do. The
-robot gets there as surely as its localizer knows where it is: the success contains the spread.
+The robot does not avoid obstacles; choose places that it can reach straight. Any kind of moving robot is possible. The
+accuracy depends on the localizer; the report of success contains the spread.
 
 In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name.
 """
@@ -43,7 +43,7 @@ class WayParameters(BehaviorParameters, frozen=True, kw_only=True):
         localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
         speed_m_s: Speed on the straight way.
         reached_within_m: Distance from the place that counts as reached.
-        within_s: Time after which it fails, of the time in which the robot is held; 0: never.
+        within_s: Time after which the behavior fails; only time of grants counts; 0: never.
     """
 
     localizer: NamedComponent
@@ -78,7 +78,7 @@ class Goer(Driver[W]):
         """The state of the way; None until the place is known."""
 
     async def place(self, robot: str) -> FloorPoint:
-        """Return where to go. When: at the first grant, and after a change of parameters; raises as ``locate``."""
+        """Return the goal. When: at the first grant, and after a change of parameters; raises as ``locate``."""
         raise NotImplementedError
 
     async def drive_on(self, robot: str) -> None:
@@ -100,7 +100,7 @@ class Goer(Driver[W]):
             self.finish(BehaviorStatus.SUCCESS, at)
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Keep the place; later continue from the robot's position then."""
+        """Keep the place; after the suspension continue from the robot's position at that time."""
         if self.way is not None:
             self.way.interrupt()
             self.report(f"suspended on the way to {_spoken(self.way.place)}: {suspended_because(reason, by)}")
@@ -121,15 +121,15 @@ class Goer(Driver[W]):
 
 
 class GoTo(Goer[GoToParameters]):
-    """Succeeds at its place, from any begin; fails if the robot gets no nearer, or is too slow."""
+    """Succeeds at its place, from any start; fails if the robot gets no nearer, or is too slow."""
 
     parameters_type = GoToParameters
 
-    async def place(self, robot: str) -> FloorPoint:  # noqa: ARG002  the same for all
+    async def place(self, robot: str) -> FloorPoint:  # noqa: ARG002  the same for all robots
         """Return the place of the parameters; see ``Goer``.
 
         Raises:
-            OutsideRoom: The localizer has a plan of the floor, and the place is not on it.
+            OutsideRoom: The localizer has a plan of the floor, and the place is outside of it.
         """
         place = FloorPoint(self.parameters.x_m, self.parameters.y_m)
         room = await self.room(self.parameters.localizer)

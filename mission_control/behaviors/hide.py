@@ -1,7 +1,7 @@
-"""Hide: find a dark place by pictures alone, go into it, and look out of it.
+"""Hide: find a dark place by pictures alone, drive into it, and look out of it.
 
 In mission.xml: an ARC of kind ``capture``. A slice of at least eight seconds, long enough for a look around, is best.
-If it is shorter and the robot still stands at its place, the look around continues in the next slice.
+If the slice is shorter, and the robot still stands at its place in the next slice, the look around continues there.
 """
 
 from __future__ import annotations

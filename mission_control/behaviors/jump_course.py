@@ -1,10 +1,9 @@
-"""Jump course: drive up to an obstacle, jump, check whether the robot is over it, drive on.
+"""Jump course: drive up to an obstacle, jump, check that the robot is over it, drive on.
 
 Rules of this file: no bus, no clock. Positions and mission time go in, motions and jumps come out.
 
 Laws: after a jump the robot gets no command until it has landed and its spring is wound again. Only the robot's
-    position
-counts: if it is carried to either side of the obstacle, the course continues from there.
+    position counts: if a person carries it to either side of the obstacle, the course continues from there.
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ from mission_control.behaviors.motion import (
     turned,
 )
 
-TAKE_OFF_M = 0.20  # measured: from 15 to 32 cm before its front a box of 30 cm is cleared, and 20 cm deep
-RUN_UP_M = 0.30  # chosen: a straight piece before the take-off, so that the robot arrives there well turned
+TAKE_OFF_M = 0.20  # measured: a box 30 cm high and 20 cm deep is cleared from 15 to 32 cm before its front
+RUN_UP_M = 0.30  # chosen: a straight way before the take-off, so that the robot arrives with the right heading
 DEEPEST_M = 0.20  # measured: a jump carries 60 cm far, and 40 cm beyond the front
-AT_TAKE_OFF_M = 0.04  # chosen: leaves the robot well within the measured 17 cm
+AT_TAKE_OFF_M = 0.04  # chosen: keeps the robot well within the measured 17 cm
 AIMED_RAD = math.radians(4.0)  # chosen: 4 cm aside at the landing
 LANDED_AFTER_S = 3.0  # measured: 0.42 s until the kick is over, 0.7 s of flight, and 2.4 s until the spring is wound
-BEYOND_M = 0.06  # chosen: half a body; then no wheel stands on the obstacle
+BEYOND_M = 0.06  # chosen: half a body length; then no wheel stands on the obstacle
 ARRIVED_M = 0.08  # chosen: less than a body
 PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 
@@ -52,7 +51,7 @@ class Act(Enum):
     """An action besides driving."""
 
     JUMP = auto()
-    WAIT = auto()  # no command, not even a halt, which would cancel the jump
+    WAIT = auto()  # no command, not even a halt, because it would cancel the jump
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,7 +53,7 @@ class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class JumpOver(Driver[JumpOverParameters]):
-    """Succeeds when the robot has driven on beyond the obstacle; fails after ``attempts`` vain jumps."""
+    """Succeeds when the robot has driven on beyond the obstacle; fails after ``attempts`` unsuccessful jumps."""
 
     parameters_type = JumpOverParameters
 
@@ -88,7 +88,7 @@ class JumpOver(Driver[JumpOverParameters]):
         return self.course.airborne_s(self.clock.now_s())
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Keep the state; the next decision depends on the robot's position then."""
+        """Keep the state; after the suspension the next decision depends only on the robot's position."""
         self.course.interrupt()
         self.report(f"suspended: {suspended_because(reason, by)}; {self.course.jumps} jumps until now")
 

@@ -2,8 +2,8 @@
 
 Rules of this file: no bus, no clock; times are mission seconds.
 
-Positions are meters and radians in the room's frame: x to the right, y up, seen from above; a heading of 0 looks along
-x, and left turns are positive.
+Positions are meters and radians in the room's frame, seen from above: x to the right, y up. A heading of 0 is along x;
+left turns are positive.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from msgspec import Meta
 
 from backbone.ranges import LONGEST_MENTION
 
-MOST_M_S = 0.30  # chosen: below the 0.35 m/s of the motors, so that a wheel is left to steer with
-NEAREST_M = 0.02  # chosen: tracking from above and a robot of 11 cm allow no less
+MOST_M_S = 0.30  # chosen: below the motors' 0.35 m/s, so that a reserve for steering is left
+NEAREST_M = 0.02  # chosen: the error of tracking from above and a robot of 11 cm allow no less
 MOST_RAD_S = 1.5  # chosen: a quarter turn a second; ten decisions a second turn it 9 degrees at most in between
-TURN_PER_S = 2.5  # chosen: an error of heading shrinks to a tenth in a second, without swinging over at ten decisions
-SLOW_PER_S = 1.5  # chosen: the last 0.2 m before a place are driven ever slower; it comes to rest without overshoot
+TURN_PER_S = 2.5  # chosen: an error of heading shrinks to a tenth in a second; ten decisions cause no overshoot
+SLOW_PER_S = 1.5  # chosen: the robot slows down over the last 0.2 m before a place and stops without overshoot
 FARTHEST_M = 1000.0  # chosen: the largest room
 MOST_TIMES = 100_000  # chosen: once a minute for ten weeks
 TURN_FIRST_RAD = math.radians(50.0)  # chosen: beyond it a robot turns on the spot, so that its path stays short
@@ -33,9 +33,9 @@ Reach = Annotated[float, Meta(ge=NEAREST_M, le=FARTHEST_M)]
 Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 """A place along one side of the room."""
 Attempts = Annotated[int, Meta(ge=1, le=MOST_TIMES)]
-"""How often something is tried."""
+"""A number of attempts."""
 Times = Annotated[int, Meta(ge=0, le=MOST_TIMES)]
-"""How often, or 0 for no end."""
+"""A number of repetitions; 0: endless."""
 NamedComponent = Annotated[str, Meta(min_length=1, max_length=LONGEST_MENTION)]
 """A component or body by its name or address."""
 
@@ -77,10 +77,10 @@ STILL = Motion()
 
 
 def read_places(text: str) -> list[FloorPoint]:
-    """Return the places of a text like ``1,1 3.5,1``.
+    """Return the places in a text like ``1,1 3.5,1``.
 
     Raises:
-        ValueError: The text has no place, or a place is no pair of numbers.
+        ValueError: The text has no place, or a place is not a pair of numbers.
 
     Example:
         >>> read_places("1,1 3.5,0.5")
@@ -101,7 +101,7 @@ def read_places(text: str) -> list[FloorPoint]:
 
 
 def turned(angle_rad: float) -> float:
-    """Return the same direction as an angle from -pi to pi."""
+    """Return the angle normalized to -pi to pi."""
     return math.atan2(math.sin(angle_rad), math.cos(angle_rad))
 
 
@@ -152,8 +152,8 @@ class Maneuver:
 def shake_free() -> Maneuver:
     """Return the maneuver that frees a stuck robot.
 
-    Full speed back and forth: the tail throws a robot that lies on its back upright, and a robot before an obstacle
-    gets away from it. measured: one attempt rights the robot after every landing of a jump.
+    The robot drives back and forth at full speed. If it lies on its back, its tail throws it upright; if it is stuck at
+    an obstacle, it gets away. Measured: one attempt rights the robot after every landing of a jump.
     """
     return Maneuver([(Motion(-0.35), 0.3), (Motion(0.35), 0.3), (STILL, 0.5)])
 
@@ -165,18 +165,18 @@ class Watchdog:
         patience_s: Time in which it must get ``STEP_M`` nearer.
     """
 
-    STEP_M = 0.02  # chosen: half a wheel; tracking from above is better than that
+    STEP_M = 0.02  # chosen: half a wheel; tracking from above is more accurate
 
     def __init__(self, patience_s: float) -> None:
         self._patience_s = patience_s
         self.rest()
 
     def rest(self) -> None:
-        """Begin again, because the goal changed or the robot was not driven for a while."""
+        """Restart the time, because the goal changed or the robot was not driven for a while."""
         self._nearest_m, self._since_s = math.inf, math.inf
 
     def is_stuck(self, distance_m: float, now_s: float) -> bool:
-        """Return True if it has not got nearer within ``patience_s``; called at every decision."""
+        """Return True if the robot has not come nearer within ``patience_s``; called at every decision."""
         if distance_m <= self._nearest_m - self.STEP_M:
             self._nearest_m, self._since_s = distance_m, now_s
         return now_s - self._since_s >= self._patience_s

@@ -16,9 +16,8 @@ class ParallelParameters(BehaviorParameters, frozen=True, kw_only=True):
     Attributes:
         success_count: Number of children that must succeed, 1 for any; -1: all, -2: all but one, and so on.
         failure_count: Number of children that must fail for a failure; negative as above.
-        while_suspended: What a suspended child means. wait: it stands still, and is counted as one that is at work.
-            fail: after patience_s it counts as failed. skip: after patience_s it counts as if there were none such,
-            until it is at work again.
+        while_suspended: Effect of a suspended child. wait: it counts as at work. fail: after patience_s it counts as
+            failed. skip: after patience_s it is not counted until it is at work again.
         patience_s: With fail or skip, the mission time for which a child may be suspended.
     """
 

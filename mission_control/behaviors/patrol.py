@@ -1,7 +1,7 @@
 """Patrol: drive through way points, round after round.
 
 A Scout does not know its position. A localizer must track it: a camera above the room, as in laboratories, the
-simulated world, or dead reckoning. By dead reckoning its round drifts, until the robot sees a landmark.
+simulated world, or dead reckoning. With dead reckoning the rounds drift until the robot sees a landmark.
 
 In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name; a simulated world is its own localizer.
 """
@@ -26,7 +26,7 @@ class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
     Attributes:
         waypoints: Way points in order: ``x,y`` in meters, separated by blanks, as in ``1,1 3.5,1 3.5,4``.
         localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
-        rounds: Number of rounds until success; 0: for ever.
+        rounds: Number of rounds until success; 0: endless.
         speed_m_s: Speed on straight ways.
         reached_within_m: Distance from a way point that counts as reached.
         rest_s: Time at each way point; only time of grants counts.
@@ -44,7 +44,7 @@ class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class Patrol(Driver[PatrolParameters]):
-    """Publishes ``WaypointReached`` once for each way point, in order, with any number of suspensions."""
+    """Publishes ``WaypointReached`` once for each way point, in order, despite any number of suspensions."""
 
     parameters_type = PatrolParameters
     hands_over = frozenset({"route", "_published"})
@@ -68,16 +68,16 @@ class Patrol(Driver[PatrolParameters]):
         self.finish(BehaviorStatus.SUCCESS, self._found())
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Keep the state; later continue from the robot's position then."""
+        """Keep the state; after the suspension continue from the robot's position at that time."""
         self.route.interrupt()
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:
-        """Begin a new patrol with the new parameters; way points of the old one stay published."""
+        """Begin a new patrol with the new parameters; arrivals of the old one stay published."""
         self.route, self._published = self._plan(), 0
 
     def statistics(self) -> dict[str, float]:
-        """Return the base's counters, the way points reached, and how often the robot was shaken free."""
+        """Return the base's counters, and the numbers of reached way points and of maneuvers that freed the robot."""
         return {**super().statistics(), "waypoints_reached": self.route.reached, "shaken_free": self.route.freed}
 
     def _plan(self) -> PatrolRoute:

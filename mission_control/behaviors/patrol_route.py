@@ -2,9 +2,9 @@
 
 Rules of this file: no bus, no clock. Positions and mission time go in, motions come out.
 
-Law: way points are reached in order and each once a round, with any events between two decisions. Only positions during
-grants count, so the record of an interrupted patrol, even if a person drove the robot elsewhere, equals that of an
-undisturbed patrol.
+Law: way points are reached in order, each once a round, whatever happens between two decisions. Only positions during
+grants count. So an interrupted patrol has the same record as an undisturbed one, even if a person drove the robot
+elsewhere meanwhile.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from mission_control.behaviors.motion import (
 
 REMEMBERED = 1000  # chosen: hours of an ordinary patrol
 PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
-LONGEST_STEP_S = 0.5  # chosen: between decisions further apart than this the robot stood or was not granted
-BACK_AT = 2.0  # chosen: tolerances beyond which a robot that was carried away during its rest drives back
+LONGEST_STEP_S = 0.5  # chosen: if decisions are further apart, the robot stood still or was not granted
+BACK_AT = 2.0  # chosen: tolerances; a robot that was carried farther away during its rest drives back
 
 
 @dataclass(frozen=True, slots=True)

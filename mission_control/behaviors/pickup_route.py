@@ -1,4 +1,4 @@
-"""Pick-up route: to the neighborhood of the marked place with a localizer, the rest of the way by sight.
+"""Pick-up route: drive near the marked place with a localizer, and the rest of the way by sight.
 
 Rules of this file: no bus, no clock. Positions and mission time go in, motions come out.
 """
@@ -9,8 +9,8 @@ from enum import StrEnum
 
 from mission_control.behaviors.motion import FloorPoint, Maneuver, Motion, Position, Watchdog, head_for, shake_free
 
-NEAR_M = 0.25  # chosen: the mark is found within 2.5 m, so more precision is useless
-AWAY_M = 1.0  # chosen: a robot left further away than this goes to the neighborhood first
+NEAR_M = 0.25  # chosen: the mark is found from within 2.5 m, so more precision is useless
+AWAY_M = 1.0  # chosen: from farther away the robot first drives near the place
 PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 
 
@@ -29,7 +29,7 @@ class PickupRoute:
     Args:
         near: A place from which the mark is in sight.
         speed_m_s: Speed on the way to it.
-        attempts: Number of vain searches after which it gives up.
+        attempts: Number of unsuccessful searches after which the route gives up.
     """
 
     def __init__(self, near: FloorPoint, *, speed_m_s: float, attempts: int) -> None:
@@ -37,7 +37,7 @@ class PickupRoute:
         self.stage = PickupStage.UNKNOWN
         """How the robot navigates."""
         self.in_vain = 0
-        """Number of vain searches for the mark."""
+        """Number of unsuccessful searches for the mark."""
         self._watchdog = Watchdog(PATIENCE_S)
         self._freeing: Maneuver | None = None
 
@@ -49,7 +49,7 @@ class PickupRoute:
         self._watchdog.rest()
 
     def not_found(self) -> None:
-        """Record a vain search all around."""
+        """Record an unsuccessful search all around."""
         self.in_vain += 1
         self.stage = PickupStage.FAILED if self.in_vain >= self._attempts else PickupStage.TRAVEL
         self._watchdog.rest()

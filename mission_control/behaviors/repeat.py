@@ -1,4 +1,4 @@
-"""Repeat: a child again while it succeeds."""
+"""Repeat: starts a child again as long as it succeeds."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class RepeatParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Repeat``.
 
     Attributes:
-        num_cycles: Number of cycles, the first included; -1: without end.
+        num_cycles: Number of cycles, including the first; -1: endless.
         pause_s: Mission time from an end of the child to its next start.
-        while_suspended: What a suspended child means. wait: it stands still, and the repeat waits. fail: after
-            patience_s the cycle counts as failed, and the repeat has failed.
+        while_suspended: Effect of a suspended child. wait: the repeat waits for it. fail: after patience_s the cycle
+            counts as failed, and the repeat fails.
         patience_s: With fail, the mission time for which the child may be suspended.
     """
 

@@ -1,4 +1,4 @@
-"""Retry: a child again while it fails."""
+"""Retry: starts a child again as long as it fails."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ class RetryParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Retry``.
 
     Attributes:
-        num_attempts: Number of attempts, the first included; -1: without end.
+        num_attempts: Number of attempts, including the first; -1: endless.
         pause_s: Mission time from an end of the child to its next start.
-        while_suspended: What a suspended child means. wait: it stands still, and the retry waits. fail: after
-            patience_s the attempt counts as failed, and the child is started again.
+        while_suspended: Effect of a suspended child. wait: the retry waits for it. fail: after patience_s the attempt
+            counts as failed, and the child is started again.
         patience_s: With fail, the mission time for which the child may be suspended.
     """
 

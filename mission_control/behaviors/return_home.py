@@ -1,4 +1,4 @@
-"""Return home: drive a robot straight to where it stood when its localizer first knew it.
+"""Return home: drive a robot straight to its first position that the localizer knew.
 
 In mission.xml: as for ``go_to``.
 """
@@ -10,7 +10,7 @@ from mission_control.behaviors.motion import FloorPoint
 
 
 class ReturnHome(Goer[WayParameters]):
-    """Succeeds at home, from any begin; fails if the robot gets no nearer, or is too slow."""
+    """Succeeds at home, from any start; fails if the robot gets no nearer, or is too slow."""
 
     parameters_type = WayParameters
 

@@ -1,4 +1,4 @@
-"""Return to pickup: bring a robot back to the marked place where it is picked up.
+"""Return to pickup: bring a robot back to the marked place at which a person picks it up.
 
 The robot first drives, tracked by a localizer, to a place from which the mark is in sight; then it servoes to the mark.
 It also returns after a person has left it at the other end of the room.
@@ -33,7 +33,7 @@ class PickupParameters(ServoParameters, frozen=True, kw_only=True):
         localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
         speed_m_s: Speed on the way to it.
         search_turns: Number of turns of one search for the mark.
-        attempts: Number of vain searches after which it fails.
+        attempts: Number of unsuccessful searches after which the behavior fails.
     """
 
     near: str
@@ -48,7 +48,7 @@ class PickupParameters(ServoParameters, frozen=True, kw_only=True):
 
 
 class ReturnToPickup(Servo[PickupParameters]):
-    """Succeeds at its place before the mark, from any begin; fails if it does not find the mark."""
+    """Succeeds at its place before the mark, from any start; fails if it does not find the mark."""
 
     parameters_type = PickupParameters
 
@@ -84,7 +84,7 @@ class ReturnToPickup(Servo[PickupParameters]):
         super().parameters_changed()
 
     def statistics(self) -> dict[str, float]:
-        """Return the base's counters, and the vain searches."""
+        """Return the base's counters, and the unsuccessful searches."""
         return {**super().statistics(), "searched_in_vain": self.route.in_vain}
 
     def _way(self) -> PickupRoute:

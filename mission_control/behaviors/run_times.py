@@ -1,17 +1,16 @@
-"""Run times: the best requests to see a target that is in view for a while through a shared frequency.
+"""Run times: the best run times for detecting, through a shared frequency, a target that is in view for a limited time.
 
-Pure. If a slice is extended at the first glimpse, it needs only its blind begin and a few frames for a glimpse. It
-detects a target that is in view for ``view_s``, unless the target leaves before ``blind_s + detect_s`` of the slice or
-comes after its end. With N equals that each run for ``run_s`` and settle for ``settling_s``, the share of phases in
-which one of the slices of one robot detects it is
-``(view_s + run_s - blind_s - detect_s) / (N (run_s + settling_s))``. It falls with ``run_s`` if and only if
-``view_s > settling_s + blind_s + detect_s``: then slices should be as short as a glimpse allows, otherwise as long as
-the mission allows.
+Pure. If the first glimpse of a target extends the slice, the slice needs only its blind begin and a few frames for a
+glimpse. It detects a target that is in view for ``view_s``, unless the target leaves before ``blind_s + detect_s`` of
+the slice or comes after its end. With N ARCs of equal priority that each run for ``run_s`` and settle for
+``settling_s``, the share of phases in which one of the slices of one robot detects it is ``(view_s + run_s - blind_s -
+detect_s) / (N (run_s + settling_s))``. It falls with ``run_s`` if and only if ``view_s > settling_s + blind_s +
+detect_s``: then slices should be as short as a glimpse allows, otherwise as long as the mission allows.
 
-Short run times are drawn again for each slice: if all equals ask for fixed times, the schedule has a period, and a
-target that passes in a multiple of it is seen every time or never.
+Short run times are drawn at random for each slice. If all ARCs requested fixed times, the schedule would be periodic,
+and a target that passes at a multiple of the period would be seen every time or never.
 
-Source: RAM 2002, "Experiments" (behaviors that work out the run times they ask for are its stated next step); the
+Source: RAM 2002, "Experiments" (its stated next step: behaviors that compute the run times that they request); the
 formula: chosen, for slices in turn.
 """
 
@@ -21,14 +20,14 @@ import math
 from dataclasses import dataclass
 from random import Random
 
-GLIMPSE_FRAMES = (2, 4)  # chosen: one good frame in two is likely, in four certain; longer slices come less often
-EXTENSION = 1.5  # chosen: multiples of the time to detect, because a burst of bad frames hits many detections
+GLIMPSE_FRAMES = (2, 4)  # chosen: two frames probably, four certainly include a good one; longer slices come less often
+EXTENSION = 1.5  # chosen: multiples of the detection time, because a burst of bad frames delays many detections
 GRAIN_S = 0.001  # chosen: finer times are meaningless
 
 
 @dataclass(frozen=True, slots=True)
 class RunTimes:
-    """The run times to ask for.
+    """The run times to request.
 
     Attributes:
         shortest_s: Least useful time, seconds.
@@ -41,7 +40,7 @@ class RunTimes:
     maximum_s: float
 
     def drawn_s(self, dice: Random) -> float:
-        """Return the minimum run time to ask for next, seconds; drawn only if there is anything to draw."""
+        """Return the next minimum run time to request, seconds; a random number is drawn only for a range."""
         if self.shortest_s == self.longest_s:
             return self.shortest_s
         return _whole_grains(dice.uniform(self.shortest_s, self.longest_s))
@@ -50,15 +49,15 @@ class RunTimes:
 def useful_run_times(
     *, view_s: float, settling_s: float, blind_s: float, frame_s: float, detect_s: float, given_s: float
 ) -> RunTimes:
-    """Return the run times to ask for.
+    """Return the run times to request.
 
     Args:
         view_s: Shortest time for which a target is in view, seconds.
         settling_s: Time from a switch to the first picture, seconds.
         blind_s: Time from the first picture to the first usable picture, seconds.
-        frame_s: Time from one sound picture to the next, on average, seconds.
-        detect_s: Time from the first picture with it to certainty, seconds, above 0.
-        given_s: Run time in the mission file; only extensions ask for more.
+        frame_s: Mean time between usable pictures, seconds.
+        detect_s: Time from the first picture with the target to certainty, seconds, above 0.
+        given_s: Run time in the mission file; only extensions are longer.
 
     Example:
         >>> useful_run_times(view_s=4.0, settling_s=0.3, blind_s=0.5, frame_s=0.1, detect_s=0.8, given_s=5.0)

@@ -13,9 +13,9 @@ class SequenceParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Sequence``.
 
     Attributes:
-        while_suspended: What a suspended child means. wait: it stands still, and the sequence waits. fail: after
-            patience_s it counts as failed. No later child stands in for it, because their order matters; where it does
-            not, take a fallback with next, or a parallel.
+        while_suspended: Effect of a suspended child. wait: the sequence waits for it. fail: after patience_s it counts
+            as failed. No later child replaces it, because the order matters; if it does not, use a fallback with next,
+            or a parallel.
         patience_s: With fail, the mission time for which a child may be suspended.
     """
 

@@ -1,8 +1,8 @@
-"""Servo to target: find the landmark, follow it in the picture, and stop at a place straight before it.
+"""Servo to target: find the landmark, track it in the picture, and stop at a place straight before it.
 
-``mission_control.vision`` decides about pictures and motions; this file carries them out, and publishes where the
-landmark puts the robot, for localizers. Between grants the robot may be moved or turned: the next pictures acquire the
-target again, and the approach continues at its stage.
+``mission_control.vision`` decides on motions from pictures. This file carries the motions out, and publishes the
+robot's pose relative to the landmark for localizers. A person may move or turn the robot between grants: the behavior
+acquires the target again, and the approach continues at its stage.
 
 In mission.xml: an ARC of kind ``capture`` at the camera's full rate, with a period as short as a picture's.
 
@@ -34,12 +34,12 @@ from mission_control.vision.skeleton_tracking import Track, TrackingPhase
 from mission_control.vision.visual_servo import FARTHEST_STOP_M, LATENCY_S, NEAREST_STOP_M, ServoStep, VisualServo
 from resource_pool.arc_client import Frame, LandmarkSighting
 
-PICTURE_PX = (320, 240)  # what ``SCOUT_CAMERA`` was measured for
-SURE_M = 0.3  # chosen: dead reckoning over a few meters knows as much
-LEAST_SPREAD_M = 0.03  # chosen: what servoing was measured to err at its place; a fit alone promises more
+PICTURE_PX = (320, 240)  # the size for which ``SCOUT_CAMERA`` was measured
+SURE_M = 0.3  # chosen: dead reckoning over a few meters is as accurate
+LEAST_SPREAD_M = 0.03  # chosen: the measured error of servoing at its place; the fit alone claims a smaller one
 TELL_EVERY_S = 0.2  # chosen: localizers publish as often
 MOST_TURNS = 1e6  # chosen: a month of turning
-SETTLES_S = 2.0  # chosen: about half the time of settling; requested again if it was too short
+SETTLES_S = 2.0  # chosen: about half the settling time; requested again if it was too short
 
 
 class UnusablePicture(Refusal):
@@ -61,7 +61,7 @@ class ServoParameters(BehaviorParameters, frozen=True, kw_only=True):
 
     Attributes:
         stop_m: Distance before the target at which to stop.
-        search_turns: Number of turns without a sight of the target after which it fails; 0: never.
+        search_turns: Number of turns without a sighting after which the behavior fails; 0: never.
         latency_s: Time from a picture's capture until its command turns the wheels.
     """
 
@@ -123,12 +123,12 @@ class Servo(Driver[S]):
         self.look_anew()
 
     def statistics(self) -> dict[str, float]:
-        """Return the base's counters, and counts of sights and approaches."""
+        """Return the base's counters, and counts of sightings and approaches."""
         mine = {"acquisitions": self._acquisitions, "approaches": self._servo.approaches}
         return {**super().statistics(), **mine}
 
     def look_anew(self) -> None:
-        """Begin again with acquisition: the robot stands still, perhaps elsewhere."""
+        """Begin again with acquisition; the robot stands still, and may have been moved."""
         self._servo.resumed()
         self.step, self._seen_s, self._phase = None, None, TrackingPhase.ACQUIRING
         self._fresh.clear()
@@ -143,17 +143,17 @@ class Servo(Driver[S]):
         self._fresh.clear()
         if self._unusable is not None:
             raise self._unusable
-        assert self.step is not None  # noqa: S101  a picture that is fresh was seen
+        assert self.step is not None  # noqa: S101  a fresh picture has been processed
         return self.step
 
     async def follow(self, robot: str, step: ServoStep) -> None:
-        """Send the command of a picture's decision, and report it."""
+        """Send the command that a picture led to, and report it."""
         await self.held.move(step.command.forward_m_s, step.command.turn_rad_s)
         self.report(f"{robot} {step.stage}, {step.track.phase}, {self._servo.approaches} approaches until now")
 
     def has_searched(self, turns: float) -> bool:
-        """Return True if the robot has made this many turns without a sight of the target; never for 0."""
-        self._counted_rad = min(self._counted_rad, self._servo.searched_rad)  # a sight restarts the count
+        """Return True if the robot has made this many turns without a sighting; for 0, never."""
+        self._counted_rad = min(self._counted_rad, self._servo.searched_rad)  # a sighting restarts the count
         return turns > 0 and self._servo.searched_rad - self._counted_rad >= 2 * math.pi * turns
 
     def search_anew(self) -> None:
@@ -179,7 +179,7 @@ class Servo(Driver[S]):
         return VisualServo(stop_m=self.parameters.stop_m, latency_s=self.parameters.latency_s)
 
     def _tell_sighting(self, frame: Frame) -> None:
-        """Publish the pose before the landmark, if it is sure enough to tell localizers; a few times a second."""
+        """Publish the pose before the landmark for localizers, if it is accurate enough; a few times a second."""
         pose = None if self.step is None else self.step.pose
         if pose is None or self._servo.spread_m > SURE_M or frame.captured_s < self._told_s + TELL_EVERY_S:
             return

@@ -26,7 +26,7 @@ class Skeleton(Behavior[SkeletonParameters]):
     """Turns on the spot a few times, one second each, then has succeeded."""
 
     parameters_type = SkeletonParameters
-    turned = 0  # kept through suspensions, as everything on self is
+    turned = 0  # survives suspensions, as all state on self does
 
     async def act(self) -> None:
         """Command the robot: begins with each grant, is cancelled at its end."""

@@ -1,4 +1,4 @@
-"""Surveillance: several watchers, one record of their events.
+"""Surveillance: runs several watchers and collects their events.
 
 Source: IROS 2001, "Surveillance": behaviors of equal priority watch the same room.
 """
@@ -46,7 +46,7 @@ class Surveillance(Behavior[SurveillanceParameters]):
         self.children_changed()
 
     def children_changed(self) -> None:
-        """Subscribe to those that are new; one that is gone publishes no more."""
+        """Subscribe to new watchers; a removed watcher publishes no more."""
         for path, _node in walk(self.parameters.children):
             if path[-1][0] not in self._watched:
                 self._watched.add(path[-1][0])

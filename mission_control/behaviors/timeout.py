@@ -1,4 +1,4 @@
-"""Timeout: a child for a limited time."""
+"""Timeout: runs a child for a limited time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class TimeoutParameters(BehaviorParameters, frozen=True, kw_only=True):
 
     Attributes:
         seconds: Mission time after which the child is ended.
-        while_suspended: Whether the time counts in which the child is suspended. wait: it does not. count: it does.
+        while_suspended: Whether the time of a suspension counts. wait: it does not. count: it does.
     """
 
     seconds: Seconds

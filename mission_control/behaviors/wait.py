@@ -1,4 +1,4 @@
-"""Wait: some time."""
+"""Wait: succeeds after a given time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class WaitParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class Wait(Composed[WaitParameters]):
-    """Succeeds after some time."""
+    """Succeeds after the given time."""
 
     parameters_type = WaitParameters
     rules_type = WithDelay

@@ -29,8 +29,8 @@ from mission_control.modules.orders import output_address
 from mission_control.vision.motion_detection import FAST_FRAMES, VOTES, MotionDetector
 from resource_pool.arc_client import Frame
 
-PICTURE, SWAPPED_IN, JUDGED = "picture", "swapped_in", "judged"  # keys, as the modules' classes declare them
-BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is well seen
+PICTURE, SWAPPED_IN, JUDGED = "picture", "swapped_in", "judged"  # keys that the modules' classes declare
+BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is clearly visible
 REPORT_EVERY_FRAMES = 30  # chosen: about once a second
 
 
@@ -40,13 +40,13 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
     Attributes:
         again_after_s: Time after which continuing motion is published again, mission seconds.
         frames_wanted: Number of pictures of one slice with certain motion before it is published.
-        view_s: Shortest time for which a target is in view, mission seconds. Above 0 the behavior computes its run
-            times, none longer than the tree's; 0: it asks for those of the tree.
-        settling_s: Time from a switch to the first picture, mission seconds; for that.
-        frame_rate_hz: Pictures a second; for that.
-        clean_share: Share of usable pictures, above 0 to 1; for that.
-        seed: Seed of the drawn run times.
-        vision: Name of the execution unit that judges its pictures; empty: the behavior does so itself.
+        view_s: Shortest time for which a target is in view, mission seconds. Above 0: the behavior computes its run
+            times, which are at most the tree's. 0: it requests the tree's run times.
+        settling_s: Time from a context switch to the first picture, mission seconds; used with view_s.
+        frame_rate_hz: Pictures a second; used with view_s.
+        clean_share: Share of usable pictures, above 0 to 1; used with view_s.
+        seed: Seed of the random run times.
+        vision: Name of the execution unit that analyzes the pictures; empty: the behavior analyzes them itself.
     """
 
     again_after_s: float = 1.0
@@ -60,10 +60,10 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class WatchForMotion(Behavior[WatchParameters]):
-    """Publishes ``MotionSeen`` under its own address; keeps its view while it is suspended.
+    """Publishes ``MotionSeen`` under its own address; keeps the average picture while it is suspended.
 
     With a unit for its vision, it publishes its pictures for modules (``GreyPicture`` under ``picture``, ``SwappedIn``
-    under ``swapped_in``) and acts on what they say of each, ``PictureJudged`` under the unit's ``judged``.
+    under ``swapped_in``), and acts on their result for each picture (``PictureJudged`` under the unit's ``judged``).
     """
 
     parameters_type = WatchParameters
@@ -94,7 +94,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         return need
 
     async def connect(self) -> None:
-        """Listen to the unit that judges the pictures."""
+        """Subscribe to the unit that analyzes the pictures."""
         await super().connect()
         if self.parameters.vision:
             at = output_address(address(Subsystem.MISSION_CONTROL, self.parameters.vision), JUDGED)
@@ -119,7 +119,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def see(self, frame: Frame) -> None:
-        """Have the picture judged, by the modules or here."""
+        """Analyze the picture, in the modules or here."""
         self._robot, self._pictures = frame.robot, self._pictures + 1
         if self._pictures % REPORT_EVERY_FRAMES == 0:
             self._say()
@@ -135,14 +135,14 @@ class WatchForMotion(Behavior[WatchParameters]):
         self._take_in(PictureJudged(frame.captured_s, frame.robot, list(self._detector.votes), region, is_rejected))
 
     def statistics(self) -> dict[str, float]:
-        """Return the base's counters, the events, and the pictures that were too torn to use."""
+        """Return the base's counters, the events, and the number of pictures too torn to use."""
         return {**super().statistics(), "events": self._events, "frames_rejected": self._rejected}
 
     def _publish(self, key: str, message: Message) -> None:
         self.bus.publish(output_address(self.address, key), Conversation.OUTPUTS, message)
 
     def _take_in(self, judged: PictureJudged) -> None:
-        """Publish motion when it is certain, and again while it continues; extend the slice after a glimpse."""
+        """Publish motion when it is certain, and again while it continues; after a glimpse extend the slice."""
         region, at_s = judged.region, judged.captured_s
         self._rejected += judged.is_rejected
         self._certain_frames += region is not None
@@ -159,14 +159,14 @@ class WatchForMotion(Behavior[WatchParameters]):
 
     def _show_stages(self) -> None:
         stages, views = self._detector.stages, self.views
-        if stages is not None:  # the first pictures of a slice are not judged
+        if stages is not None:  # the first pictures of a slice are not analyzed
             views.picture("difference", lambda: BRIGHTER * stages.difference)
             views.picture("changed", lambda: 127 * (stages.changed.astype(np.uint8) + stages.kept))
             views.value("threshold", stages.bar)
             views.value("votes", sum(self._detector.votes))
 
     def _ask_for_more(self, captured_s: float, votes: Sequence[bool]) -> None:
-        """Extend the slice until motion is certain, if there was a glimpse that is not published yet."""
+        """If there was a glimpse of motion that is not published yet, extend the slice until the motion is certain."""
         if self._told_in_slice or not votes or not votes[-1]:
             return
         missing = max(0, VOTES - 1 - sum(votes)) + max(1, self.parameters.frames_wanted - self._certain_frames)
@@ -176,17 +176,17 @@ class WatchForMotion(Behavior[WatchParameters]):
             self.start_task(self._ask_until(until_s), "longer")
 
     async def _ask_until(self, until_s: float) -> None:
-        assert self.arc is not None  # noqa: S101  pictures come through it
+        assert self.arc is not None  # noqa: S101  pictures come through the ARC
         try:
             await self.arc.want_longer(until_s)
-        except (Refusal, LinkError) as error:  # then the slice ends in time
+        except (Refusal, LinkError) as error:  # then the slice ends as planned
             self.story.note(self.arc.arc, f"its slice was not extended: {error}")
 
     async def _ask_next_for(self, minimum_s: float) -> None:
         assert self.arc is not None  # noqa: S101  it was granted
         try:
             await self.arc.want_runtime(minimum_s, self._maximum_s)
-        except (Refusal, LinkError) as error:  # the next slice is as long as this one
+        except (Refusal, LinkError) as error:  # then the next slice is as long as this one
             self.story.note(self.arc.arc, f"its run time was not changed: {error}")
 
     def _found(self) -> dict[str, object]:
@@ -220,5 +220,5 @@ def run_times(given: WatchParameters, given_s: float) -> RunTimes:
 
 
 def frames_s(given: WatchParameters, sound_frames: int) -> float:
-    """Return the average time until this many usable pictures, seconds."""
+    """Return the mean time until this many usable pictures, seconds."""
     return sound_frames / (given.frame_rate_hz * given.clean_share)

@@ -1,4 +1,4 @@
-"""Way: to one place, with an end for a robot that does not get there; and the distance that a follower keeps.
+"""Way: drive to one place, and detect that the robot does not get there; keep a distance from a followed body.
 
 Rules of this file: no bus, no clock. Positions and mission time go in, motions come out.
 """
@@ -19,16 +19,16 @@ from mission_control.behaviors.motion import (
 )
 from mission_control.behaviors.patrol_route import LONGEST_STEP_S, PatrolRoute
 
-ATTEMPTS = 3  # chosen: what three shakes do not free, a fourth does not
-GAIN_M = 0.1  # chosen: nearer by a robot's length than at the last shake: the way goes on
-FACING_RAD = math.radians(10.0)  # chosen: a follower sees whom it follows with any camera
+ATTEMPTS = 3  # chosen: a robot that three shakes do not free is not freed by a fourth
+GAIN_M = 0.1  # chosen: if the robot is nearer by its length than at the last shake, it makes progress
+FACING_RAD = math.radians(10.0)  # chosen: any camera of the follower then has the followed body in view
 
 
 class Way:
     """The state of a way to one place.
 
     Args:
-        place: Where to.
+        place: Goal.
         speed_m_s: Speed on the straight way.
         reached_within_m: Distance that counts as reached.
         within_s: Time after which it fails; only time of grants counts; 0: never.
@@ -36,9 +36,9 @@ class Way:
 
     def __init__(self, place: FloorPoint, *, speed_m_s: float, reached_within_m: float, within_s: float) -> None:
         self.place = place
-        """Where to."""
+        """The goal."""
         self.failure = ""
-        """Why the robot does not get there, for people; empty: it may."""
+        """Why the robot does not get there, for people; empty: no failure so far."""
         self._route = PatrolRoute([place], rounds=1, speed_m_s=speed_m_s, reached_within_m=reached_within_m, rest_s=0.0)
         self._within_s = within_s
         self._driven_s = 0.0
@@ -48,12 +48,12 @@ class Way:
 
     @property
     def is_there(self) -> bool:
-        """True once the place was reached; it stays so."""
+        """True once the place was reached; stays True."""
         return self._route.is_over
 
     @property
     def is_over(self) -> bool:
-        """True once the place was reached, or will not be."""
+        """True once the place was reached, or the way has failed."""
         return self.is_there or bool(self.failure)
 
     def interrupt(self) -> None:
@@ -62,7 +62,7 @@ class Way:
         self._route.interrupt()
 
     def decide(self, position: Position, now_s: float) -> Motion:
-        """Return the next motion; still once it is over.
+        """Return the next motion; no motion once the way is over.
 
         Args:
             now_s: Mission time; it never decreases.
@@ -96,7 +96,7 @@ def keep_distance(
 
     Args:
         speed_m_s: Fastest speed.
-        tolerance_m: It stands while its distance is no further off than this, and the target is ahead.
+        tolerance_m: Tolerance; the robot stands still while the distance is within it and the target is ahead.
     """
     off_m, bearing_rad = target.distance_m(position) - distance_m, target.bearing_rad(position)
     is_near = abs(off_m) <= tolerance_m

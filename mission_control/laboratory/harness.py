@@ -1,4 +1,4 @@
-"""Many trials or missions on all cores: the same give the same results, with any number of processes."""
+"""Runs many trials or missions on all cores; the results do not depend on the number of processes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TypeVar
 Order = TypeVar("Order")
 Result = TypeVar("Result")
 
-BATCH = 5  # chosen: seconds of work, so that the last process is not long alone, and cached pictures are used again
+BATCH = 5  # chosen: seconds of work: the last process does not run alone for long, and cached pictures are reused
 
 OBJECTS_AT_ONCE = 20_000  # chosen: some megabytes of garbage; Python's own 700 are for programs that have less
 
@@ -31,12 +31,12 @@ def run_all(
     """Run the work for each order and return the results in the same order.
 
     Args:
-        work: A function of a module, which other processes can import; its result depends only on its order.
-        orders: One for each result; orders and results can be pickled.
-        jobs: Processes; 0: one a core; 1: this one.
+        work: A module-level function, so that other processes can import it; its result depends only on its order.
+        orders: Arguments of the calls, one for each result; orders and results must be picklable.
+        jobs: Number of processes; 0: one per core; 1: this process.
 
     Raises:
-        Exception: The first exception of the work; no further order is begun.
+        Exception: The first exception of the work; no further call is started.
     """
     results: list[Result] = []
     for result in results_of(work, orders, jobs=jobs, chunk=BATCH):
@@ -49,7 +49,7 @@ def run_all(
 def results_of(
     work: Callable[[Order], Result], orders: Sequence[Order], *, jobs: int = 0, chunk: int = 1
 ) -> Generator[Result, None, None]:
-    """Yield the results in the order of the orders; no further order is begun once the generator is closed.
+    """Yield the results in the order of the orders; after the generator is closed, no further call is started.
 
     Args:
         work: As for ``run_all``.

@@ -1,6 +1,6 @@
-"""Arrangement: units as a mission file declares them, with the connections between them worked out.
+"""Arrangement: the units of a mission file, with the computed connections between them.
 
-The same modules in other units are another arrangement, and nothing else changes.
+The same modules may be put into other units; that changes only the arrangement.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from mission_control.modules.orders import (
 )
 from mission_control.modules.ports import kinds_of_ports, type_name
 
-_NAMED = re.compile(r"`(?:\$\.)?(\w+)`")  # the parameter that msgspec speaks of
+_NAMED = re.compile(r"`(?:\$\.)?(\w+)`")  # the parameter in msgspec's error text
 
 
 class UnitOrder(Running, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A unit.
 
     Attributes:
-        name: Of the component that runs it.
-        modules: What it runs; where nothing else orders them, in this order.
-        choices: Keys that get the values of one of several others.
+        name: Name of the component that runs the unit.
+        modules: Its modules; unless connections demand otherwise, they run in this order.
+        choices: Keys that get the values of one of several other keys.
     """
 
     name: str
@@ -50,7 +50,7 @@ class GivenKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         type: Class of the values, ``package.module:Class``.
-        source: Where they are published.
+        source: Place of their publication.
     """
 
     type: str
@@ -58,15 +58,15 @@ class GivenKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class NoMessage(WiringFault):
-    """Values that would cross the bus are no messages."""
+    """Values that must cross the bus are not messages."""
 
 
 class NoRounds(WiringFault):
-    """A unit never has a round; ``modules`` are all that it has."""
+    """A unit would never have a round; ``modules`` are all its modules."""
 
 
 class NoQuality(WiringFault):
-    """A key cannot have the quality that is declared for it; the port is the key."""
+    """A key cannot have its declared quality; the port is the key."""
 
 
 def arranged(
@@ -74,12 +74,12 @@ def arranged(
 ) -> dict[str, UnitParameters]:
     """Return unit → parameters of the component that runs it.
 
-    What another unit takes is published, and what no other module takes, if it is a message: it is there for others. So
-    are all algorithms that a choice can choose from.
+    Outputs that another unit takes are published. Outputs that no module takes are published, too, if they are
+    messages, for use by other components; and so are all sources of a choice.
 
     Raises:
-        WrongModule: A class path leads to no module.
-        GraphRefused: The modules cannot be connected; it says everything at once.
+        WrongModule: A class path does not name a module.
+        GraphRefused: The modules cannot be connected; the error lists all faults.
     """
     given_kinds = {key: load_at(one.type) for key, one in given.items()}
     kinds = dict(given_kinds)
@@ -99,7 +99,7 @@ def arranged(
 
 
 def _member(order: ModuleOrder, kinds: dict[str, object]) -> Member:
-    """Return a module's place in the graph; the classes of its outputs are among the kinds from now on."""
+    """Return a module's place in the graph, and add the classes of its outputs to the kinds."""
     module = order.load()
     member, declared = order.member(module), kinds_of_ports(module.Outputs)
     for key, port in member.keyed_outputs:
@@ -108,7 +108,7 @@ def _member(order: ModuleOrder, kinds: dict[str, object]) -> Member:
 
 
 def _with_choices(unit: UnitOrder, kinds: dict[str, object], members: list[Member]) -> UnitOrder:
-    """Return the unit with modules that choose; they have a place among the members from now on."""
+    """Return the unit with its choosing modules, and add these to the members."""
     orders = [choice.order(kinds[choice.source]) for choice in unit.choices]
     members += [_member(order, kinds) for order in orders]
     return msgspec.structs.replace(unit, modules=[*unit.modules, *orders], choices=[])
@@ -162,7 +162,7 @@ def _no_qualities(
 
 
 def _no_messages(graph: Graph, kinds: Mapping[str, object]) -> Iterator[WiringFault]:
-    """Yield what cannot go from one unit to another, at the module that takes it."""
+    """Yield a fault for each value that cannot cross between units, at the module that takes it."""
     for one in graph.connections:
         if not is_message(kinds[one.key]):
             [taker, *_] = [m for m in graph.units[one.consumer] if one.key in dict(m.keyed_inputs)]
@@ -181,7 +181,7 @@ def _no_rounds(graph: Graph, units: Sequence[UnitOrder]) -> Iterator[WiringFault
 
 # ---------------------------------------------------------------------- for mission files
 def judged(question: UnitsQuestion) -> Arranged:
-    """Return parameters of all units, or everything that does not fit."""
+    """Return the parameters of all units, or all faults."""
     units: list[UnitOrder] = []
     found: list[UnitFault] = []
     for declared in question.units:

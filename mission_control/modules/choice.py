@@ -1,7 +1,7 @@
-"""Choice: algorithms for one task run side by side, and one of them is the source of a key.
+"""Choice: algorithms for one task run side by side, and one of them provides the values of a key.
 
-A ``SourceChoice`` is a module like others, so the graph checks its classes, finds its place, and connects it to
-other units. Its ports follow from its parameters.
+A ``SourceChoice`` is an ordinary module: the graph checks its classes, orders it, and connects it to other units. Its
+parameters determine its ports.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class ChoiceOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         key: The key that gets the values.
-        source: The key whose values it gets at first.
+        source: The key that provides the values at first.
         others: Keys that can be chosen instead.
     """
 
@@ -35,12 +35,12 @@ class ChoiceOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def name(self) -> str:
-        """Name of the module that chooses."""
+        """Name of the choosing module."""
         return f"choose-{self.key}"
 
     @property
     def sources(self) -> list[str]:
-        """All keys that can be chosen, the first one first."""
+        """All keys that can be chosen, the initial one first."""
         return [self.source, *(key for key in self.others if key != self.source)]
 
     def order(self, kind: object) -> ModuleOrder:
@@ -49,7 +49,7 @@ class ChoiceOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SourceChoice(Module):
-    """Hands on the values of the chosen source, as they come."""
+    """Passes the values of the chosen source on when they arrive."""
 
     class Parameters(Module.Parameters, frozen=True):
         """Parameters of ``SourceChoice``.
@@ -57,7 +57,7 @@ class SourceChoice(Module):
         Attributes:
             of: Class of the values, ``package.module:Class``.
             key: Key of the output.
-            sources: Keys of the inputs; at first the first is chosen.
+            sources: Keys of the inputs; initially the first is chosen.
         """
 
         of: str
@@ -70,7 +70,7 @@ class SourceChoice(Module):
         """Return a module of a class with these ports.
 
         Raises:
-            WrongModule: Nothing stands at the path of the class.
+            WrongModule: The class path does not exist.
         """
         kind: Any = load_at(parameters.of)
         fields = [(f"from_{n}", Annotated[kind | None, Key(key)], None) for n, key in enumerate(parameters.sources)]
@@ -92,7 +92,7 @@ class SourceChoice(Module):
 
 
 def choice_faults(choices: Sequence[ChoiceOrder], kinds: Mapping[str, object]) -> Iterator[WiringFault]:
-    """Yield what is wrong with sources.
+    """Yield the faults of sources.
 
     Args:
         kinds: Key → class of the values of each key that has a producer.

@@ -1,16 +1,16 @@
-"""Exchange: decides which of two modules produces while one takes the place of the other.
+"""Exchange: decides which of two modules produces outputs while one replaces the other.
 
-Pure: time is an argument, and both modules are functions that run them once.
+Pure: time is an argument, and each module is given as a function that runs it once.
 
 Rules of this file:
 
-* In each round all outputs come from one of the two, so none is lost and none is doubled.
-* While it *warms*, the new one gets the same inputs and its outputs are dropped; the old one produces. While the new
-  one is *proving* itself, it produces, and the old one runs beside it.
-* The old one runs until the exchange is over. That costs the time of both, but its state is that of a module that was
-  never exchanged, and its outputs of the very round in which the new one fails are at hand.
-* A failure of the new one ends the exchange; a failure of the old one is the bug that it would be without an exchange,
-  unless the new one produces already.
+* In each round all outputs come from one of the two modules, so no output is lost or doubled.
+* *Warming*: the old one produces; the new one gets the same inputs, and its outputs are dropped. *Proving*: the new one
+produces, and the old one runs beside it.
+* The old one runs until the exchange is over. That costs the run time of both. But the old one's state is that of a
+module that was never exchanged, and its outputs are available even in the round in which the new one fails.
+* A failure of the new one ends the exchange. A failure of the old one counts as without an exchange, unless the new one
+already produces.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from mission_control.modules.module import Module
 from mission_control.modules.ports import type_name
 
 Turned = Mapping[str, object] | None
-"""Key → value that a module produced in a round; None: its inputs were not there, so it did not run."""
+"""Key → value that a module produced in a round; None: inputs were missing, so it did not run."""
 Turn = Callable[[], Turned]
-"""Runs a module once, if its inputs are there."""
+"""Runs a module once, if no input is missing."""
 
 
 class Exchange(ExchangeCourse):
@@ -37,7 +37,7 @@ class Exchange(ExchangeCourse):
 
     Args:
         is_ready: Returns whether the outputs of the new one can be used.
-        changed: Called after each change of the phase, in the thread that made it.
+        changed: Called after each change of the phase, in the thread that changed it.
         now_s: Time of its begin.
     """
 
@@ -49,14 +49,14 @@ class Exchange(ExchangeCourse):
         super().__init__(rules, changed, now_s)
         self._is_ready = is_ready
         self._missing_since_s: dict[str, float] = {}
-        self._busy = threading.Lock()  # a round may run in a thread, and its time is over in the event loop
+        self._busy = threading.Lock()  # a round may run in a thread, while the event loop ends its time
 
     def begin(self, now_s: float, hand_over: Callable[[], bool]) -> None:
-        """Let the new one have the state of the old one, if ``hand_over`` returns that it can."""
+        """Hand the old one's state over to the new one, if ``hand_over`` returns True."""
         self.keeps_state = bool(self.tried(now_s, hand_over))
 
     def round(self, now_s: float, old: Turn, new: Turn) -> Turned:
-        """Run what is to run in this round; return the outputs of the one that produces."""
+        """Run the modules in this round; return the outputs of the producing one."""
         with self._busy:
             self.let_pass(now_s)
             match self.phase:
@@ -70,7 +70,7 @@ class Exchange(ExchangeCourse):
                     return old()
 
     def pass_time(self, now_s: float) -> None:
-        """Note the time, between rounds or during one, which then notes it itself."""
+        """Apply the passing of time; during a round, the round applies it."""
         if self._busy.acquire(blocking=False):
             try:
                 self.let_pass(now_s)
@@ -106,7 +106,7 @@ class Exchange(ExchangeCourse):
         return turned
 
     def _silent(self, now_s: float, kept: Mapping[str, object], turned: Mapping[str, object]) -> list[str]:
-        """Return the keys without an output for too long."""
+        """Return the keys that have had no output for too long."""
         for key in turned:
             self._missing_since_s.pop(key, None)
         for key in set(kept) - set(turned):
@@ -115,9 +115,9 @@ class Exchange(ExchangeCourse):
 
 
 def handed_over(old: Module, new: Module) -> bool:
-    """Let the new module go on with a copy of the old one's state; return whether it has the same fields and types.
+    """Give the new module a copy of the old one's state; return whether both states have the same fields and types.
 
-    A copy, because both run.
+    A copy is needed because both modules run.
     """
     fields = _fields(old.State)
     if not fields or fields != _fields(new.State):

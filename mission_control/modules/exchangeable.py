@@ -1,10 +1,10 @@
-"""Whether a module can take the place of another one, as everything that does not fit. Pure.
+"""Checks whether a module can replace another one; reports all faults at once. Pure.
 
 Rules of this file:
 
-* Both have the same outputs by key and class, and the new one has the inputs of the old one, fed as those are.
-* The new one may have further inputs if they are optional, their keys exist in the unit, and none of them would begin
-  rounds: when the unit runs is no matter of one module.
+* Both have the same outputs by key and class, and the new one has all inputs of the old one, fed in the same way.
+* The new one may have further inputs if they are optional, their keys exist in the unit, and they do not begin rounds,
+because one module must not change when the unit runs.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from mission_control.modules.ports import Port, kinds_of_ports, type_name
 
 
 class OtherPorts(WiringFault):
-    """A module has other ports than the one whose place it is to take."""
+    """A module has other ports than the one that it should replace."""
 
 
 def graph_with(graph: Graph, unit: str, new: Member) -> Graph:
-    """Return the graph of a unit with this member in place of the one of its name.
+    """Return the graph of a unit in which this member replaces the one of the same name.
 
     Raises:
-        GraphRefused: The member cannot take that place; it says everything at once.
+        GraphRefused: The member does not fit; the error lists all faults.
     """
     members = graph.units[unit]
     [old] = [one for one in members if one.name == new.name]
@@ -97,7 +97,7 @@ def judge_of(kinds: Mapping[str, object], kind: type[Module], member: Member) ->
     """Return a function that raises if what the ``update`` of a module of this class returned are no outputs.
 
     Args:
-        kinds: Key → class of its values, as the modules that take them have it.
+        kinds: Key → class of its values, as declared by the modules that take them.
     """
     wanted = [(port.name, key, kinds[key]) for key, port in member.keyed_outputs]
 
@@ -117,7 +117,7 @@ def judge_of(kinds: Mapping[str, object], kind: type[Module], member: Member) ->
 
 
 def _is_of(value: object, kind: object) -> bool:
-    """Return whether the value is of the class, as far as a class can tell."""
+    """Return whether the value is of the class, as far as this can be checked."""
     if get_origin(kind) is not None or not isinstance(kind, type):
         return True
     return isinstance(value, (float, int) if kind is float else kind)

@@ -1,10 +1,10 @@
-"""Execution unit: modules that run one after the other, round by round, and hand over the objects themselves.
+"""Execution unit: modules that run one after the other, round by round, and exchange objects without copying.
 
 Pure: time is an argument, and the caller carries values between units. In a round each module runs, in the graph's
-order, if its inputs are there:
+order, if no input is missing:
 
-* a required input needs a value; a fresh one, a value that the module has not had yet;
-* a module whose fresh inputs are all optional runs if one of them has such a value;
+* a required input needs a value; a fresh input needs a value that the module has not had yet;
+* a module whose fresh inputs are all optional runs if one of them has a new value;
 * a module without fresh inputs runs in every round.
 """
 
@@ -28,7 +28,7 @@ from mission_control.modules.ports import Port
 from mission_control.modules.unit_schedule import Trigger, UnitSchedule
 
 Stopwatch = Callable[[], float]
-"""Returns seconds from any origin: to measure how long modules run."""
+"""Returns seconds from any origin, to measure the run time of modules."""
 
 
 class NeverRuns(Refusal):
@@ -46,7 +46,7 @@ class Produced(NamedTuple):
 
 
 class ModuleTimes(msgspec.Struct, frozen=True):
-    """How often and how long a module ran."""
+    """Number and duration of a module's runs."""
 
     runs: int = 0
     busy_s: float = 0.0
@@ -58,17 +58,17 @@ class ModuleTimes(msgspec.Struct, frozen=True):
 
 
 class UnitStatistics(msgspec.Struct, frozen=True):
-    """How a unit keeps up.
+    """Statistics of a unit.
 
     Attributes:
         rounds: Number of rounds.
-        rate_hz: Rounds a second of late.
-        ticks: Rounds that began because of the frequency.
-        missed: Ticks that had no round, because the one before began too late.
-        mean_late_s: How late rounds of the frequency began.
-        most_late_s: The latest of them.
-        overwritten: Key → values from outside that came before the one before them was taken; for fresh inputs.
-        modules: Module → how often and how long it ran.
+        rate_hz: Recent rate of rounds, Hz.
+        ticks: Rounds that the frequency began.
+        missed: Ticks without a round, because an earlier round was too late.
+        mean_late_s: Mean delay of the rounds of the frequency.
+        most_late_s: Largest of these delays.
+        overwritten: Key → number of values from outside that replaced a value not yet taken; for fresh inputs.
+        modules: Module → number and duration of its runs.
     """
 
     rounds: int
@@ -116,7 +116,7 @@ class _Seat:
     times: ModuleTimes = field(default_factory=ModuleTimes)
 
     def taken(self) -> dict[str, object] | None:
-        """Return the inputs that are there, which are seen from now on; None: the module does not run."""
+        """Return the present inputs and mark them as seen; None: the module does not run."""
         fresh = [one for one in self.inputs if not one.port.is_latest]
         if not all(one.is_there for one in self.inputs if one.port.is_required):
             return None
@@ -135,13 +135,13 @@ class _Seat:
 
 @dataclass(frozen=True, slots=True)
 class WantedExchange:
-    """A module that is to take the place of another one.
+    """A request to replace a module by another one.
 
     Attributes:
-        graph: The unit's with the new module in place of the old one; its connections from outside are the same.
-        name: Of both modules.
+        graph: The unit's graph with the new module in place of the old one; its connections from outside are the same.
+        name: Name of both modules.
         module: The new one.
-        judge: Raises if what its ``update`` returned are no outputs.
+        judge: Raises if the new module's ``update`` returned wrong outputs.
     """
 
     graph: Graph
@@ -153,28 +153,28 @@ class WantedExchange:
 
 @dataclass(slots=True)
 class _Exchanging:
-    """Two seats of one name, of which the exchange says which one produces."""
+    """Two seats of one name; the exchange decides which one produces."""
 
     exchange: Exchange
     old: _Seat
     new: _Seat
     seats: list[_Seat]
-    """All seats of the unit as they were before."""
+    """All previous seats of the unit."""
 
 
 class ExecutionUnit:
     """The modules of one unit at work.
 
     Args:
-        name: Of the unit.
+        name: Name of the unit.
         graph: The whole graph.
-        modules: Name → module, at least those of the unit.
-        trigger: When it has rounds.
+        modules: Name → module, for at least all modules of the unit.
+        trigger: Condition for rounds.
         start_s: Time of its first tick.
         stopwatch: Measures how long each module runs.
 
     Raises:
-        NeverRuns: It has neither a frequency nor an input that begins a round.
+        NeverRuns: The unit has neither a frequency nor an input that begins a round.
     """
 
     def __init__(
@@ -223,10 +223,10 @@ class ExecutionUnit:
         return self._schedule.due_s
 
     def put(self, key: str, value: object, overwritten: int = 0) -> bool:
-        """Take a value from outside the unit; return whether a round is due because of it.
+        """Store a value from outside the unit; return whether a round is due because of it.
 
         Args:
-            overwritten: How many values of the key came since the last ``put`` and were not put.
+            overwritten: Number of values of the key that were dropped since the last ``put``.
         """
         if key not in self._into:
             return False
@@ -242,7 +242,7 @@ class ExecutionUnit:
         return self._schedule.tick(now_s)
 
     def run(self, now_s: float) -> list[Produced]:
-        """Have a round; return what its modules produced, in the order in which they did."""
+        """Run a round; return the produced values in the order of production."""
         self._schedule.began(now_s)
         produced: list[Produced] = []
         self._settle(now_s)
@@ -254,7 +254,7 @@ class ExecutionUnit:
         return produced
 
     def _turned(self, seat: _Seat, now_s: float) -> Mapping[str, object] | None:
-        """Return what comes from this place in this round; None: its inputs are not there."""
+        """Return the outputs of this seat in this round; None: inputs are missing."""
         pair = self._exchanging
         if pair is None or pair.old is not seat:
             return self._turn(seat)
@@ -275,11 +275,11 @@ class ExecutionUnit:
         return seat.values(outputs)
 
     def exchange(self, wanted: WantedExchange) -> None:
-        """Begin the exchange with the next round; it decides which module produces until it is over."""
+        """Begin the exchange with the next round; until it is over, it decides which module produces."""
         self._wanted = wanted
 
     def _settle(self, now_s: float) -> None:
-        """End an exchange that is over, and begin one that is wanted."""
+        """Remove a finished exchange, and begin a requested one."""
         if self._exchanging is not None and self._exchanging.exchange.is_over:
             self._end_exchange(self._exchanging)
         if self._wanted is not None and self._exchanging is None:
@@ -294,7 +294,7 @@ class ExecutionUnit:
         for one in new.inputs:
             one.seen = seen.get(id(one.slot), one.seen)
         self._exchanging = _Exchanging(wanted.exchange, old, new, self._seats)
-        order = wanted.graph.order[self.name]  # legal for the old one, too: the new one has its inputs, and others
+        order = wanted.graph.order[self.name]  # legal for the old one, too, because the new one has at least its inputs
         self._seats = sorted(self._seats, key=lambda seat: order.index(seat.name))
         wanted.exchange.begin(now_s, lambda: handed_over(old.module, new.module))
 
@@ -308,7 +308,7 @@ class ExecutionUnit:
         self._fresh = self._fresh_inputs()
 
     def reset(self, start_s: float) -> None:
-        """Begin anew: modules, inputs and statistics are as they were at first, and no exchange goes on."""
+        """Reset modules, inputs and statistics to the beginning, and end any exchange."""
         if self._exchanging is not None:
             self._exchanging.exchange.fail(start_s, "its unit began anew")
             self._end_exchange(self._exchanging)
@@ -322,7 +322,7 @@ class ExecutionUnit:
         self._begin(start_s)
 
     def statistics(self) -> UnitStatistics:
-        """Return how it keeps up."""
+        """Return the unit's statistics."""
         schedule = self._schedule
         return UnitStatistics(
             schedule.rounds,

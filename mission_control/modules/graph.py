@@ -1,12 +1,12 @@
-"""Graph: modules in execution units, with their connections checked and their order worked out.
+"""Graph: modules in execution units; checks their connections and computes their order.
 
-Pure data goes in, so a mission file is checked without an instance of any module.
+The input is plain data, so a mission file can be checked without an instance of any module.
 
 Rules of this file:
 
 * Outputs and inputs are connected by key. Their types must be equal.
-* What is legal does not depend on the units: the same modules are legal in every arrangement. So a cycle through
-  several units is refused as one within a unit is.
+* Legality does not depend on the units: legal modules are legal in every arrangement. So a cycle through several units
+is rejected like a cycle within one unit.
 * All faults are found at once.
 
 Source: B-Human's module graph; RoboFrame 2006, section III.
@@ -22,7 +22,7 @@ from backbone.errors import Refusal
 from backbone.naming import did_you_mean, is_legal
 from mission_control.modules.ports import ModulePorts, Port
 
-OUTSIDE = ""  # the unit of a value that no module of the graph produces
+OUTSIDE = ""  # the unit of values that no module of the graph produces
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,8 @@ class Member:
 
     Attributes:
         name: Unique in the graph.
-        ports: As its class declares them.
-        inputs: Input → key, where it is another than the declared one.
+        ports: Ports that its class declares.
+        inputs: Input → key, if it differs from the declared one.
         outputs: Output → key, likewise.
     """
 
@@ -54,10 +54,10 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """The way of a key's values from one unit to another.
+    """The path of a key's values from one unit to another.
 
     Attributes:
-        producer: Unit of the module that produces them; ``OUTSIDE``: none does.
+        producer: Unit of the module that produces them; ``OUTSIDE``: no module does.
         consumer: Unit with a module that takes them.
     """
 
@@ -70,13 +70,13 @@ class Connection:
 # ---------------------------------------------------------------------- faults
 @dataclass(frozen=True, slots=True)
 class WiringFault:
-    """Something that does not fit.
+    """A fault of the graph.
 
     Attributes:
-        modules: Names of the modules that it is about, the first to blame first.
-        port: Name of the port of the first of them; empty: it is about the whole module.
+        modules: Names of the modules concerned, the main one first.
+        port: Name of the port of the first module; empty: the fault concerns the whole module.
         detail: A sentence with the names.
-        remedy: What to do.
+        remedy: Advice for the author.
     """
 
     modules: tuple[str, ...]
@@ -86,11 +86,11 @@ class WiringFault:
 
 
 class IllegalModuleName(WiringFault):
-    """A module or a key has a name that cannot be part of a key, or that another module has."""
+    """The name of a module or key cannot be part of a key, or another module has it."""
 
 
 class UnknownPort(WiringFault):
-    """A module is given a key for a port that it does not have."""
+    """A key is set for a port that the module does not have."""
 
 
 class SecondProducer(WiringFault):
@@ -102,7 +102,7 @@ class NoProducer(WiringFault):
 
 
 class WrongType(WiringFault):
-    """An input takes another type than its key's producer makes."""
+    """The type of an input differs from that of its key's producer."""
 
 
 class Cycle(WiringFault):
@@ -113,11 +113,11 @@ class GraphRefused(Refusal):
     """The modules cannot be connected.
 
     Attributes:
-        faults: All that was found.
+        faults: All faults found.
     """
 
     code = "module.graph"
-    remedy = "Mend each fault as it says."
+    remedy = "Correct each fault as its remedy says."
 
     def __init__(self, faults: Sequence[WiringFault]) -> None:
         lines = (f"{type(one).__name__}: {one.detail}. {one.remedy}" for one in faults)
@@ -130,15 +130,15 @@ class Graph:
     """A checked graph.
 
     Args:
-        units: Unit → its modules, in the order in which they run where nothing else orders them.
-        given: Key → type of the values that come from outside.
+        units: Unit → its modules; unless connections demand otherwise, they run in this order.
+        given: Key → type of values from outside.
 
     Attributes:
         order: Unit → names of its modules in the order in which they run.
-        connections: What goes from one unit to another, or comes from outside; sorted.
+        connections: Connections between units and from outside; sorted.
 
     Raises:
-        GraphRefused: Something does not fit; it says everything at once.
+        GraphRefused: The graph has faults; the error lists all of them.
     """
 
     def __init__(self, units: Mapping[str, Sequence[Member]], given: Mapping[str, str] | None = None) -> None:
@@ -160,11 +160,11 @@ class Graph:
         )
 
     def into(self, unit: str) -> dict[str, str]:
-        """Return key → producing unit of all that comes into a unit."""
+        """Return key → producing unit, for all values that enter a unit."""
         return {one.key: one.producer for one in self.connections if one.consumer == unit}
 
     def awaited(self, unit: str) -> frozenset[str]:
-        """Return the keys from outside the unit whose values begin a round: of required fresh inputs, else of all."""
+        """Return the keys from outside whose values begin a round: those of required fresh inputs, else of all."""
         into = self.into(unit)
         fresh = [
             (key, port.is_required)
@@ -180,7 +180,7 @@ class Graph:
 
 
 def faults(units: Mapping[str, Sequence[Member]], given: Mapping[str, str]) -> list[WiringFault]:
-    """Return everything that does not fit, in the order of the modules."""
+    """Return all faults, in the order of the modules."""
     members = [member for _unit, member in _all(units)]
     producers: dict[str, tuple[Member, Port]] = {}
     found = list(_of_names(members))
@@ -229,7 +229,7 @@ def _of_outputs(
             yield SecondProducer((member.name,), port.name, detail, "Give its output another key")
         elif first is not member or producers[key][1] is not port:
             detail = f"{member.name} produces {key}, and so does {first.name}"
-            remedy = "Give one of them another key; who takes the values names the key that it wants"
+            remedy = "Give one of them another key; each module that takes values names the wanted key"
             yield SecondProducer((member.name, first.name), port.name, detail, remedy)
 
 
@@ -272,7 +272,7 @@ def _before(members: Sequence[Member], producers: Mapping[str, str]) -> dict[str
 
 
 def _ordered(members: Sequence[Member]) -> Iterator[str]:
-    """Yield the names in the first of all possible orders, by their places among ``members``."""
+    """Yield the names in the first possible order, by their places among ``members``."""
     producers = {key: member.name for member in members for key, _port in member.keyed_outputs}
     left = _before(members, producers)
     place = {member.name: number for number, member in enumerate(members)}
@@ -289,7 +289,7 @@ def _ordered(members: Sequence[Member]) -> Iterator[str]:
 
 
 def _cycles(members: Sequence[Member], producers: Mapping[str, str]) -> Iterator[WiringFault]:
-    """Yield one fault for each set of modules that all wait for each other."""
+    """Yield one fault for each set of modules that wait for each other."""
     before = _before(members, producers)
     reached = {name: _reachable(name, before) for name in before}
     told: set[str] = set()

@@ -1,7 +1,7 @@
-"""Module: an algorithm with declared inputs and outputs, which knows neither bus nor clock.
+"""Module: an algorithm with declared inputs and outputs, without access to bus or clock.
 
-Derive, declare ``Inputs`` and ``Outputs``, override ``update``. What a module keeps between two updates it sets in
-``reset``, or declares as ``State``. A module is tried in three lines::
+Derive, declare ``Inputs`` and ``Outputs``, override ``update``. The attributes that a module keeps between two updates
+are set in ``reset``, or declared as ``State``. Three lines test a module::
 
     averaging = Averaging(Averaging.Parameters(count=2))
     averaging.update(Averaging.Inputs(Number(1.0)))
@@ -20,23 +20,23 @@ import msgspec
 
 from mission_control.modules.ports import ModulePorts, Ports, ports_of
 
-if TYPE_CHECKING:  # most modules see no pictures and stay without NumPy
+if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
     import numpy as np
     from numpy.typing import NDArray
 
 
 class Debug(Protocol):
-    """Where a module shows named pictures and values; see ``mission_control.debug_views.DebugViews``."""
+    """Interface by which a module shows named pictures and values; see ``mission_control.debug_views.DebugViews``."""
 
     def picture(self, view: str, make: Callable[[], NDArray[np.generic]]) -> None:
-        """Show a picture; ``make`` is called at once if a console looks, else never."""
+        """Show a picture; if a console watches the view, ``make`` is called at once, else never."""
 
     def value(self, view: str, value: float | bool | str) -> None:
         """Show a value."""
 
 
 class Unseen:
-    """The debug views of a module outside a mission: nothing is made."""
+    """The debug views of a module outside a mission: they do nothing."""
 
     def picture(self, view: str, make: Callable[[], NDArray[np.generic]]) -> None:
         """Do nothing."""
@@ -49,25 +49,25 @@ UNSEEN = Unseen()
 
 
 class Module:
-    """Base of every module.
+    """Base class of every module.
 
-    A derived class declares the classes that it needs; the others are empty.
+    A derived class declares the classes that it needs; the others are empty by default.
 
     Args:
-        parameters: Its ``Parameters``; left out: their defaults.
+        parameters: Its ``Parameters``; left out: the defaults.
     """
 
     class Inputs(Ports):
-        """What ``update`` gets; see ``ports``."""
+        """Argument of ``update``; see ``ports``."""
 
     class Outputs(Ports):
-        """What ``update`` returns; see ``ports``."""
+        """Result of ``update``; see ``ports``."""
 
     class Parameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-        """Values that a mission file can set; with defaults, or else the file must give them."""
+        """Values that a mission file can set; it must set values without a default."""
 
     class State(msgspec.Struct):
-        """What it keeps between two updates and hands over when it is exchanged; each field has a default."""
+        """Values that the module keeps between two updates and hands over in an exchange; each field has a default."""
 
     state: Any
     """Derived classes with a state repeat this as ``state: State``."""
@@ -77,21 +77,21 @@ class Module:
     def __init__(self, parameters: msgspec.Struct | None = None) -> None:
         self.parameters = self.Parameters() if parameters is None else parameters
         self.debug: Debug = UNSEEN
-        """Its debug views; they cost nothing unless a console looks."""
+        """Its debug views; they cost nothing unless a console watches them."""
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything: afterwards the module is as it was when it was made.
+        """Return to the state of a new module.
 
-        When: at the begin of its life, and before its unit begins anew. What: set every attribute that ``update``
+        When: at the creation of the module, and before its unit begins again. What: set every attribute that ``update``
         changes. A class that declares ``State`` and keeps nothing else needs no ``reset`` of its own.
         """
         self.state = self.State()
 
     def is_ready(self) -> bool:
-        """Return whether its outputs are good enough to use.
+        """Return whether the module's outputs are good enough to use.
 
-        When: after each update while it runs beside the module that it is to replace. Override it if the first outputs
+        When: after each update while it runs beside the module that it should replace. Override it if the first outputs
         after ``reset`` are poor, such as those of a running average.
         """
         return True
@@ -99,8 +99,8 @@ class Module:
     def update(self, inputs: Any) -> Any:
         """Return the ``Outputs`` for these ``Inputs``.
 
-        When: once in each round in which its required inputs are there. Not: read a clock, wait, send, start tasks, or
-        change an input, which others see as well.
+        When: once in each round in which no required input is missing. Not: read a clock, wait, send, start tasks, or
+        change an input, because other modules have the same object.
         """
         raise NotImplementedError
 
@@ -109,13 +109,13 @@ class Module:
         """Return the declared ports.
 
         Raises:
-            WrongDeclaration: They cannot be read.
+            WrongDeclaration: A port cannot be read from its declaration.
         """
         return ModulePorts(ports_of(cls.Inputs), ports_of(cls.Outputs))
 
 
 def default_name(kind: type[Module]) -> str:
-    """Return the name of a module that is given none: its class's.
+    """Return the default name of a module, derived from its class.
 
     Example:
         >>> default_name(type("FrameAveraging", (Module,), {}))

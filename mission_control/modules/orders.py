@@ -1,4 +1,4 @@
-"""Orders: what a mission file says of modules and units, as plain data, and the modules that are made of it."""
+"""Orders: the declarations of modules and units in a mission file, as plain data; creates the modules from them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mission_control.modules.unit_schedule import Trigger
 
 
 class WrongModule(WrongClass):
-    """A class path leads to no module, or the module refuses its parameters."""
+    """A class path does not name a module, or the module refuses its parameters."""
 
     code = "module.class"
     remedy = "Write the class as package.module:Class, derived from mission_control.modules.module:Module."
@@ -32,7 +32,7 @@ class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         name: Its name, unique in the mission.
         class_path: ``package.module:Class``.
         parameters: Values for its ``Parameters``.
-        inputs: Input → key, where it is another than the class declares.
+        inputs: Input → key, if it differs from the declared one.
         outputs: Output → key, likewise.
     """
 
@@ -46,7 +46,7 @@ class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Return the module.
 
         Raises:
-            WrongModule: There is none, or not with these parameters.
+            WrongModule: There is no such class, or it refuses these parameters.
         """
         kind = load_module_class(self.class_path)
         try:
@@ -58,16 +58,16 @@ class ModuleOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             ) from None
 
     def member(self, module: Module | type[Module]) -> Member:
-        """Return its place in a graph."""
+        """Return the module's place in a graph."""
         return Member(self.name, module.ports(), self.inputs, self.outputs)
 
 
 class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the values of a key are published.
+    """The place of publication of a key's values.
 
     Attributes:
         address: ``<subsystem>/<component>``, and the key of an output.
-        conversation: Of the publications.
+        conversation: Conversation of the publications.
     """
 
     address: str
@@ -75,12 +75,12 @@ class Source(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Running(Trigger, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """When and where a unit has its rounds.
+    """Condition and place of a unit's rounds.
 
     Attributes:
-        own_thread: Whether the rounds run in a thread of their own, beside the event loop.
+        own_thread: True: the rounds run in their own thread beside the event loop.
         nice: Added to the niceness of that thread.
-        cpus: Processors that it may run on; empty: all.
+        cpus: Processors on which it may run; empty: all.
     """
 
     own_thread: bool = False
@@ -97,11 +97,11 @@ class UnitParameters(Running, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Parameters of the component that runs a unit.
 
     Attributes:
-        modules: What it runs.
-        sources: Key → where its values come from, for what the unit does not produce itself.
-        published: Keys of the outputs that others get.
-        qualities: Key of these or of a source → how its values travel, where it is not as for all outputs.
-        chosen: Key → chosen source, where it is another than the first one of a ``SourceChoice``; settable.
+        modules: Modules of the unit.
+        sources: Key → source of its values, for keys that the unit does not produce itself.
+        published: Keys of the published outputs.
+        qualities: Key of an output or source → quality of its transport, if it differs from the default.
+        chosen: Key → chosen source, if it is not the first one of a ``SourceChoice``; settable.
     """
 
     modules: list[ModuleOrder]
@@ -127,15 +127,15 @@ def is_message(kind: object) -> TypeGuard[type[Message]]:
 
 
 def load_at(class_path: str) -> object:
-    """Return what stands at ``package.module:Class``; imports its file.
+    """Return the object at ``package.module:Class``; imports its file.
 
     Raises:
-        WrongModule: Nothing does, or the file cannot be imported.
+        WrongModule: There is no such object, or the file cannot be imported.
     """
     file, _, name = class_path.partition(":")
     try:
         return operator.attrgetter(name)(importlib.import_module(file))
-    except Exception as error:  # a file that is being written raises anything
+    except Exception as error:  # a file that is just being written may raise any exception
         raise WrongModule(f"{class_path}: {type(error).__name__}: {error}", class_path=class_path) from error
 
 

@@ -1,6 +1,6 @@
-"""The operating system's calls for one thread: niceness, and the processors it may run on.
+"""System calls for one thread: niceness and allowed processors.
 
-On Linux both belong to the thread and not to its process, so a unit of a shared process has its own.
+On Linux both belong to the thread, not to its process, so each unit of a shared process has its own values.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ LEAST_NICE, MOST_NICE = -20, 19  # setpriority(2)
 
 
 class ThreadRefused(Refusal):
-    """A thread cannot have the niceness or the processors that were asked for."""
+    """A thread cannot have the requested niceness or processors."""
 
     code = "module.thread"
     remedy = "Name processors that this host has, and a niceness of 0 or more, or give the user the right CAP_SYS_NICE."
 
 
 class ThreadPlace(msgspec.Struct, frozen=True):
-    """Where and how urgently a thread runs.
+    """Processors and priority of a thread.
 
     Attributes:
         id: Number of the thread on its host.
         nice: -20, the most urgent, to 19.
-        cpus: Processors it may run on.
+        cpus: Allowed processors.
     """
 
     id: int
@@ -41,11 +41,12 @@ class ThreadPlace(msgspec.Struct, frozen=True):
 
 
 def place_thread(nice: int, cpus: Collection[int]) -> ThreadPlace:
-    """Place the calling thread, and return what the operating system then says of it.
+    """Set niceness and processors of the calling thread; return the values that the operating system then reports.
 
     Args:
-        nice: Added to the niceness of the thread; above 0: others come before it. Stays within -20 to 19.
-        cpus: Processors it may run on; empty: all that it may run on already.
+        nice: Added to the niceness of the thread; above 0: other threads have priority. The sum is clipped to -20 to
+            19.
+        cpus: Processors on which it may run; empty: unchanged.
 
     Raises:
         ThreadRefused: This host lacks one of the processors, or the user may not raise the priority.

@@ -1,12 +1,12 @@
 """Ports: the inputs and outputs that a module declares, as plain data.
 
-A port is a field of the module's ``Inputs`` or ``Outputs``. Its class and key say what it is connected to:
+A port is a field of the module's ``Inputs`` or ``Outputs``. Its class and key determine its connections:
 
 * without a default an input is required: the module waits for a value;
 * with a default it is optional: without a value the module gets the default;
-* an input is *fresh*: the module gets each value once, and its producer runs first. Marked ``LATEST`` it is a *latest
-  value*: the module gets the newest value, as often as it runs. With a default, too, it orders nothing, so it breaks a
-  cycle;
+* an input is *fresh*: the module gets each value once, and its producer runs first. An input marked ``LATEST`` is a
+*latest value*: at each run the module gets the newest value. If it also has a default, its producer need not run
+first, so it breaks a cycle;
 * an output with the default ``None`` may be left out of a round.
 
 Source: B-Human's REQUIRES, USES and PROVIDES; keys and types: RoboFrame 2006, section III.
@@ -38,7 +38,7 @@ class Ports(msgspec.Struct):
 
 
 class InputMark(Enum):
-    """How an input is fed, other than fresh."""
+    """Marks of inputs that are not fresh."""
 
     LATEST = "latest"
 
@@ -54,14 +54,14 @@ class Key(msgspec.Struct, frozen=True):
 
 
 class Port(msgspec.Struct, frozen=True):
-    """One input or output of a module.
+    """An input or output of a module.
 
     Attributes:
-        name: Its field.
-        key: What it is connected by, unique in the graph for an output.
-        type: Its class, ``package.module:Class``; equal on both sides of a connection.
+        name: Name of its field.
+        key: Key of its connections; an output's key is unique in the graph.
+        type: Class of its values, ``package.module:Class``; equal on both sides of a connection.
         is_required: Of an input: the module waits for a value. Of an output: each round has one.
-        is_latest: Of an input: it is the latest value instead of fresh.
+        is_latest: Of an input: it is a latest value, not fresh.
     """
 
     name: str
@@ -88,7 +88,7 @@ def ports_of(declared: type[Ports]) -> tuple[Port, ...]:
     """Return the ports that a struct declares, in the order of its fields.
 
     Raises:
-        WrongDeclaration: A field's annotation is no class, or its key is no legal name.
+        WrongDeclaration: A field's annotation is not a class, or its key is not a legal name.
     """
     hints = _hints(declared)
     return tuple(_port(declared, field, hints[field.name]) for field in msgspec.structs.fields(declared))
@@ -101,7 +101,7 @@ def kinds_of_ports(declared: type[Ports]) -> dict[str, object]:
 
 
 def type_name(kind: object) -> str:
-    """Return the name by which two ports are compared.
+    """Return the name of a type, for the comparison of two ports.
 
     Example:
         >>> type_name(Port), type_name(list[int])

@@ -13,7 +13,7 @@ from mission_control.modules.module import Module, default_name
 from mission_control.modules.unit_schedule import Trigger
 from mission_control.modules.units_together import Listener, UnitsTogether
 
-UNIT = "unit"  # the name of the only one
+UNIT = "unit"  # the name of the only unit
 
 
 def connected(
@@ -22,9 +22,9 @@ def connected(
     """Return the modules in one unit, each under the name of its class.
 
     Args:
-        modules: Each of another class.
-        frequency_hz: Rounds a second; 0: only when something is fed.
-        given: Key → type of what is fed.
+        modules: Modules of different classes.
+        frequency_hz: Rounds a second; 0: rounds only when a value is fed.
+        given: Key → type of the fed values.
         start_s: Time of the first round.
 
     Raises:
@@ -44,7 +44,7 @@ def run(
     """Run the modules in this process; return them when the time is over.
 
     Args:
-        modules: Each of another class.
+        modules: Modules of different classes.
         frequency_hz: Rounds a second, above 0.
         for_s: Seconds; left out: until the process is interrupted.
         listen: Key → function that is called with each of its values.
@@ -61,7 +61,7 @@ def run(
 
 
 async def run_units(units: UnitsTogether, clock: Clock, until_s: float = math.inf) -> None:
-    """Run the rounds of all frequencies when they are due; return when the next one is not before ``until_s``."""
+    """Run the rounds of all frequencies when they are due, until no further round is due before ``until_s``."""
     while (next_s := units.next_s) < until_s:
         await clock.sleep_until_s(next_s)
         units.tick(clock.now_s())

@@ -1,7 +1,7 @@
-"""Run modules without a mission, each in a process of its own: connected by name and type over a hub of their own.
+"""Run modules without a mission, each in its own process, connected by name and type over their own hub.
 
-The same modules that ``run`` runs in one process. The processes are forked from the script, so the script's own classes
-are there in each of them; they end with the script, also if it is killed.
+The same modules also work with ``run`` in one process. The processes are forked from the script, so each of them has
+the script's own classes. They end with the script, even if it is killed.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class ModuleProcessFell(Refusal):
     """The process of a module ended, or was not ready in time."""
 
     code = "module.process"
-    remedy = "See what it printed."
+    remedy = "Read the output that the process printed."
 
 
 class _Unit(UnitComponent):
@@ -60,7 +60,7 @@ class _Unit(UnitComponent):
 
 @dataclass
 class _Child:
-    """The process of a module; it begins when it is told the endpoint, and ends when the connection is closed."""
+    """The process of a module; it begins when it receives the endpoint, and ends when the connection is closed."""
 
     launch: Launch
     process: BaseProcess
@@ -73,18 +73,20 @@ def run_in_processes(
     for_s: float = math.inf,
     listen: Mapping[str, Listener] | None = None,
 ) -> dict[str, dict[str, float]]:
-    """Run each module in a process of its own; return module → statistics of its unit when the time is over.
+    """Run each module in its own process; when the time is over, return module → statistics of its unit.
 
-    A module that waits for inputs runs when they come, the others at the frequency.
+    A module that waits for inputs runs when they arrive; the other modules run at the frequency.
 
     Args:
-        modules: Each of another class at a module's top. The processes make them anew from class and parameters.
+        modules: Modules of different classes, each at the top level of a file. The processes create them again from
+            class and parameters.
         frequency_hz: Rounds a second, above 0.
         for_s: Seconds; left out: until the process is interrupted.
         listen: Key → function that is called in this process with each of its values.
 
     Raises:
-        GraphRefused: They cannot be connected, or what they exchange is no message; it says everything at once.
+        GraphRefused: The modules cannot be connected, or exchange values that are not messages; the error lists all
+            faults.
         ModuleProcessFell: A process ended before the time was over.
     """
     units = _units(modules, frequency_hz)
@@ -98,7 +100,7 @@ def run_in_processes(
 
 
 def _units(modules: Sequence[Module], frequency_hz: float) -> dict[str, UnitParameters]:
-    """Return unit → parameters; the units of modules that take from others stand before theirs."""
+    """Return unit → parameters; consumers are before their producers."""
     members = [Member(default_name(type(one)), one.ports()) for one in modules]
     order = Graph({"all": members}).order["all"]
     apart = Graph({member.name: [member] for member in members})
@@ -120,7 +122,7 @@ def _order(name: str, module: Module) -> ModuleOrder:
 
 # ---------------------------------------------------------------------- in the script
 def _forked(name: str, parameters: UnitParameters, clock: MissionClock, others: Sequence[_Child]) -> _Child:
-    """Fork a process that waits for the endpoint of the hub; it must be forked before the hub's threads exist."""
+    """Fork a process that waits for the hub's endpoint; call this before the hub's threads exist."""
     given = msgspec.to_builtins(parameters)
     origin_s = clock.origin_monotonic_s
     launch = Launch(MISSION, Subsystem.MISSION_CONTROL, name, "unit", "", "here", "", origin_s, 1.0, given)
@@ -143,7 +145,7 @@ def _end(child: _Child) -> None:
 async def _accompany(
     children: Sequence[_Child], endpoint: str, clock: MissionClock, for_s: float, listen: Mapping[str, Listener]
 ) -> dict[str, dict[str, float]]:
-    """Be the hub, and call the listeners, until the time is over."""
+    """Run the hub and call the listeners until the time is over."""
     loop = asyncio.get_running_loop()
     fell: asyncio.Future[str] = loop.create_future()
     for child in children:
@@ -182,7 +184,7 @@ def _hand_on(listener: Listener, output: Envelope[Message]) -> None:
 
 
 async def _begin(hub: ZenohBus, child: _Child, endpoint: str, fell: asyncio.Future[str]) -> None:
-    """Let the process begin; return when it is ready, so that those that produce begin after those that take."""
+    """Start the process; return when it is ready, so that producers begin after their consumers."""
     ready: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     hub.watch_alive(child.launch.address, lambda _address, alive: settle(ready, "") if alive else None)
     child.connection.send(endpoint)
@@ -199,10 +201,10 @@ async def _statistics(hub: ZenohBus, launch: Launch) -> dict[str, float]:
 
 # ---------------------------------------------------------------------- in the process of a module
 def _become(launch: Launch, connection: Connection, inherited: Sequence[Connection]) -> None:
-    """Become the unit when the endpoint comes."""
-    for one in inherited:  # else the end of the script would not close them
+    """Run the unit when the endpoint arrives."""
+    for one in inherited:  # otherwise the end of the script would not close them
         one.close()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the script ends its processes
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the script ends its processes
     try:
         endpoint = connection.recv()
     except EOFError:

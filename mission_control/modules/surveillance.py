@@ -1,10 +1,10 @@
-"""The vision of a watching behavior as modules: averaging → detection → tracking, and the earlier method beside them.
+"""The vision of a watching behavior as modules (averaging → detection → tracking), and the earlier method.
 
-Together the three say what ``vision.motion_detection.MotionDetector`` says, picture by picture. Each can be exchanged
-for another algorithm of the same inputs and outputs, and each shows its own debug views.
+Together the three modules give the same results as ``vision.motion_detection.MotionDetector``, picture by picture. Each
+can be exchanged for another algorithm with the same inputs and outputs, and each has its own debug views.
 
-The average of one picture depends on how the picture before it was judged. So ``Averaging`` gets the newest judgment
-as a latest value, and the graph has no cycle.
+The average depends on the judgment of the previous picture. ``Averaging`` gets the newest judgment as a latest value,
+so the graph has no cycle.
 
 Source: RAM 2002, "Distributed Surveillance Task"; modules: RoboFrame 2006, section IV.
 """
@@ -23,19 +23,19 @@ from mission_control.modules.ports import LATEST
 from mission_control.vision.frame_averaging import AVERAGED, FrameAveraging
 from mission_control.vision.motion_detection import Background, Blob, Judged, Vote, judge, prepared
 
-BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is well seen
+BRIGHTER = 4  # chosen: the least difference that counts, 28 grey levels, is clearly visible
 
 
 class BackgroundComparison(msgspec.Struct, frozen=True, eq=False):
-    """A picture and what to compare it with.
+    """A picture and the average to compare it with.
 
     Attributes:
         number: Grows by one with each comparison.
-        view: Grows when the camera may show another view; regions of an earlier one count no more.
+        view: Grows when the camera may show another view; regions of an earlier view are then dropped.
         captured_s: Mission time of the capture.
         robot: The robot of the camera.
-        picture: Prepared, grey levels.
-        average: Of the pictures before, the same shape.
+        picture: The prepared picture, grey levels.
+        average: Average of the earlier pictures, the same shape.
     """
 
     number: int
@@ -47,7 +47,7 @@ class BackgroundComparison(msgspec.Struct, frozen=True, eq=False):
 
 
 class Judgment(msgspec.Struct, frozen=True, eq=False):
-    """A comparison, and what it shows."""
+    """A comparison and its result."""
 
     comparison: BackgroundComparison
     judged: Judged
@@ -57,14 +57,14 @@ class Averaging(Module):
     """Keeps the running average of one camera's pictures, and learns a new view fast."""
 
     class Inputs(Module.Inputs):
-        """The picture; ``swapped_in`` comes with the first picture after a swap."""
+        """The picture; ``swapped_in`` arrives with the first picture after a context switch."""
 
         picture: GreyPicture
         swapped_in: SwappedIn | None = None
         judgment: Annotated[Judgment | None, LATEST] = None
 
     class Outputs(Module.Outputs):
-        """Nothing while the first pictures of a view are learned."""
+        """No output while the first pictures of a view are learned."""
 
         comparison: BackgroundComparison | None = None
 
@@ -74,7 +74,7 @@ class Averaging(Module):
         self._learned = 0  # number of the newest comparison whose judgment was learned
 
     def update(self, inputs: Inputs) -> Outputs:
-        """Learn from the judgment of the picture before, and return this picture with the average."""
+        """Learn from the judgment of the previous picture; return this picture with the average."""
         judgment, given = inputs.judgment, inputs.picture
         if judgment is not None and judgment.comparison.number > self._learned:
             self._learned = judgment.comparison.number
@@ -89,19 +89,19 @@ class Averaging(Module):
         view = self._background.times_begun
         return self.Outputs(
             BackgroundComparison(self._number, view, given.captured_s, given.robot, picture, average.copy())
-        )  # a copy: the average is changed later, and what was handed over must not be
+        )  # a copy, because the average changes later, and an output must not
 
 
 class Detection(Module):
     """Judges where a picture differs from the average by more than noise."""
 
     class Inputs(Module.Inputs):
-        """What to compare."""
+        """The comparison."""
 
         comparison: BackgroundComparison
 
     class Outputs(Module.Outputs):
-        """A judgment of each comparison."""
+        """The judgment of each comparison."""
 
         judgment: Judgment
 
@@ -109,7 +109,7 @@ class Detection(Module):
         """Parameters of ``Detection``.
 
         Attributes:
-            filters_rows: Whether rows that changed as a whole are link noise.
+            filters_rows: True: rows that changed as a whole count as link noise.
         """
 
         filters_rows: bool = True
@@ -128,7 +128,7 @@ class Detection(Module):
 
 
 class Tracking(Module):
-    """Follows regions over pictures: only what several of the last pictures show is motion."""
+    """Tracks regions over pictures: motion is certain only if several of the last pictures show it."""
 
     class Inputs(Module.Inputs):
         """Judgments, one after the other."""
@@ -136,7 +136,7 @@ class Tracking(Module):
         judgment: Judgment
 
     class Outputs(Module.Outputs):
-        """What each picture shows, and motion, in pictures that have some."""
+        """The result of each picture, and motion if the picture shows it."""
 
         judged: PictureJudged
         motion: MotionSeen | None = None
@@ -146,7 +146,7 @@ class Tracking(Module):
         self._vote, self._view = Vote(), 0
 
     def update(self, inputs: Inputs) -> Outputs:
-        """Count the region, and return it if enough of the last pictures had one."""
+        """Count the region; return it if enough of the last pictures had one."""
         comparison, judged = inputs.judgment.comparison, inputs.judgment.judged
         if comparison.view != self._view:
             self._view = comparison.view
@@ -162,16 +162,16 @@ class Tracking(Module):
 
 
 class FrameDifference(Module):
-    """The earlier method, for the same task in one module; to be compared with the three others."""
+    """The earlier method for the same task, in one module, for comparison with the three others."""
 
     class Inputs(Module.Inputs):
-        """As ``Averaging`` has."""
+        """As for ``Averaging``."""
 
         picture: GreyPicture
         swapped_in: SwappedIn | None = None
 
     class Outputs(Module.Outputs):
-        """As ``Tracking`` has; beside it, one of the two needs another key."""
+        """As for ``Tracking``; if both run side by side, one of them needs other keys."""
 
         motion: MotionSeen | None = None
 
@@ -179,7 +179,7 @@ class FrameDifference(Module):
         """Parameters of ``FrameDifference``.
 
         Attributes:
-            averaged: How many pictures make an average.
+            averaged: Number of pictures in an average.
         """
 
         averaged: Annotated[int, msgspec.Meta(ge=1)] = AVERAGED
@@ -191,7 +191,7 @@ class FrameDifference(Module):
         self._frames = FrameAveraging(self.parameters.averaged)
 
     def update(self, inputs: Inputs) -> Outputs:
-        """Return where the last pictures differ from those before them."""
+        """Return the region in which the last pictures differ from the ones before."""
         if inputs.swapped_in is not None:
             self._frames.swapped_in()
         given = inputs.picture

@@ -1,11 +1,11 @@
 """The component that runs one execution unit on the bus: a thin loop around ``ExecutionUnit``; see ``unit_thread``.
 
-* another unit, or any component → it: the values of its inputs, published under the addresses that its parameters name.
-* an operator → it: the exchange of a module (``exchange``).
-* it → everybody: the outputs that its parameters name, published under ``output_address`` (conversation ``outputs``).
+* another unit, or any component → this unit: values of its inputs, published under the addresses that its parameters
+  name.
+* operator → this unit: the exchange of a module (``exchange``).
+* this unit → all: the outputs that its parameters name, published under ``output_address`` (conversation ``outputs``).
 
-Only the newest value of a key waits for delivery, so a slow unit never works on old ones; the values that it did not
-get to are counted.
+Only the newest value of a key waits for delivery, so a slow unit never works on old values; skipped values are counted.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ from mission_control.modules.unit_exchanges import UnitExchanges
 from mission_control.modules.unit_schedule import Trigger
 from mission_control.modules.unit_thread import LoopPublisher, UnitThread
 
-if TYPE_CHECKING:  # most modules see no pictures and stay without NumPy
+if TYPE_CHECKING:  # most modules use no pictures and need no NumPy
     import numpy as np
     from numpy.typing import NDArray
 
-_TABLES = ("overwritten", "modules")  # of the statistics: each of their entries gets a name of its own
+_TABLES = ("overwritten", "modules")  # suffixes in the statistics, so that each entry has its own name
 REPORT_EVERY_S = 1.0  # chosen: a person reads no faster; seconds of the mission
 
 
 class UnitComponent(Component[UnitParameters]):
-    """Runs the modules of one unit in the component's event loop, or in a thread of their own beside it."""
+    """Runs the modules of one unit in the component's event loop, or in their own thread beside it."""
 
     parameters_type = UnitParameters
     shares_process = False
@@ -56,7 +56,7 @@ class UnitComponent(Component[UnitParameters]):
 
     @classmethod
     def arrange(cls, question: UnitsQuestion) -> Arranged:
-        """Return how the units of a mission file are connected, or everything that does not fit."""
+        """Return the connections of a mission file's units, or all faults."""
         return judged(question)
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
@@ -94,7 +94,7 @@ class UnitComponent(Component[UnitParameters]):
         return UnitDeadlines(self, self._into, self._tell)
 
     async def connect(self) -> None:
-        """Have the thread, if it is to have one, and listen to the sources."""
+        """Start the thread, if the unit has one, and subscribe to the sources."""
         self._unit = self._new_unit()
         qualities = self.parameters.qualities
         for key in self._published.keys() & qualities.keys():
@@ -109,7 +109,7 @@ class UnitComponent(Component[UnitParameters]):
             self.bus.subscribe(source.address, source.conversation, kind, self._listener(key), latest=True)
 
     async def serve(self) -> None:
-        """Have the rounds of the frequency; those of inputs begin when these arrive."""
+        """Run the rounds of the frequency; arriving inputs begin their own rounds."""
         self.start_task(self._deadlines.watch(), "deadlines")
         if self._thread is not None:
             await self._thread.keep()
@@ -120,7 +120,7 @@ class UnitComponent(Component[UnitParameters]):
                 self._run(now_s)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer who looks at debug views, and exchange a module."""
+        """Answer questions for debug views, and exchange a module."""
         match asked.body:
             case SwapModule() as swap:
                 return await self._exchanges.swap(swap)
@@ -132,10 +132,10 @@ class UnitComponent(Component[UnitParameters]):
                 raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 
     def parameters_changed(self) -> None:
-        """Choose sources; all else is as at the start.
+        """Choose sources; no other parameter can change at run time.
 
         Raises:
-            WrongParameter: Something else is to change, or there is no such choice.
+            WrongParameter: Another parameter would change, or there is no such choice.
         """
         if msgspec.structs.replace(self.parameters, chosen={}) != self._as_started:
             raise WrongParameter(
@@ -162,7 +162,7 @@ class UnitComponent(Component[UnitParameters]):
             choice.chosen = self.parameters.chosen.get(key, choice.parameters.sources[0])
 
     def statistics(self) -> dict[str, float]:
-        """Return rates, lateness and misses of the unit, and the times of each module."""
+        """Return rates, delays and missed rounds of the unit, and the run times of each module."""
         told = self._unit.statistics()
         own = {name: float(getattr(told, name)) for name in told.__struct_fields__ if name not in _TABLES}
         missed = {f"overwritten_{key}": float(count) for key, count in told.overwritten.items()}
@@ -215,7 +215,7 @@ class UnitComponent(Component[UnitParameters]):
             self._tell()
 
     def _tell(self) -> None:
-        """Report what is late or missed, and where the thread is."""
+        """Report late inputs, missed rounds, and the place of the thread."""
         self.report("; ".join(filter(None, [self._deadlines.text, self._misses_text, self._thread_text()])))
 
     def _thread_text(self) -> str:
@@ -224,25 +224,25 @@ class UnitComponent(Component[UnitParameters]):
 
 
 class ViewsOfModule:
-    """The debug views of one module among those of its unit; see ``module.Debug``."""
+    """The debug views of one module, as views of its unit; see ``module.Debug``."""
 
     def __init__(self, module: str, views: DebugViews) -> None:
         self._module, self._views = module, views
 
     def picture(self, view: str, make: Callable[[], NDArray[np.generic]]) -> None:
-        """Show a picture, named ``<module>-<view>``."""
+        """Show a picture; the view's name is ``<module>-<view>``."""
         self._views.picture(f"{self._module}-{view}", make)
 
     def value(self, view: str, value: float | bool | str) -> None:
-        """Show a value, named ``<module>-<view>``."""
+        """Show a value; the view's name is ``<module>-<view>``."""
         self._views.value(f"{self._module}-{view}", value)
 
 
 def _message_kind(key: str, kind: object) -> type[Message]:
-    """Return the class of a key's values, which cross the bus.
+    """Return the class of the values of a key that crosses the bus.
 
     Raises:
-        WrongModule: It is no message.
+        WrongModule: The class is not a message.
     """
     if is_message(kind):
         return kind

@@ -1,4 +1,4 @@
-"""The deadlines of a unit's sources: a value that does not come in time is told once, and so is its return."""
+"""The deadlines of a unit's sources: publishes one event when values are late, and one when they arrive again."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from mission_control.modules.orders import UnitParameters
 
 
 class UnitDeadlines:
-    """Watches the deadlines of one unit; made when it begins to listen.
+    """Watches the deadlines of one unit; create it when the unit subscribes.
 
     Args:
-        component: Runs the unit.
-        keys: Those whose values the unit takes from elsewhere.
+        component: Component that runs the unit.
+        keys: Keys whose values come from outside the unit.
         changed: Called when ``text`` has changed.
     """
 
@@ -34,30 +34,30 @@ class UnitDeadlines:
 
     @property
     def text(self) -> str:
-        """What is late at present; empty: nothing."""
+        """The keys that are late at present, as text; empty: no key is late."""
         late = [f"no {key} from {self._sources[key].address}" for key in self._deadlines.late]
         return ", ".join(late)
 
     def met(self, key: str) -> None:
-        """Record that a value came."""
+        """Record the arrival of a value."""
         late_s = self._deadlines.came(key, self._component.clock.now_s())
         if late_s is not None:
             self._component.publish_event(key, f"comes again, {late_s:.3f} s late", LogLevel.NOTICE)
             self._changed()
 
     async def watch(self) -> None:
-        """Tell what is late, as soon as it is; return if there are no deadlines."""
+        """Publish an event as soon as a key is late; return if there are no deadlines."""
         while self._within_s:
             now_s = self._component.clock.now_s()
             for key in self._deadlines.newly_missed(now_s):
                 told = f"no value from {self._sources[key].address} within {self._within_s[key]:g} s"
                 self._component.publish_event(key, told, LogLevel.WARNING)
                 self._changed()
-            look_again_s = now_s + min(self._within_s.values())  # for those that are late now and come again
+            look_again_s = now_s + min(self._within_s.values())  # for keys that are late now and arrive again
             await self._component.clock.sleep_until_s(min(self._deadlines.next_s, look_again_s))
 
     def statistics(self) -> dict[str, float]:
-        """Return how often each deadline was missed, by the key on the bus."""
+        """Return the number of misses of each deadline, by the key on the bus."""
         return {
             f"{DEADLINES_MISSED}{self._sources[key].address}/{self._sources[key].conversation}"[:LONGEST_MENTION]: count
             for key, count in self._deadlines.missed.items()

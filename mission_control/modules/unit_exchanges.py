@@ -1,4 +1,4 @@
-"""The exchanges of modules in one unit that runs: reads the new class, lets the unit exchange, tells how it goes."""
+"""The exchanges of modules in one running unit: imports the new class, starts the exchange, reports its course."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from mission_control.modules.graph import Graph
 from mission_control.modules.module import UNSEEN, Module
 from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule, load_module_class
 
-LEAST_WAIT_S = 0.01  # chosen: a round that runs in a thread when its exchange's time is over ends soon
+LEAST_WAIT_S = 0.01  # chosen: if a round runs in a thread when the time of its exchange is over, the round ends soon
 
 
 @dataclass(frozen=True, slots=True)
 class _Candidate:
-    """A module that is to take a place, and the one that has it."""
+    """A new module, and the module that it should replace."""
 
     asked: SwapModule
     before: ModuleOrder
@@ -45,11 +45,12 @@ class UnitExchanges:
     """Exchanges modules of one unit, one at a time.
 
     Args:
-        component: That runs the unit; its parameters name the modules that run.
+        component: Component that runs the unit; its parameters name the running modules.
         modules: Name → module; kept up to date.
-        graph: The unit's at its start.
+        graph: The unit's graph at its start.
         unit: Returns the unit.
-        exchanged: Called with the orders of all modules that run after an exchange; they become its parameters.
+        exchanged: Called after an exchange with the orders of all running modules, which become the component's
+            parameters.
     """
 
     def __init__(
@@ -63,20 +64,20 @@ class UnitExchanges:
         self._component, self._modules, self._graph, self._unit = component, modules, graph, unit
         self._exchanged = exchanged
         self._kinds: dict[str, object] = {}
-        """Key → class of the values; of the start, because a file that is read anew declares the classes again."""
+        """Key → class of the values; those at the start, because a file that is imported again declares new classes."""
         for one in component.parameters.modules:
             self._kinds |= kinds_made(modules[one.name], one.member(modules[one.name]))
         self._running = ""
 
     async def swap(self, asked: SwapModule) -> Swapped:
-        """Exchange the module; return when the new one has proved itself, or the old one has come back.
+        """Exchange the module; return when the new one has passed its trial, or the old one is back.
 
         Raises:
-            UnknownModule: The unit has no such module, or it is a choice.
-            ExchangeRunning: Another exchange of this unit is not over.
-            WrongModule: The class cannot be read or made.
-            ValuesChanged: Its file declares values otherwise.
-            GraphRefused: It has other ports; everything at once.
+            UnknownModule: The unit has no such module, or the module is a choice.
+            ExchangeRunning: Another exchange of this unit is still running.
+            WrongModule: The class cannot be imported or created.
+            ValuesChanged: The new file declares classes of values differently.
+            GraphRefused: The module has other ports; the error lists all faults.
         """
         if asked.module not in self._modules:
             meant = did_you_mean(asked.module, self._modules)
@@ -186,7 +187,7 @@ def _made(order: ModuleOrder) -> Module:
     """Return the module.
 
     Raises:
-        WrongModule: It refuses its parameters, or cannot be made.
+        WrongModule: The module refuses its parameters, or cannot be created.
     """
     try:
         return order.load()
@@ -197,6 +198,6 @@ def _made(order: ModuleOrder) -> Module:
 
 
 def _unless_closed(loop: asyncio.AbstractEventLoop, changed: asyncio.Event) -> None:
-    """Set the event in its loop; a round may end after the loop."""
+    """Set the event in its loop; a round may end later than the loop."""
     if not loop.is_closed():
         loop.call_soon_threadsafe(changed.set)

@@ -1,7 +1,7 @@
 """Unit schedule: decides when an execution unit has a round.
 
-Pure: time is an argument. Ticks of a frequency lie on a grid that begins at the unit's start, so a late round delays no
-later one; ticks that are over when a round begins are missed, and not made up for.
+Pure: time is an argument. Ticks of a frequency lie on a grid that begins at the unit's start, so a late round does not
+delay later ones. Ticks that have passed when a round begins are missed and not made up for.
 
 Source: RoboFrame 2006, section III: threads are executed at a given frequency and / or on new input.
 """
@@ -16,12 +16,12 @@ from typing import Annotated
 
 import msgspec
 
-RATE_OVER = 64  # chosen: a third of a second at the fastest, a minute at one round a second
+RATE_OVER = 64  # chosen: covers a third of a second at the highest rate, a minute at one round a second
 MOST_HZ = 1000.0  # chosen: the resolution of an event loop's timers is a millisecond
 
 
 class OnInput(StrEnum):
-    """On which new inputs from outside the unit a round begins."""
+    """The new inputs from outside the unit that begin a round."""
 
     NONE = "none"
     ANY = "any"
@@ -29,12 +29,12 @@ class OnInput(StrEnum):
 
 
 class Trigger(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """When a unit has a round: at a frequency, on new input, or both.
+    """Condition for a unit's rounds: a frequency, new input, or both.
 
     Attributes:
         frequency_hz: Rounds a second; 0: only on input.
-        on_input: ``any``: on each fresh input that comes from outside the unit; ``all``: when each of them has come
-            since the last time that all had; ``none``: only at the frequency.
+        on_input: ``any``: at each fresh input from outside the unit; ``all``: when all fresh inputs have arrived since
+            the last such round; ``none``: only at the frequency.
     """
 
     frequency_hz: Annotated[float, msgspec.Meta(ge=0, le=MOST_HZ)] = 0.0
@@ -49,8 +49,8 @@ class UnitSchedule:
     """The rounds of one unit.
 
     Args:
-        trigger: When there are rounds.
-        awaited: Keys of the fresh inputs that come from outside the unit.
+        trigger: Condition for rounds.
+        awaited: Keys of the fresh inputs from outside the unit.
         start_s: Time of the first tick.
     """
 
@@ -70,7 +70,7 @@ class UnitSchedule:
         return self._start_s + self._tick / frequency_hz if frequency_hz else math.inf
 
     def arrived(self, key: str) -> bool:
-        """Note a new value from outside; return whether a round is due because of it."""
+        """Record a new value from outside; return whether a round is due because of it."""
         if key not in self._awaited or self._trigger.on_input is OnInput.NONE:
             return False
         if self._trigger.on_input is OnInput.ANY:
@@ -82,7 +82,7 @@ class UnitSchedule:
         return True
 
     def tick(self, now_s: float) -> bool:
-        """Return whether a round is due because of the time; if so, the next tick is later than now."""
+        """Return whether a round is due because of the time; if so, the next tick lies in the future."""
         if now_s < self.due_s:
             return False
         late_s = now_s - self.due_s
@@ -97,12 +97,12 @@ class UnitSchedule:
         return True
 
     def began(self, now_s: float) -> None:
-        """Note that a round begins."""
+        """Record that a round begins."""
         self.rounds += 1
         self._rounds_s.append(now_s)
 
     @property
     def rate_hz(self) -> float:
-        """Rounds a second over the last ``RATE_OVER``; 0 before the second one."""
+        """Rate over the last ``RATE_OVER`` rounds, Hz; 0 before the second round."""
         span_s = self._rounds_s[-1] - self._rounds_s[0] if self._rounds_s else 0.0
         return (len(self._rounds_s) - 1) / span_s if span_s > 0 else 0.0

@@ -1,10 +1,10 @@
-"""A thread of its own for the rounds of one execution unit, beside the event loop of its component.
+"""A separate thread for the rounds of one execution unit, beside the event loop of its component.
 
-The thread decides when the next round begins, so the unit keeps its rate while its component's event loop is blocked,
-by another component of the process or by a hub that hangs. The event loop puts values in and hands outputs on. A value
-that finds the unit waiting gets a round; of what arrives until that is over only the newest value of each key waits.
-The outputs of up to ``MOST_WAITING`` rounds wait for the event loop. On a ``VirtualLoop`` there is no thread, and a
-round takes no time.
+The thread decides when the next round begins. So the unit keeps its rate even if the event loop is blocked, by another
+component of the process or by a hub that hangs. The event loop puts values in and publishes outputs. If a value arrives
+while the unit waits, a round begins; of the values that arrive during a round, only the newest of each key waits. The
+outputs of up to ``MOST_WAITING`` rounds wait for the event loop. On a ``VirtualLoop`` there is no thread, and a round
+takes no time.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from backbone.wire import Message
 from mission_control.modules.execution_unit import ExecutionUnit, Produced
 from mission_control.modules.os_threads import ThreadPlace, place_thread
 
-MOST_WAITING = 256  # chosen: a hub that hangs blocks a sender for a second, in which few units have as many rounds
-LONGEST_WAIT_S = 3600.0  # chosen: far below what a lock can wait for
+MOST_WAITING = 256  # chosen: a hub that hangs blocks a sender for a second; few units have more rounds in that time
+LONGEST_WAIT_S = 3600.0  # chosen: far below the longest wait of a lock
 
 
 @dataclass(frozen=True, slots=True)
 class _Arrival:
-    """The newest value of a key that waits for the end of a round, and how many it overwrote."""
+    """The newest value of a key that waits for the end of a round, and the number of values that it replaced."""
 
     key: str
     value: object
@@ -49,13 +49,13 @@ class _Round:
 
 
 class UnitThread:
-    """The rounds of one unit in a thread. Make it inside the event loop of its component.
+    """The rounds of one unit in a thread. Create it inside the event loop of its component.
 
     Args:
-        produced: Called in the event loop with the time of each round and what its modules produced.
+        produced: Called in the event loop with the time of each round and the produced values.
 
     Attributes:
-        lost: Rounds whose outputs were dropped, because too many waited for the event loop.
+        lost: Number of rounds whose outputs were dropped, because too many waited for the event loop.
     """
 
     def __init__(self, unit: ExecutionUnit, clock: Clock, produced: Callable[[float, list[Produced]], None]) -> None:
@@ -73,17 +73,17 @@ class UnitThread:
         self.lost = 0
 
     async def place(self, nice: int, cpus: list[int]) -> ThreadPlace | None:
-        """Place the thread; return None on a ``VirtualLoop``, which has none.
+        """Set the thread's niceness and processors; return None on a ``VirtualLoop``, because it has no thread.
 
         Raises:
-            ThreadRefused: It cannot run there.
+            ThreadRefused: The operating system refuses the values.
         """
         if self._pool is None:
             return None
         return await self._loop.run_in_executor(self._pool, place_thread, nice, cpus)
 
     def put(self, key: str, value: object) -> None:
-        """Take a value from outside the unit, at once or after the round that runs; called in the event loop."""
+        """Store a value from outside the unit, at once or after the present round; call it in the event loop."""
         cause = current_cause.get()
         with self._news:
             if self._is_idle and self._next is None:
@@ -95,7 +95,7 @@ class UnitThread:
         self._virtual_news.set()
 
     async def keep(self) -> None:
-        """Have all rounds, until cancelled; the round that then runs ends by itself, and its outputs are dropped."""
+        """Run all rounds until cancelled; a round in progress then ends by itself, and its outputs are dropped."""
         try:
             if self._pool is None:
                 await self._live_virtually()
@@ -129,11 +129,11 @@ class UnitThread:
 
     @property
     def _left_s(self) -> float:
-        """Seconds of the machine until the next round of the frequency."""
+        """Machine seconds until the next round of the frequency."""
         return (self._unit.due_s - self._clock.now_s()) / self._clock.rate
 
     def _turn(self) -> None:
-        """Have the round that is due because of the time, and the one because of a value that waits."""
+        """Run the round that is due because of the time, and the round for waiting values."""
         if self._unit.tick(self._clock.now_s()):
             self._round("")
         with self._news:
@@ -161,7 +161,7 @@ class UnitThread:
 
     # ------------------------------------------------------------------ in the event loop
     def _hand_next_on(self) -> None:
-        """Hand on the outputs of one round; those of the next in a step of its own, so that listeners get both."""
+        """Pass the outputs of one round on; the next round follows in a separate step, so that listeners get both."""
         with self._news:
             done, has_more = self._waiting.popleft(), len(self._waiting) > 0
         self._hand_on(done)
@@ -175,7 +175,7 @@ class UnitThread:
 
 
 class LoopPublisher:
-    """Publishes from any thread: the event loop sends."""
+    """Publishes from any thread, through the event loop."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus, self._loop = bus, asyncio.get_running_loop()
@@ -186,6 +186,6 @@ class LoopPublisher:
         return self._bus.source
 
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
-        """Send the message soon; nothing happens when the loop has ended."""
-        with contextlib.suppress(RuntimeError):  # a round may end after the component and its loop
+        """Send the message soon; if the loop has ended, do nothing."""
+        with contextlib.suppress(RuntimeError):  # a round may end later than the component and its loop
             self._loop.call_soon_threadsafe(self._bus.publish, address, conversation, message)

@@ -1,6 +1,6 @@
-"""Units in one process: carries values between them, in an order that depends on nothing but the inputs.
+"""Units in one process: passes values between them, in an order that depends only on the inputs.
 
-Pure: time is an argument. Between units, too, the object itself is handed over.
+Pure: time is an argument. Units, too, exchange objects without copying.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class UnitsTogether:
     """All units of a graph.
 
     Args:
-        graph: Which modules there are, and how they are connected.
+        graph: The modules and their connections.
         modules: Name → module.
-        triggers: Unit → when it has rounds; a unit that is left out has them on any input.
+        triggers: Unit → condition for its rounds; a unit left out has a round at any input.
         start_s: Time of the first ticks.
-        stopwatch: Measures how long modules run.
+        stopwatch: Measures the run time of modules.
     """
 
     def __init__(
@@ -50,30 +50,30 @@ class UnitsTogether:
 
     @property
     def next_s(self) -> float:
-        """Time of the next round of any frequency; infinite if there is none."""
+        """Time of the next round of any frequency; infinite without frequencies."""
         return min((unit.due_s for unit in self._units.values()), default=float("inf"))
 
     def listen(self, key: str, listener: Listener) -> None:
-        """Call the listener with each value that is produced under this key."""
+        """Call the listener with each produced value of this key."""
         self._listeners[key].append(listener)
 
     def feed(self, key: str, value: object, now_s: float) -> None:
-        """Take a value from outside; return when every unit that is due because of it has run."""
+        """Store a value from outside, and run every unit that is due because of it."""
         self._run([unit for unit in self._consumers[key] if unit.put(key, value)], now_s)
 
     def tick(self, now_s: float) -> None:
-        """Return when every unit that is due at this time, and all that follow from it, have run."""
+        """Run every unit that is due at this time, and all units that are due because of that."""
         for unit in self._units.values():
             if unit.tick(now_s):
                 self._run([unit], now_s)
 
     def advance(self, until_s: float) -> None:
-        """Let time pass: each round of a frequency up to and including this time is on time."""
+        """Let time pass up to and including this time; run each round of a frequency at its time."""
         while (now_s := self.next_s) <= until_s:
             self.tick(now_s)
 
     def statistics(self) -> dict[str, UnitStatistics]:
-        """Return unit → how it keeps up."""
+        """Return unit → its statistics."""
         return {name: unit.statistics() for name, unit in self._units.items()}
 
     def _run(self, due: list[ExecutionUnit], now_s: float) -> None:

@@ -1,1 +1,1 @@
-"""Recordings as data for those who train models."""
+"""Conversion of recordings to training data for models."""

@@ -1,10 +1,10 @@
-"""Episodes: what a robot saw, reported and did in each of its grants, at a fixed rate. Pure.
+"""Episodes: a robot's pictures, reports and actions in each of its grants, at a fixed rate. Pure.
 
-An episode is the time in which one ARC held the robot under one epoch, as the robot's RC said it. Its first step is as
-soon as each camera has sent a picture and the robot has reported all its readings. A step has the newest of each that
-was sent until then, so it knows nothing that its commander could not know.
+An episode is the time in which one ARC held the robot under one epoch, according to the robot's RC. It begins with the
+first step at which each camera has sent a picture and the robot has reported all its readings. A step has the newest
+data sent before it, so it contains nothing that the commander could not know.
 
-Source: the form of a step, an observation and the action in force, is that of LeRobot, see ``lerobot_dataset``.
+Source: a step (observation and present action) has the form of LeRobot's steps, see ``lerobot_dataset``.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ STILL = (0.0, 0.0)
 
 @dataclass
 class Survey:
-    """What a recording has of a robot.
+    """The data of one robot in a recording.
 
     Attributes:
         kind: Type of the robot; empty: not known.
         robots: Names of all robots.
-        arcs: ARCs that held it.
-        reports: Fields of its readings, in the order in which they first came.
+        arcs: ARCs that held the robot.
+        reports: Fields of its readings, in the order of their first appearance.
         sizes_px: Camera → width and height of its first picture.
         owners: ARC → address of its decision process.
-        users: Address of a console → who sat there.
+        users: Address of a console → name of its user.
     """
 
     kind: str = ""
@@ -52,25 +52,25 @@ class Survey:
     users: dict[str, str] = field(default_factory=dict)
 
     def commander(self, arc: str) -> str:
-        """Return the name of the person or behavior whose ARC it is; empty: not known."""
+        """Return the name of the person or behavior that owns the ARC; empty: not known."""
         owner = self.owners.get(arc, "")
         return self.users.get(owner, owner.rpartition("/")[2])
 
     def is_of_a_person(self, arc: str) -> bool:
-        """Return whether it is the ARC of a console."""
+        """Return whether a console owns the ARC."""
         return self.owners.get(arc, "").startswith(f"{Subsystem.UI_CONSOLE}/")
 
 
 @dataclass(frozen=True, slots=True)
 class EpisodeStep:
-    """One instant of an episode.
+    """One step of an episode.
 
     Attributes:
         episode: Number of the episode, from 0.
-        number: Of the step in it, from 0.
+        number: Number of the step in the episode, from 0.
         at_s: Mission time.
-        state: The newest of each of ``Survey.reports``; a flag is 0 or 1.
-        action: Velocities in force by the last command that the robot applied, in the order of ``ACTION``.
+        state: The newest value of each of ``Survey.reports``; a flag is 0 or 1.
+        action: Present velocities by the last applied command, in the order of ``ACTION``.
         pictures: Camera → its newest picture.
         arc: The ARC that holds the robot.
     """
@@ -85,12 +85,12 @@ class EpisodeStep:
 
 
 def keys_of(robot: str) -> tuple[str, ...]:
-    """Return the patterns of the keys that matter for a robot."""
+    """Return the patterns of the keys with data of a robot."""
     return (f"{Subsystem.RESOURCE_POOL}/{robot}/*", "*/frames", "*/schedule", "*/status")
 
 
 def survey(messages: Iterable[Recorded], robot: str) -> Survey:
-    """Return what these messages have of a robot."""
+    """Return the data of a robot in these messages."""
     found, its = Survey(), address(Subsystem.RESOURCE_POOL, robot)
     for message in messages:
         match message.schema:
@@ -117,7 +117,7 @@ class Follower:
 
     Attributes:
         grants: Number of grants so far.
-        episodes: Number of those that had a step.
+        episodes: Number of grants with at least one step.
     """
 
     def __init__(self, robot: str, reports: Iterable[str], cameras: Iterable[str], rate_hz: int) -> None:
@@ -133,7 +133,7 @@ class Follower:
         self._pictures: dict[str, Frame] = {}
 
     def follow(self, messages: Iterable[Recorded]) -> Iterator[EpisodeStep]:
-        """Yield the steps before each message, and those until the last."""
+        """Yield the steps before each message, and the remaining steps until the last message."""
         for message in messages:
             yield from self._steps_before(message.at_s)
             self._take(message)
@@ -164,7 +164,7 @@ class Follower:
                 self._end()
 
     def _heard_itself(self, message: Recorded) -> None:
-        """Take what the robot's RC said: only it knows who holds it."""
+        """Process a message of the robot's RC, because only the RC knows the present holder."""
         match message.schema:
             case _Schema.CONNECTED:
                 epoch = revived(Connected, message.body).epoch
@@ -212,7 +212,7 @@ class _Schema:
 
 
 def _fields(message: Recorded) -> dict[str, Any]:
-    """Return the fields of a message, without decoding a picture that may not be wanted."""
+    """Return the fields of a message; a picture is not decoded, because it may not be needed."""
     return message.body if isinstance(message.body, dict) else {}
 
 

@@ -1,14 +1,15 @@
-"""Episodes as a data set that LeRobot reads.
+"""Writes episodes as a data set for LeRobot.
 
 Source: LeRobotDataset v3.0 as lerobot 0.6.1 reads it (docs/source/lerobot-dataset-v3.mdx; ``DatasetInfo``, the paths
 and ``load_tasks`` in src/lerobot/datasets, ``DEFAULT_FEATURES`` in src/lerobot/utils/constants.py):
 
 * ``meta/info.json``: version, numbers, rate, paths, and the type and shape of each column.
 * ``meta/stats.json``: statistics of each column.
-* ``meta/tasks.parquet``: number of each task; pandas has its text as the index.
-* ``meta/episodes/chunk-000/file-000.parquet``: of each episode its length, place, tasks and statistics.
-* ``data/chunk-000/file-000.parquet``: a row for each step. A vector of one number is a number. Pictures are of its type
-  ``image``, PNG files in the rows: OpenCV does not write the codecs that LeRobot expects of its type ``video``.
+* ``meta/tasks.parquet``: number of each task; pandas uses the text as index.
+* ``meta/episodes/chunk-000/file-000.parquet``: length, place, tasks and statistics of each episode.
+* ``data/chunk-000/file-000.parquet``: a row for each step. A vector of one number is stored as a number. Pictures have
+LeRobot's type ``image`` (PNG files in the rows), because OpenCV cannot write the codecs that LeRobot expects for its
+type ``video``.
 """
 
 from __future__ import annotations
@@ -76,8 +77,8 @@ class Form:
     """The form of a data set.
 
     Attributes:
-        found: What the recording has of the robot.
-        cameras: Those whose pictures it has.
+        found: The robot's data in the recording.
+        cameras: Cameras whose pictures are written.
         rate_hz: Steps in a second.
         task: Text for all episodes; empty: the behavior's name, or ``BY_HAND``.
     """
@@ -88,7 +89,7 @@ class Form:
     task: str = ""
 
     def features(self) -> dict[str, Feature]:
-        """Return column → type, shape, and names of the numbers in it."""
+        """Return column → type, shape and names of its numbers."""
         features: dict[str, Feature] = {}
         for camera in self.cameras:
             width, height = self.found.sizes_px[camera]
@@ -114,7 +115,7 @@ class Form:
 
 
 class DataSetWriter:
-    """Writes episodes, step by step, into a folder; it is a data set after ``finish``.
+    """Writes episodes, step by step, into a folder; after ``finish`` the folder is a data set.
 
     Attributes:
         rows: Number of steps.
@@ -144,7 +145,7 @@ class DataSetWriter:
             self._write_rows()
 
     def finish(self) -> None:
-        """Write all that makes the files a data set; at least one step was added."""
+        """Write the metadata that makes the folder a data set; at least one step must have been added."""
         self._end_episode()
         self.close()
         self._write(EPISODES.format(chunk_index=0, file_index=0), pa.Table.from_pylist(self.episodes))
@@ -153,7 +154,7 @@ class DataSetWriter:
             (self._folder / f"meta/{name}.json").write_text(json.dumps(content, indent=4))
 
     def close(self) -> None:
-        """Write the end of the present file of data."""
+        """Complete the present data file."""
         if self._file is not None:
             self._file.close()
             self._file = None
@@ -245,7 +246,7 @@ class DataSetWriter:
 
 @dataclass
 class _Seen:
-    """What the statistics are of: the numbers of all rows, and how often each grey level was in a camera's pictures."""
+    """Data for the statistics: the numbers of all rows, and a histogram of grey levels for each camera."""
 
     numbers: dict[str, list[NDArray[np.float64]]] = field(default_factory=lambda: defaultdict(list))
     levels: dict[str, NDArray[np.int64]] = field(default_factory=lambda: defaultdict(lambda: np.zeros(LEVELS, int)))
@@ -303,7 +304,7 @@ class DataSet:
     """A data set that can be written.
 
     Attributes:
-        follower: Counts grants and episodes as they are written.
+        follower: Counts grants and episodes during writing.
     """
 
     form: Form
@@ -311,7 +312,7 @@ class DataSet:
     steps: Iterator[EpisodeStep]
 
     def write(self, folder: Path) -> str:
-        """Write it into a folder; return what it has, for people."""
+        """Write the data set into a folder; return a summary for people."""
         writer = DataSetWriter(folder, self.form)
         try:
             for step in self.steps:
@@ -328,9 +329,9 @@ def data_set(recording: Recording, robot: str, rate_hz: int, task: str, *, with_
     """Return the data set of a robot's grants.
 
     Raises:
-        NoEpisodes: The recording has no step of it.
+        NoEpisodes: The recording has no step of the robot.
         NoRecording: The recording is damaged.
-        OtherForm: It is of another release.
+        OtherForm: The recording was made by another release.
     """
     found = survey(recording.messages(keys_of(robot)), robot)
     form = Form(found, tuple(sorted(found.sizes_px)) if with_pictures else (), rate_hz, task)

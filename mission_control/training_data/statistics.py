@@ -1,6 +1,6 @@
-"""Statistics of the columns of a data set, by which training normalizes them. Pure.
+"""Statistics of the columns of a data set; training uses them for normalization. Pure.
 
-Source: the names and shapes are those of ``meta/stats.json`` of LeRobotDataset v3.0, see ``lerobot_dataset``.
+Source: ``meta/stats.json`` of LeRobotDataset v3.0, for names and shapes; see ``lerobot_dataset``.
 """
 
 from __future__ import annotations

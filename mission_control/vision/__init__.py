@@ -1,1 +1,1 @@
-"""One published algorithm a file: arrays in, arrays out."""
+"""Published algorithms, one in each file: arrays go in, arrays come out."""

@@ -1,7 +1,7 @@
-"""The earlier method: average the last pictures, and take what differs from the average before for motion.
+"""The earlier method: average the last pictures; a difference from the previous average counts as motion.
 
-Averaging takes white noise and thin lines down by the number of pictures, and smears what moves.  It is
-kept to be compared with ``motion_detection``: against torn and partial pictures it does nothing.
+Averaging reduces white noise and thin lines in proportion to the number of pictures, and smears moving bodies. It has
+no effect on torn and partial pictures. It is kept for comparison with ``motion_detection``.
 
 Source: RAM 2002, "Visual Servoing", on previous work: a simple frame-averaging algorithm that only
 dealt with the problem of spurious horizontal lines and white noise.
@@ -31,7 +31,7 @@ def average(frames: list[Picture]) -> Picture:
         Grey levels, the same shape, rounded.
 
     Raises:
-        ValueError: There is none, or shapes differ.
+        ValueError: There is no picture, or shapes differ.
 
     Example:
         >>> average([np.array([[0, 10]], np.uint8), np.array([[100, 20]], np.uint8)])
@@ -51,10 +51,10 @@ class FrameAveraging:
     """Averages one camera's pictures and compares each average with the one before it.
 
     Args:
-        averaged: How many pictures make an average, 1 or more.
+        averaged: Number of pictures in an average, 1 or more.
 
     Raises:
-        ValueError: It is less than 1.
+        ValueError: The number is less than 1.
     """
 
     def __init__(self, averaged: int = AVERAGED) -> None:
@@ -68,13 +68,14 @@ class FrameAveraging:
         self._frames.clear()
 
     def look(self, frame: Picture) -> Blob | None:
-        """Return the largest region in which the last pictures differ from those before, or None.
+        """Return the largest region in which the last pictures differ from the ones before, or None.
 
         Args:
-            frame: Grey levels 0 to 255, shape (height, width), row 0 on top; a new shape starts afresh.
+            frame: Grey levels 0 to 255, shape (height, width), row 0 on top; after a change of shape the averaging
+                begins again.
 
         Raises:
-            ValueError: It is no grey picture of at least 2 × 2 pixels.
+            ValueError: The array is not a grey picture of at least 2 × 2 pixels.
         """
         if frame.ndim != 2 or min(frame.shape) < 2:
             raise ValueError(f"a grey picture has shape (height, width), not {frame.shape}")

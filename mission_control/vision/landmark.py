@@ -1,7 +1,7 @@
 """The landmark on a home base: four dark discs in a T on a white board, upright on the floor.
 
-The board's frame: seen from a place in front of it and facing it, ``left`` is positive to the left of
-the board's middle, heights are above the floor.
+The board's frame: for an observer who faces the board, ``left`` is positive to the left of the board's middle; heights
+are above the floor.
 
 Source: RAM 2002, "Visual Servoing": an easy-to-detect landmark of four blobs marks a home base or a
 deployment platform.  Sizes: chosen; a disc is 9 pixels wide from 2 m away, and the whole T is still
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 DISC_DIAMETER_M = 0.04  # chosen: 9 pixels from 2 m away
 PITCH_M = 0.06  # chosen: between the middles of neighbouring discs; leaves half a disc of white between them
-BOARD_WIDTH_M, BOARD_HEIGHT_M = 0.28, 0.17  # chosen: white around every disc that a skeleton pixel can stand on
+BOARD_WIDTH_M, BOARD_HEIGHT_M = 0.28, 0.17  # chosen: white around every disc, for skeleton pixels
 CENTRE_HEIGHT_M = 0.075  # chosen: between the T's two rows; above the camera, within its tilted view
 
 
@@ -71,5 +71,5 @@ class Sighting:
 
     @property
     def pitch_px(self) -> float:
-        """Distance of the two discs above each other: unlike the row it does not shrink seen from the side."""
+        """Distance of the two discs above each other; unlike the row it does not shrink when seen from the side."""
         return math.hypot(*self.down_px.tolist())

@@ -1,9 +1,9 @@
-"""Motion detection: what changes against a running average, in pictures from an analog radio link.
+"""Motion detection: finds changes against a running average, in pictures from an analog radio link.
 
-Half-size mean → blur → running average → difference → threshold → rows that changed as a whole are
-link noise → connected regions → a vote over the last frames. Without the row filter and the vote,
-link noise alone gives an alarm in every slice. A picture whose rows have slipped sideways is no picture
-of the scene: most of its vertical edges are elsewhere; it is rejected, and leaves no trace in the average.
+Half-size mean → blur → running average → difference → threshold → rows that changed as a whole are link noise →
+connected regions → a vote over the last frames. Without the row filter and the vote, link noise alone would give an
+alarm in every slice. If rows have slipped sideways, most vertical edges of the picture have moved; such a picture is
+rejected and does not change the average.
 
 Source: RAM 2002, "Distributed Surveillance Task": a weighted average, subtraction of each new picture,
 a threshold, connected regions; blobs of whole rows are link noise and dropped. Vote and numbers: chosen
@@ -20,27 +20,27 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-SLOW_WEIGHT = 0.08  # chosen: a standing body is forgotten after about half a second
-FAST_FRAMES = 8  # chosen: 0.27 s at 30 frames a second, the price of every swap-in
-MOVING_SHARE = 0.25  # chosen: of the first pictures; where more than so many differ from the others, something passes
+SLOW_WEIGHT = 0.08  # chosen: the average absorbs a standing body within about half a second
+FAST_FRAMES = 8  # chosen: 0.27 s at 30 frames a second, without detection after every context switch
+MOVING_SHARE = 0.25  # chosen: of the first pictures; if more of them differ from the others, a body passes
 LEAST_DIFFERENCE = 28.0  # chosen: grey levels; above the blurred noise of a 13 dB link
-MEAN_DIFFERENCES = 4.5  # chosen: in units of the mean difference, so that a noisy link raises the bar
+MEAN_DIFFERENCES = 4.5  # chosen: in units of the mean difference, so that a noisy link raises the threshold
 ROW_SHARE = 0.55  # chosen: a torn row changes as a whole, a body never fills more than half of one
 ROWS_SHARE = 0.25  # chosen: with more torn rows than this the whole picture is doubtful
-EDGE_LEVELS = 12.0  # chosen: grey levels between neighbors in the average; furniture and doors have more
+EDGE_LEVELS = 12.0  # chosen: grey levels between neighbors in the average; furniture and doors exceed it
 EDGES_SHARE = 0.62  # measured: a Pioneer 1.2 m away hides up to 0.49 of the edges, slipped rows move 0.77 and more
-LEAST_SAME = 3  # chosen: of the first pictures; as many slipped ones in a row hardly ever keep the edges in place
+LEAST_SAME = 3  # chosen: of the first pictures; so many slipped pictures in a row hardly ever keep the edges in place
 LEAST_EDGES_PX = 200  # measured: the papers' room shows 550 to 700; a small body can hide most of a few
-REJECTED_IN_TURN = 15  # chosen: a second; the longest of the papers' bursts are shorter, then it is a new view
+REJECTED_IN_TURN = 15  # chosen: a second, longer than the papers' longest bursts; after it the view is new
 LEAST_AREA_PX = 40  # chosen: in the halved picture; a Pioneer at 4 m covers about 300
 STREAK_HEIGHT_PX = 4  # chosen: a torn piece of 1 to 3 rows, halved and blurred, is at most this high
-STREAK_RATIO = 4.0  # chosen: and at least this much wider than high
+STREAK_RATIO = 4.0  # chosen: and at least this many times wider than high
 VOTES, VOTERS = 3, 5  # chosen: link noise does not hit the same detector three times within five frames
 
 
 @dataclass(frozen=True, slots=True)
 class Blob:
-    """A rectangle around what changed, in pixels of the full picture, origin in its upper left corner."""
+    """A rectangle around changed pixels, in pixels of the full picture, origin in its upper left corner."""
 
     x_px: int
     y_px: int
@@ -51,15 +51,15 @@ class Blob:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stages:
-    """The pictures a detector went through for its last one, of half the size, for a look at how it judged.
+    """The intermediate pictures of the last analysis, at half the size, for debug views.
 
     Attributes:
         picture: The new picture, blurred, grey levels.
-        average: What it was compared with; changes when the next picture is looked at.
-        difference: How far it was from the average, grey levels.
-        bar: Grey levels above which a difference is more than noise.
-        changed: Where it differed by more than noise does.
-        kept: The same without rows that changed as a whole; all False if the picture was not judged.
+        average: The average used for comparison; changes with the next picture.
+        difference: Absolute difference from the average, grey levels.
+        bar: Threshold in grey levels above which a difference is more than noise.
+        changed: Pixels that differed by more than noise.
+        kept: The same without rows that changed as a whole; all False if the picture was rejected.
     """
 
     picture: NDArray[np.float32]
@@ -91,7 +91,8 @@ def halve(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def median_of(pictures: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
     """Return the median of each pixel; of an even number of pictures the mean of the middle two.
 
-    Sixteen times as fast as NumPy's for as few as eight: pictures are compared whole, not pixels one by one.
+    For eight pictures this is sixteen times as fast as NumPy's median, because whole pictures are compared, not single
+    pixels.
 
     Args:
         pictures: Grey levels, one or more of shape (height, width).
@@ -116,12 +117,12 @@ def median_of(pictures: Sequence[NDArray[np.float32]]) -> NDArray[np.float32]:
 
 
 def noise_bar(difference: NDArray[np.float32]) -> float:
-    """Return the grey levels above which a difference of two pictures is more than noise."""
+    """Return the threshold in grey levels above which a difference of two pictures is more than noise."""
     return max(LEAST_DIFFERENCE, MEAN_DIFFERENCES * float(difference.mean()))
 
 
 def changed_pixels(average: NDArray[np.float32], picture: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return where the picture differs from the average by more than noise does.
+    """Return the pixels that differ from the average by more than noise.
 
     Args:
         average: Grey levels, shape (height, width).
@@ -135,7 +136,7 @@ def changed_pixels(average: NDArray[np.float32], picture: NDArray[np.float32]) -
 
 
 def torn_rows(changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which rows changed as a whole, shape (height,): the link tore them.
+    """Return the rows that changed as a whole because the link tore them, shape (height,).
 
     Example:
         >>> torn_rows(np.array([[True, True, True], [True, False, False]]))
@@ -145,7 +146,7 @@ def torn_rows(changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def edges_moved(average: NDArray[np.float32], picture: NDArray[np.float32]) -> float:
-    """Return on which share of the average's vertical edges the picture differs; 0 if it has hardly any.
+    """Return the share of the average's vertical edges at which the picture differs; 0 if there are hardly any edges.
 
     Args:
         average: Grey levels, shape (height, width).
@@ -168,8 +169,8 @@ def largest_blob(changed: NDArray[np.bool_], *, drop_streaks: bool = True) -> Bl
     """Return the largest connected region that is neither too small nor a streak, or None.
 
     Args:
-        changed: Of the halved picture, shape (height, width).
-        drop_streaks: False lets streaks pass, the pieces of torn rows.
+        changed: Changed pixels of the halved picture, shape (height, width).
+        drop_streaks: False: streaks (pieces of torn rows) are accepted, too.
 
     Returns:
         The region in pixels of the full picture.
@@ -187,11 +188,11 @@ def largest_blob(changed: NDArray[np.bool_], *, drop_streaks: bool = True) -> Bl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Judged:
-    """What a picture shows against an average.
+    """The result of a comparison of a picture with an average.
 
     Attributes:
-        stages: The pictures on the way.
-        sound: Rows that may change the average, as a mask of the picture's shape; None: it is no picture of the scene.
+        stages: The intermediate pictures.
+        sound: Rows that may change the average, as a mask of the picture's shape; None: the picture is rejected.
         blob: The largest region that changed.
     """
 
@@ -201,13 +202,13 @@ class Judged:
 
 
 def prepared(frame: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return the picture as it is compared: at half its size, blurred.
+    """Return the picture prepared for comparison: at half its size, blurred.
 
     Args:
         frame: Grey levels 0 to 255, shape (height, width), row 0 on top.
 
     Raises:
-        ValueError: It is no grey picture of at least 2 × 2 pixels.
+        ValueError: The array is not a grey picture of at least 2 × 2 pixels.
     """
     if frame.ndim != 2 or min(frame.shape) < 2:
         raise ValueError(f"a grey picture has shape (height, width), not {frame.shape}")
@@ -215,12 +216,12 @@ def prepared(frame: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def judge(picture: NDArray[np.float32], average: NDArray[np.float32], *, filters_rows: bool = True) -> Judged:
-    """Return what a picture shows against an average of the same shape.
+    """Compare a picture with an average of the same shape.
 
     Args:
-        picture: A prepared one.
-        average: Of prepared ones.
-        filters_rows: False leaves out the filter of whole rows and their pieces.
+        picture: A prepared picture.
+        average: Average of prepared pictures.
+        filters_rows: False: without the filter for whole rows and their pieces.
     """
     difference = np.asarray(cv2.absdiff(picture, average), np.float32)
     bar = noise_bar(difference)
@@ -235,7 +236,7 @@ def judge(picture: NDArray[np.float32], average: NDArray[np.float32], *, filters
 
 
 class Vote:
-    """Decides by the last ``VOTERS`` pictures whether a region is more than link noise.
+    """Decides from the last ``VOTERS`` pictures whether a region is more than link noise.
 
     Attributes:
         last: Whether each of them had a region, newest last.
@@ -245,16 +246,16 @@ class Vote:
         self.last: deque[bool] = deque(maxlen=VOTERS)
 
     def count(self, blob: Blob | None) -> Blob | None:
-        """Return the region of a further picture, if ``VOTES`` of the last ``VOTERS`` pictures had one."""
+        """Count the region of a further picture; return it if ``VOTES`` of the last ``VOTERS`` pictures had one."""
         self.last.append(blob is not None)
         return blob if sum(self.last) >= VOTES else None
 
 
 class Background:
-    """The running average of one camera's prepared pictures; it is kept when its robot is swapped out.
+    """The running average of one camera's prepared pictures; it is kept while its robot is swapped out.
 
     Attributes:
-        times_begun: How often it began to adapt fast; what was seen before then counts no more.
+        times_begun: Number of restarts of fast adaptation; earlier votes are dropped at each restart.
     """
 
     def __init__(self) -> None:
@@ -265,16 +266,16 @@ class Background:
         self.times_begun = 0
 
     def begin(self) -> None:
-        """Adapt fast to what changed meanwhile: the next ``FAST_FRAMES`` pictures are compared with nothing."""
+        """Begin fast adaptation to changes in the meantime: the next ``FAST_FRAMES`` pictures are not compared."""
         self._fresh.clear()
         self._is_settling, self._rejected_in_turn = True, 0
         self.times_begun += 1
 
     def to_compare(self, picture: NDArray[np.float32]) -> NDArray[np.float32] | None:
-        """Return the average to compare the next picture with; None: it is one of the first, and part of the average.
+        """Return the average for comparison with the next picture; None: the picture is used for adaptation.
 
         Args:
-            picture: A new shape begins anew.
+            picture: The prepared picture; after a change of shape the adaptation begins again.
         """
         known = self._fresh[0] if self._fresh else self._average
         if known is not None and known.shape != picture.shape:
@@ -286,7 +287,7 @@ class Background:
         return self._average
 
     def learn(self, picture: NDArray[np.float32], sound: NDArray[np.bool_] | None) -> None:
-        """Move the average towards the picture that was compared with it; many rejected ones in a row are a new view.
+        """Move the average towards the compared picture; many rejected pictures in a row begin a new adaptation.
 
         Args:
             sound: As in ``Judged``.
@@ -301,14 +302,15 @@ class Background:
         cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT, mask=sound.astype(np.uint8))
 
     def _settle(self, picture: NDArray[np.float32]) -> None:
-        """Take one of the first pictures after a swap; after the last of them there is an average again.
+        """Collect one of the first pictures after a context switch; after the last one there is an average again.
 
-        Where these pictures agree, the scene stands still, and is learned as it is now: who left or came meanwhile
-        does not move. Where they do not agree something passes, and the old view stays for comparison.
+        Pixels at which these pictures agree show a still scene; their present values are learned, so a body that came
+        or left meanwhile does not count as motion. At the other pixels a body passes, and the old values stay for
+        comparison.
 
-        If enough of them show the old view, only those count; otherwise the view is new, and a slipped picture
-        looks like a turned robot. Their median is taken, which a few bad ones do not move; while most of
-        them are not like it, one more picture is waited for.
+        If enough of the pictures show the old view, only these are used. Otherwise the view is new, because a slipped
+        picture looks like one of a turned robot. The result is the pictures' median, which a few bad pictures do not
+        change. As long as most pictures differ from it, one more picture is collected.
         """
         self._fresh.append(picture)
         if len(self._fresh) < FAST_FRAMES:
@@ -331,22 +333,22 @@ class Background:
 
 
 class MotionDetector:
-    """Looks at one camera's pictures, one after the other; keeps the average when its robot is swapped out.
+    """Analyzes one camera's pictures, one after the other; keeps the average while its robot is swapped out.
 
     Args:
-        filters_rows: False leaves out the second filter, of whole rows and their pieces: to measure what it is for.
+        filters_rows: False: without the filter for whole rows and their pieces, to measure its effect.
     """
 
     def __init__(self, *, filters_rows: bool = True) -> None:
         self._filters_rows = filters_rows
         self.stages: Stages | None = None
-        """The pictures on the way to the last judgment; None: the last picture was one of the first after a swap."""
+        """The intermediate pictures of the last analysis; None: the last picture was used for adaptation."""
         self._background, self._vote = Background(), Vote()
         self._times_begun = 0
         self.frames = self.rejected = 0
 
     def swapped_in(self) -> None:
-        """Adapt fast to what changed meanwhile: the next ``FAST_FRAMES`` pictures detect nothing."""
+        """Begin fast adaptation to changes in the meantime; the next ``FAST_FRAMES`` pictures detect nothing."""
         self._background.begin()
         self._forget_what_was_before()
 
@@ -356,16 +358,17 @@ class MotionDetector:
         return self._vote.last
 
     def look(self, frame: NDArray[np.uint8]) -> Blob | None:
-        """Return where something moves, or None.
+        """Return the region of motion, or None.
 
         Args:
-            frame: Grey levels 0 to 255, shape (height, width), row 0 on top; a new shape starts afresh.
+            frame: Grey levels 0 to 255, shape (height, width), row 0 on top; after a change of shape the adaptation
+                begins again.
 
         Returns:
             The largest region of this picture, if ``VOTES`` of the last ``VOTERS`` pictures had one.
 
         Raises:
-            ValueError: It is no grey picture of at least 2 × 2 pixels.
+            ValueError: The array is not a grey picture of at least 2 × 2 pixels.
         """
         picture, found = prepared(frame), None
         self.frames, self.stages = self.frames + 1, None
@@ -382,7 +385,7 @@ class MotionDetector:
         return found
 
     def _forget_what_was_before(self) -> None:
-        """Forget the votes of the time before the background began anew, if it has."""
+        """Drop the votes if the background has begun again since."""
         if self._times_begun != self._background.times_begun:
             self._times_begun = self._background.times_begun
             self._vote.last.clear()

@@ -1,4 +1,4 @@
-"""The robot's place from many pictures: odometry in between, and both sides of the line until one fits.
+"""Estimates the robot's pose from many pictures and odometry, with a hypothesis for each side of the zero-angle line.
 
 Source: the extended Kalman filter as in Thrun, Burgard and Fox, "Probabilistic Robotics", section 3.3,
 iterated, with one hypothesis for each side of the zero-angle line (same book, section 7.5).
@@ -19,9 +19,9 @@ from mission_control.vision.target_pose import (
 )
 
 FORGETTING = 0.97  # chosen: one second of pictures decides between the two sides
-REFUTED_PX = 1.0  # chosen: four times a disc's error; the pose explains what is seen no longer
-REFUTATIONS = 5  # chosen: more than the sightings a bad burst spoils; a moved robot is found again in a sixth second
-WORSE = 12.0  # chosen: in squared pixel errors; the other side is then given up
+REFUTED_PX = 1.0  # chosen: four times a disc's error; above it the pose no longer explains the sighting
+REFUTATIONS = 5  # chosen: more than a burst of bad pictures spoils; a moved robot is found again in a sixth of a second
+WORSE = 12.0  # chosen: in squared pixel errors; at this difference the other side is given up
 
 
 class PoseFilter:
@@ -33,12 +33,12 @@ class PoseFilter:
         self._refuted = 0
 
     def forget(self) -> None:
-        """Forget the pose, because the robot may have been moved."""
+        """Discard the pose, because the robot may have been moved."""
         self._hypotheses = []
 
     @property
     def spread_m(self) -> float:
-        """Standard deviation of the place, or the distance of the place on the other side if that is larger."""
+        """Standard deviation of the place, or the distance to the place on the other side if that is larger."""
         if not self._hypotheses:
             return math.inf
         (best, _), *others = self._hypotheses
@@ -55,8 +55,8 @@ class PoseFilter:
         """Add a sighting and return the likeliest pose.
 
         Returns:
-            None if no place on the floor explains the sighting, or none near the pose known before.  That
-            pose is given up only when ``REFUTATIONS`` sightings on end speak against it.
+            None if no place on the floor, or none near the known pose, explains the sighting. The known pose is given
+            up only after ``REFUTATIONS`` contradicting sightings in a row.
         """
         kept = []
         for before, badness in self._hypotheses:
@@ -80,5 +80,5 @@ class PoseFilter:
 
 
 def _squared(pose: TargetPose) -> float:
-    """Return the sum of the eight squared errors, in units of a disc's usual one."""
+    """Return the sum of the eight squared errors, in units of a disc's usual error."""
     return 8 * (pose.residual_px / PIXEL_ERROR_PX) ** 2

@@ -1,4 +1,4 @@
-"""Videos of a recording: what each camera saw, with time and commander written below the picture."""
+"""Videos of a recording: the pictures of each camera, with time and commander below each picture."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FRAMES = "Frame/"
 
 
 class NoVideo(Refusal):
-    """This OpenCV cannot write a video there."""
+    """The installed OpenCV cannot write a video to this path."""
 
     code = "recording.video"
     remedy = "Export without --video, or install an OpenCV that writes MP4."
@@ -79,7 +79,7 @@ class _Video:
         self._writer.write(np.vstack([scaled, below]))
 
     def close(self) -> None:
-        """Write its end."""
+        """Complete the file."""
         if self._writer is not None:
             self._writer.release()
 

@@ -1,13 +1,13 @@
-"""How fast to drive and turn towards the landmark without losing it from the narrow view.
+"""Servo law: speeds of driving and turning that approach the landmark without losing it from the narrow view.
 
-A robot that keeps the target a little beside the middle of its picture moves on a curve that brings it
-nearer to the zero-angle line: forward with the target on the side of the line it must get to, backward
-with the target on the other side.  So the approach is forward; where it ends off the line, back off on
-such a curve and approach again.  Rates and speeds are limited so that the picture never moves further
-from frame to frame than tracking reaches, and change slowly, because a jerk tilts the camera.
+If the robot keeps the target a little beside the middle of its picture, it moves on a curve towards the zero-angle
+line: forward with the target on the side towards the line, backward with the target on the other side. So the approach
+is forward. If it ends off the line, the robot backs off on such a curve and approaches again. Speeds are limited so
+that the picture moves less from frame to frame than the reach of tracking. They change slowly, because a jerk tilts the
+camera.
 
 Source: RAM 2002, "Visual Servoing" and figure 8: forward, rotate, back off, approach again, until the
-robot is on the zero-angle line that lines it up with the target; too quick a turn loses the target.
+robot is on the zero-angle line that lines it up with the target; a turn that is too fast loses the target.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ CREEP_M_S = 0.05  # chosen: for the last centimetres
 TURN_RAD_S = 0.5  # chosen: moves the picture by 7 pixels a frame, half of what tracking reaches
 SPEED_SLEW_M_S2 = 0.6  # measured: more tilts the body so that the picture jumps by 20 pixels
 TURN_SLEW_RAD_S2 = 4.5  # measured: same
-BEARING_SHARE = 0.62  # measured: of the half view; further out a disc is lost when the body sways
+BEARING_SHARE = 0.62  # measured: of the half view; farther out a disc is lost when the body sways
 OFF_AXIS_GAIN = 1.5  # chosen: the angle off the line shrinks with this power of the distance
-BEARING_GAIN_HZ = 2.5  # chosen: with 0.1 s from picture to wheel it does not swing
+BEARING_GAIN_HZ = 2.5  # chosen: with 0.1 s from picture to wheel it does not oscillate
 STRAIGHT_RAD = math.radians(12.0)  # chosen: with a larger error of the bearing, turn before driving
 HALF_VIEW_PX, FOCAL_PX = 160.0, 439.6  # the Scout's camera; a test holds them to target_pose
-TARGET_HALF_M = 0.11  # chosen: half the T, and as much white as a skeleton and its search need
-FARTHEST_BACK_M = 1.4  # chosen: from there one approach takes away ten degrees; further needs more room
-NEAREST_BACK_M = 0.75  # chosen: less is no room to steer in
-ARRIVED_ASIDE_M, ARRIVED_AHEAD_M = 0.025, 0.02  # chosen: half of the 5 cm within which it shall end
-ARRIVED_HEADING_RAD = math.radians(6.0)  # chosen: of 10 degrees
-ARRIVED_BEARING_RAD = math.radians(2.0)  # chosen: what is left is below a pixel's worth of heading
-STEADY_FRAMES = 10  # chosen: a third of a second of standing pictures makes a pose sure
-SETTLING_S = 4.0  # chosen: to turn by 30 degrees, creep 5 cm, and look
-BACKING_S = 20.0  # chosen: twice what the longest way back takes; something may stand behind the robot
-HOLD_S = 0.8  # chosen: longer than nearly every burst of bad pictures; only then look elsewhere
+TARGET_HALF_M = 0.11  # chosen: half the T, and the white that a skeleton and its search need
+FARTHEST_BACK_M = 1.4  # chosen: from there one approach corrects ten degrees; farther needs more room
+NEAREST_BACK_M = 0.75  # chosen: a shorter way leaves no room to steer
+ARRIVED_ASIDE_M, ARRIVED_AHEAD_M = 0.025, 0.02  # chosen: half of the permitted 5 cm
+ARRIVED_HEADING_RAD = math.radians(6.0)  # chosen: half of the permitted 10 degrees
+ARRIVED_BEARING_RAD = math.radians(2.0)  # chosen: the remaining error is less than a pixel of heading
+STEADY_FRAMES = 10  # chosen: a third of a second of still pictures makes a pose reliable
+SETTLING_S = 4.0  # chosen: time to turn by 30 degrees, creep 5 cm, and look
+BACKING_S = 20.0  # chosen: twice the time of the longest way back; an obstacle may be behind the robot
+HOLD_S = 0.8  # chosen: longer than nearly every burst of bad pictures; only after it look elsewhere
 LOOK_S = 0.5  # chosen: the body comes to rest, and one clean picture comes between two bad bursts
 SEARCH_STEP_RAD = math.radians(15.0)  # chosen: "a few degrees"; two views overlap by more than the target's width
-SEARCH_TURN_RAD_S = 0.8  # chosen: nothing is tracked meanwhile
+SEARCH_TURN_RAD_S = 0.8  # chosen: the target is not tracked meanwhile
 
 
 class Stage(StrEnum):
@@ -76,14 +76,14 @@ def _clip(value: float, limit: float) -> float:
 
 
 def slewed(wanted: SpeedCommand, last: SpeedCommand, elapsed_s: float) -> SpeedCommand:
-    """Return the command nearest to the wanted one that the body follows without a jerk."""
+    """Return the command nearest to the wanted one that causes no jerk."""
     forward_m_s = last.forward_m_s + _clip(wanted.forward_m_s - last.forward_m_s, SPEED_SLEW_M_S2 * elapsed_s)
     turn_rad_s = last.turn_rad_s + _clip(wanted.turn_rad_s - last.turn_rad_s, TURN_SLEW_RAD_S2 * elapsed_s)
     return SpeedCommand(forward_m_s, turn_rad_s)
 
 
 def bearing_limit_rad(range_m: float) -> float:
-    """Return how far beside the middle the target may be so that all of it is in the picture, from this distance.
+    """Return the largest bearing of the target at which all of it is in the picture, from this distance.
 
     Example:
         >>> bearing_limit_rad(0.45) < bearing_limit_rad(2.0)
@@ -97,10 +97,10 @@ def steer(pose: TargetPose, stage: Stage, last: SpeedCommand, elapsed_s: float, 
     """Return the next command.
 
     Args:
-        pose: Where the robot stands.
-        stage: Of the approach; in ``SEARCHING`` and ``ARRIVED`` the robot is brought to rest.
-        last: The command before.
-        elapsed_s: Since then.
+        pose: Pose of the robot.
+        stage: Stage of the approach; in ``SEARCHING`` and ``ARRIVED`` the robot is brought to rest.
+        last: The previous command.
+        elapsed_s: Time since then.
         stop_m: Distance of the robot's place from the board.
 
     Returns:
@@ -120,13 +120,13 @@ def steer(pose: TargetPose, stage: Stage, last: SpeedCommand, elapsed_s: float, 
             return slewed(HALT, last, elapsed_s)
     error_rad = pose.bearing_rad - wanted_rad
     speed_m_s *= max(0.0, 1.0 - abs(error_rad) / STRAIGHT_RAD)
-    # Driving past the target turns it aside by itself; the second term keeps up with that.
+    # Driving past the target changes its bearing; the second term compensates for that.
     turn_rad_s = BEARING_GAIN_HZ * error_rad + speed_m_s * math.sin(pose.bearing_rad) / max(pose.range_m, 0.1)
     return slewed(SpeedCommand(speed_m_s, _clip(turn_rad_s, TURN_RAD_S)), last, elapsed_s)
 
 
 def has_arrived(pose: TargetPose, stop_m: float = STOP_M) -> bool:
-    """Return whether the robot is at its place and faces the board, as far as a picture shows."""
+    """Return whether the robot is at its place and faces the board, judged from a picture."""
     return (
         abs(pose.left_m) <= ARRIVED_ASIDE_M
         and abs(pose.ahead_m - stop_m) <= ARRIVED_AHEAD_M
@@ -136,14 +136,14 @@ def has_arrived(pose: TargetPose, stop_m: float = STOP_M) -> bool:
 
 
 def back_off_to_m(pose: TargetPose, stop_m: float = STOP_M) -> float:
-    """Return how far before the board to back off so that the way back and the next approach reach the line."""
+    """Return the distance from the board to back off to, so that the way back and the next approach reach the line."""
     slope = math.tan(bearing_limit_rad(pose.range_m))
     needed = 1.5 * abs(pose.off_axis_rad) / (2 * max(slope, 0.05))
     return min(FARTHEST_BACK_M, max(NEAREST_BACK_M, stop_m * math.exp(min(needed, 3.0))))
 
 
 class Approach:
-    """The stages of one approach; time and what the pictures say go in, commands come out.
+    """The stages of one approach; time and tracking results go in, commands come out.
 
     Args:
         stop_m: Distance of the robot's place from the board.
@@ -164,7 +164,7 @@ class Approach:
         self.searched_rad = 0.0
 
     def resumed(self) -> None:
-        """Look for the target again; the robot stands still, perhaps elsewhere."""
+        """Search the target again; the robot stands still, and may have been moved."""
         self._last = HALT
         self._search()
 
@@ -172,9 +172,9 @@ class Approach:
         """Return the next command.
 
         Args:
-            phase: What the tracker did with the last picture.
-            pose: Where the robot stands if ``phase`` is ``TRACKING``.
-            elapsed_s: Since the step before.
+            phase: Phase of the tracker at the last picture.
+            pose: Pose of the robot if ``phase`` is ``TRACKING``.
+            elapsed_s: Time since the last step.
         """
         self._since_s += elapsed_s
         if phase is not TrackingPhase.TRACKING or pose is None:
@@ -188,7 +188,7 @@ class Approach:
         return self._last
 
     def _blind(self, phase: TrackingPhase, elapsed_s: float) -> SpeedCommand:
-        """Stop; after a while without the target, turn step by step and look."""
+        """Stop; after a while without the target, search by turning in steps."""
         self._steady_frames = 0
         self._unseen_s += elapsed_s
         if self.stage is not Stage.SEARCHING:

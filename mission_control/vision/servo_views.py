@@ -1,4 +1,4 @@
-"""What the tracker goes by, drawn for people: what could be discs, and the skeleton with its matched pixels.
+"""Views of the tracker for people: candidates for discs, and the skeleton with its matched pixels.
 
 Rules of this file: no bus, no clock; a picture goes in, a picture in color of the same size comes out.
 """
@@ -17,15 +17,15 @@ MATCHED: Color = (0, 255, 0)
 MISSED: Color = (255, 0, 0)
 CANDIDATE: Color = (255, 255, 0)
 DARK: Color = (0, 0, 160)
-ARM_PX = 2  # chosen: a cross of five pixels is seen in a picture of 320 columns and hides no disc
+ARM_PX = 2  # chosen: a cross of five pixels is visible in a picture of 320 columns and hides no disc
 
 
 def blobs_view(frame: Picture, blobs_px: Floats | None) -> NDArray[np.uint8]:
-    """Return the picture with all that is dark in blue, what could be a disc marked yellow, and the discs green.
+    """Return the picture with dark pixels in blue, candidates for discs marked yellow, and the discs green.
 
     Args:
         frame: Grey levels 0 to 255, shape (height, width), row 0 on top.
-        blobs_px: Middles of the discs that were found, as ``Sighting.blobs_px``; None: they were not.
+        blobs_px: Middles of the discs that were found, as ``Sighting.blobs_px``; None: not found.
 
     Returns:
         Red, green and blue, shape (height, width, 3).
@@ -47,7 +47,7 @@ def skeleton_view(frame: Picture, model: TargetModel | None) -> NDArray[np.uint8
 
     Args:
         frame: Grey levels 0 to 255, shape (height, width), row 0 on top.
-        model: As last seen; None: the target is not known, and nothing is drawn.
+        model: Model of the last sighting; None: the target is not known, and no skeleton is drawn.
 
     Returns:
         Red, green and blue, shape (height, width, 3).
@@ -67,7 +67,7 @@ def in_color(frame: Picture) -> NDArray[np.uint8]:
 
 
 def mark(drawn: NDArray[np.uint8], column: int, row: int, color: Color) -> None:
-    """Draw a cross of this color, as far as it lies in the picture."""
+    """Draw the part of a cross of this color that lies in the picture."""
     height, width = drawn.shape[:2]
     if 0 <= row < height:
         drawn[row, max(0, column - ARM_PX) : max(0, column + ARM_PX + 1)] = color

@@ -1,12 +1,12 @@
 """The two models of a seen landmark: the subimage of the target, and its skeleton of 17 pixels.
 
-The skeleton has the middle of each disc and the points half a pitch above, left, right and below it,
-which lie on the white around it.  That makes 4 + 16 points; a point between two neighbours belongs to
-both discs and counts once, and in a T three pairs are neighbours: 17.
+The skeleton consists of the middle of each disc and the points half a pitch above, left, right and below it; these lie
+on the white around the disc. That makes 4 + 16 points. A point between two neighbouring discs belongs to both and
+counts once. A T has three such pairs, so 17 points remain.
 
-One rule holds in acquisition, tracking and search.  A pixel of the skeleton agrees if it is on its
-model's side of the middle between black and white; one outside the picture agrees with nothing.  At
-least 70 % must agree, and the subimage must correlate with the picture by at least 0.7.
+Acquisition, tracking and search use the same rule. A pixel of the skeleton agrees if it is on the same side of the
+middle between black and white as in its model; a pixel outside the picture never agrees. At least 70 % must agree, and
+the subimage must correlate with the picture by at least 0.7.
 
 Source: RAM 2002, "Visual Servoing" and figure 7.
 """
@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from mission_control.vision.landmark import Disc, Floats, Picture, Sighting
 
 SKELETON_PIXELS = 17  # RAM 2002, "Visual Servoing": the skeleton for a four-blob target
-LEAST_MATCH = 0.70  # RAM 2002, "Visual Servoing": below it, back to acquisition
-LEAST_CONTRAST = 55.0  # measured: grey levels between gaps and discs; with less, shades of a floor pass
+LEAST_MATCH = 0.70  # RAM 2002, "Visual Servoing": below it, acquisition begins again
+LEAST_CONTRAST = 55.0  # measured: grey levels between gaps and discs; with less, shades of a floor are accepted
 LEAST_DISCS = 3  # chosen: 13 of the 17 pixels are white, and so is every wall
 _REFRESH = 0.5  # chosen: share of the new picture in the model; one noisy picture does not replace it
-_MARGIN_PITCHES = 0.75  # chosen: how much white around the discs belongs to the subimage
+_MARGIN_PITCHES = 0.75  # chosen: width of the white around the discs that belongs to the subimage
 
 _DISCS = len(Disc)
 _SIDES = ((0, -1), (0, 1), (-1, 0), (1, 0))  # top, bottom, left, right: half pitches to the right and down
@@ -51,7 +51,7 @@ _GAP_STEPS: Floats = np.array([[right / 2, down / 2] for _, right, down in _GAPS
 
 
 def is_match(share: float) -> bool:
-    """Return whether so much of the target agrees that it is the target.
+    """Return whether enough pixels agree for this to be the target.
 
     Example:
         >>> is_match(12 / 17), is_match(11 / 17)
@@ -77,7 +77,7 @@ def skeleton_px(blobs_px: Floats) -> NDArray[np.intp]:
 
 
 def levels_at(frame: Picture, pixels: NDArray[np.intp]) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
-    """Return the grey levels at these pixels and which of them lie in the picture; 0 where they do not."""
+    """Return the grey levels at these pixels (0 outside the picture), and which of them lie in the picture."""
     height, width = frame.shape
     columns, rows = pixels[:, 0], pixels[:, 1]
     is_inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
@@ -87,10 +87,10 @@ def levels_at(frame: Picture, pixels: NDArray[np.intp]) -> tuple[NDArray[np.int1
 
 
 def contrast(levels: NDArray[np.int16]) -> float:
-    """Return how much brighter the skeleton's gaps are than its discs, in grey levels.
+    """Return the difference between the skeleton's gaps and its discs, in grey levels.
 
     Args:
-        levels: Of the skeleton, shape (17,).
+        levels: Grey levels of the skeleton, shape (17,).
     """
     black, white = _black_and_white(levels)
     return white - black
@@ -103,10 +103,10 @@ def _black_and_white(levels: NDArray[np.int16]) -> tuple[float, float]:
 
 
 def landmark_match(frame: Picture, blobs_px: Floats) -> float:
-    """Return which share of the skeleton is black on a disc and white in a gap if the discs are here.
+    """Return the share of the skeleton that is black on a disc or white in a gap, for discs at these places.
 
     Returns:
-        0 to 1; 0 if it is no landmark at all, see ``TargetModel.match``.
+        0 to 1; 0 if it cannot be a landmark, see ``TargetModel.match``.
     """
     levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
     middle = sum(_black_and_white(levels)) / 2
@@ -130,12 +130,12 @@ def _agreement(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetModel:
-    """The target as it was last seen.
+    """Model of the target from its last sighting.
 
     Attributes:
         blobs_px: Middles of its discs, as ``Sighting.blobs_px``.
         levels: Grey levels of the skeleton, shape (17,).
-        subimage: The part of the picture that holds it.
+        subimage: The part of the picture with the target.
         corner_px: Column and row of the subimage's upper left pixel.
     """
 
@@ -146,25 +146,25 @@ class TargetModel:
 
     @property
     def middle_level(self) -> float:
-        """Between the target's black and white."""
+        """Middle between the target's black and white."""
         return sum(_black_and_white(self.levels)) / 2
 
     @classmethod
     def seen(cls, frame: Picture, blobs_px: Floats) -> TargetModel:
-        """Return the model of a target whose discs are here; pixels outside the picture count as black."""
+        """Return the model of a target with discs at these places; pixels outside the picture count as black."""
         levels, _ = levels_at(frame, skeleton_px(blobs_px))
         return cls(blobs_px, levels, *_cut(frame, blobs_px))
 
     def updated(self, frame: Picture, blobs_px: Floats) -> TargetModel:
-        """Return the model after the target was found here: new places, levels half way to the new ones."""
+        """Return the model after a sighting at these places: new places, and levels half way to the new levels."""
         levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
         blended = np.where(is_inside, (1 - _REFRESH) * self.levels + _REFRESH * levels, self.levels)
         return TargetModel(blobs_px, np.rint(blended).astype(np.int16), *_cut(frame, blobs_px))
 
     def match(self, frame: Picture, blobs_px: Floats) -> float:
-        """Return which share of the skeleton agrees if the discs are here, 0 if it is no landmark at all.
+        """Return the share of the skeleton that agrees for discs at these places; 0 if it cannot be a landmark.
 
-        It is none if fewer than ``LEAST_DISCS`` discs are dark or gaps and discs differ by less than
+        It cannot be a landmark if fewer than ``LEAST_DISCS`` discs are dark, or if gaps and discs differ by less than
         ``LEAST_CONTRAST``.
         """
         levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
@@ -172,7 +172,7 @@ class TargetModel:
         return _share(levels, is_inside, middle, self.levels > middle)
 
     def agreement(self, frame: Picture, blobs_px: Floats) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """Return the pixels of the skeleton if the discs are here, and which of them agree, as ``match`` counts them.
+        """Return the pixels of the skeleton for discs at these places, and which of them agree; see ``match``.
 
         Returns:
             Column and row, shape (17, 2), and shape (17,).
@@ -183,9 +183,9 @@ class TargetModel:
         return pixels, _agreement(levels, is_inside, middle, self.levels > middle)
 
     def subimage_match(self, frame: Picture, blobs_px: Floats) -> float:
-        """Return how well the subimage correlates with the picture if the discs are here, -1 to 1.
+        """Return the correlation of the subimage with the picture for discs at these places, -1 to 1.
 
-        Pixels outside the picture are left out; 0 if more than half of the subimage is.
+        Pixels outside the picture are ignored; 0 if they are more than half of the subimage.
         """
         shift = np.rint((blobs_px - self.blobs_px).mean(axis=0)).astype(int)
         height, width = self.subimage.shape
@@ -199,10 +199,10 @@ class TargetModel:
         return correlation(there, own)
 
     def best_subimage_match(self, frame: Picture) -> tuple[float, tuple[int, int]]:
-        """Return how well the subimage correlates with the picture where it does best, both at half their size.
+        """Return the best correlation of the subimage with the picture, both at half their size.
 
         Returns:
-            The correlation, -1 to 1, and the shift from where the target was last seen: columns, rows.
+            The correlation, -1 to 1, and the shift from the last sighting: columns, rows.
         """
         small, own = (
             cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for image in (frame, self.subimage)
@@ -215,12 +215,12 @@ class TargetModel:
 
 
 def correlation(one: Picture, other: Picture) -> float:
-    """Return the likeness of two pictures of one shape, independent of brightness and contrast.
+    """Return the similarity of two pictures of one shape, independent of brightness and contrast.
 
-    What OpenCV's normalized template match says for one place, many times faster.
+    Same result as OpenCV's normalized template match for one place, but many times faster.
 
     Returns:
-        -1 to 1; 0 if one of them is plain.
+        -1 to 1; 0 if one picture is uniform.
     """
     first, second = one.ravel().astype(np.float32), other.ravel().astype(np.float32)
     first -= first.mean()
@@ -230,9 +230,10 @@ def correlation(one: Picture, other: Picture) -> float:
 
 
 def plausible(blobs_px: Floats) -> bool:
-    """Return whether four blobs can be the T: a level row, evenly spaced, the stem under its middle.
+    """Return whether four blobs can form the T: a level, evenly spaced row, and the stem under its middle.
 
-    A robot on a floor sees the row nearly level and the column upright; from the side the row shrinks.
+    In the picture of a robot on a floor the row is nearly level and the column upright; seen from the side the row
+    shrinks.
     """
     places: list[tuple[float, float]] = [(float(column), float(row)) for column, row in blobs_px]
     (left_x, left_y), (middle_x, middle_y), (right_x, right_y), (stem_x, stem_y) = places
@@ -249,17 +250,16 @@ def plausible(blobs_px: Floats) -> bool:
 
 
 def centred(frame: Picture, blobs_px: Floats, middle_level: float) -> Floats:
-    """Return the blobs moved to the centres of what is dark around them.
+    """Return the blobs moved to the centres of the dark pixels around them.
 
-    Mean shift of dark pixels in a window of one pitch: other than connected regions it does not fall
-    apart when a row is torn.
+    Method: mean shift of dark pixels in a window of one pitch; unlike connected regions, it tolerates torn rows.
 
     Args:
-        blobs_px: Roughly where the discs are.
-        middle_level: Pixels below it are dark, the more the darker.
+        blobs_px: Approximate places of the discs.
+        middle_level: Pixels below it are dark; darker pixels weigh more.
 
     Returns:
-        Places as ``blobs_px``; a blob without a dark pixel in its window stays.
+        Places as ``blobs_px``; a blob without a dark pixel in its window is not moved.
     """
     height, width = frame.shape
     sighting = Sighting(blobs_px, 1.0)
@@ -284,7 +284,7 @@ def centred(frame: Picture, blobs_px: Floats, middle_level: float) -> Floats:
 
 
 def _cut(frame: Picture, blobs_px: Floats) -> tuple[Picture, tuple[int, int]]:
-    """Return a copy of the part of the picture that holds the discs and some white, and its upper left pixel."""
+    """Return a copy of the part of the picture with the discs and some white around them, and its upper left pixel."""
     sighting = Sighting(blobs_px, 1.0)
     (left, top), (right, bottom) = blobs_px.min(axis=0).tolist(), blobs_px.max(axis=0).tolist()
     beside, above = (_MARGIN_PITCHES * abs(float(extent)) for extent in (sighting.across_px[0], sighting.down_px[1]))

@@ -1,9 +1,9 @@
-"""Follow the landmark from picture to picture by the 17 pixels of its skeleton.
+"""Tracks the landmark from picture to picture by the 17 pixels of its skeleton.
 
 Acquiring → (found) → tracking → (no match) → searching → (found) → tracking, or → (best model below
-70 %) → acquiring.  Tracking correlates only the skeleton, around where the target was last seen.
-Searching compares the whole subimage with the whole picture, which is slower; meanwhile the robot must
-stand still, so the target keeps its size.  A burst of bad pictures passes before the search is given up.
+70 %) → acquiring. Tracking correlates only the skeleton, around the last sighting. Searching compares the whole
+subimage with the whole picture, which is slower; meanwhile the robot must stand still, so that the target keeps its
+size. The search lasts longer than a burst of bad pictures.
 
 Source: RAM 2002, "Visual Servoing" and figure 7.
 """
@@ -31,7 +31,7 @@ from mission_control.vision.target_acquisition import acquire
 REACH_COLUMNS_PX = 16  # measured: 0.9 rad/s moves the picture by 13 pixels from frame to frame
 REACH_ROWS_PX = 20  # measured: the pitch of a starting or stopping body moves the picture by up to 18
 SEARCH_FRAMES = 8  # chosen: 0.27 s, longer than nearly every burst of bad pictures (0.15 s on average)
-STEADY_PX, STEADY_SHARE = 0.5, 0.05  # chosen: of the pitch; twice the noise, and the growth of an approach
+STEADY_PX, STEADY_SHARE = 0.5, 0.05  # chosen: of the pitch; twice the noise plus the growth during an approach
 
 
 class TrackingPhase(StrEnum):
@@ -47,9 +47,9 @@ class Track:
     """The result of one picture.
 
     Attributes:
-        phase: ``TRACKING``: here it is.  ``SEARCHING``: not found, stop and keep the camera still.
+        phase: ``TRACKING``: the target was found. ``SEARCHING``: not found; stop and keep the camera still.
             ``ACQUIRING``: there is no valid model.
-        sighting: Where the target is, None unless ``TRACKING``.
+        sighting: Place of the target; None unless ``TRACKING``.
         match: Share of the target that agreed with the best model, 0 to 1.
     """
 
@@ -59,21 +59,21 @@ class Track:
 
 
 class TargetTracker:
-    """Looks at one camera's pictures, one after the other; begins with acquisition."""
+    """Tracks the target in one camera's pictures, one after the other; begins with acquisition."""
 
     def __init__(self) -> None:
         self.model: TargetModel | None = None
-        """Subimage and skeleton of the target as last seen, for a look at what the tracker goes by."""
+        """Subimage and skeleton of the last sighting, for debug views."""
         self._frames_left = 0
 
     def look(self, frame: Picture) -> Track:
-        """Return where the target is in the next picture.
+        """Return the result of the next picture.
 
         Args:
             frame: Grey levels 0 to 255, shape (height, width), row 0 on top.
 
         Raises:
-            ValueError: It is no grey picture.
+            ValueError: The array is not a grey picture.
         """
         if frame.ndim != 2 or frame.dtype != np.uint8:
             raise ValueError(f"a grey picture has shape (height, width) and bytes, not {frame.shape} of {frame.dtype}")
@@ -82,7 +82,7 @@ class TargetTracker:
         sighting = track_skeleton(frame, self.model)
         if sighting is not None:
             return self._found(frame, self.model, sighting)
-        # Only now: the whole picture costs many times the skeleton.
+        # Only now, because the whole picture costs many times as much as the skeleton.
         match, sighting = search_subimage(frame, self.model)
         if sighting is not None:
             return self._found(frame, self.model, sighting)
@@ -111,35 +111,35 @@ class TargetTracker:
 
 
 def track_skeleton(frame: Picture, model: TargetModel) -> Sighting | None:
-    """Return the target near where the model has it, None if less than 70 % of the skeleton matches there.
+    """Return the target near the model's place; None if less than 70 % of the skeleton matches there.
 
     Args:
         frame: Grey levels 0 to 255, shape (height, width).
-        model: As last seen.
+        model: Model of the last sighting.
     """
     shift_px = best_shift_px(frame, model)
     return None if shift_px is None else _placed(frame, model, model.blobs_px + shift_px)
 
 
 def search_subimage(frame: Picture, model: TargetModel) -> tuple[float, Sighting | None]:
-    """Return how much of the subimage matches where it fits best in the whole picture, and the target there.
+    """Return the best match of the subimage in the whole picture, and the target there.
 
     Args:
         frame: Grey levels 0 to 255, shape (height, width).
-        model: Last valid.
+        model: The last valid model.
 
     Returns:
-        The subimage's match, -1 to 1; and the sighting, None if that or the skeleton's is below 70 %.
+        The subimage's match, -1 to 1; and the sighting, None if this match or that of the skeleton is below 70 %.
     """
     match, shift_px = model.best_subimage_match(frame)
     return match, _placed(frame, model, model.blobs_px + np.array(shift_px, float)) if is_match(match) else None
 
 
 def best_shift_px(frame: Picture, model: TargetModel) -> Floats | None:
-    """Return by how many columns and rows the skeleton moved, None if it matches nowhere within reach.
+    """Return the skeleton's shift in columns and rows; None if it matches nowhere within reach.
 
-    Correlates the 17 pixels with every place at most ``REACH_COLUMNS_PX`` and ``REACH_ROWS_PX`` away.
-    Where many places match alike, it is the one nearest to their middle.
+    Method: the 17 pixels are correlated with every place at most ``REACH_COLUMNS_PX`` and ``REACH_ROWS_PX`` away. If
+    many places match equally, the result is the place nearest to their middle.
     """
     middle = int(model.middle_level)
     is_bright = (model.levels > middle).astype(np.uint8).tolist()
@@ -167,10 +167,10 @@ def best_shift_px(frame: Picture, model: TargetModel) -> Floats | None:
 
 
 def _placed(frame: Picture, model: TargetModel, blobs_px: Floats) -> Sighting | None:
-    """Return the sighting with its discs centred, None if what is there matches one of the models too little.
+    """Return the sighting with its discs centred; None if skeleton or subimage matches too little there.
 
-    With 1300 places to choose from, a spoiled picture often has one with twelve fitting pixels; the
-    subimage does not fit there.
+    Among 1300 places, a bad picture often has one at which twelve pixels fit by chance; the subimage does not fit
+    there.
     """
     placed = steadied(centred(frame, blobs_px, model.middle_level), blobs_px)
     if not plausible(placed):
@@ -180,14 +180,14 @@ def _placed(frame: Picture, model: TargetModel, blobs_px: Floats) -> Sighting | 
 
 
 def steadied(placed_px: Floats, expected_px: Floats) -> Floats:
-    """Return the blobs, each as near to where it seems to be as the target's shape may have changed.
+    """Return the blobs at their apparent places, limited to the possible change of the target's shape.
 
-    A torn row pulls single discs away, while the target's shape changes little from picture to picture.
-    A shape that was wrong at the beginning comes right within a few pictures.
+    A torn row displaces single discs, while the target's shape changes little from picture to picture. An initially
+    wrong shape is corrected within a few pictures.
 
     Args:
-        placed_px: Where the discs seem to be, as ``Sighting.blobs_px``.
-        expected_px: The shape, somewhere near.
+        placed_px: Apparent places of the discs, as ``Sighting.blobs_px``.
+        expected_px: The expected shape, approximately at this place.
     """
     moved_px = placed_px - expected_px
     # The median of four; numpy's own takes as long as the whole correlation.

@@ -3,13 +3,13 @@
 Frame: origin on the floor under the middle of the board.  The zero-angle line leaves the board at a
 right angle; ``ahead_m`` is measured along it.  A robot on it that faces the board has heading 0.
 
-Three of the four discs lie on a line, which makes the usual homography useless; but a robot on a floor
-has only position, heading and pitch, and eight coordinates say them.  Seen from far away the target
-looks nearly the same from both sides of the zero-angle line, so the fit starts from both.
+Three of the four discs lie on a line, so the usual homography cannot be computed. But a robot on a floor has only
+position, heading and pitch, and eight coordinates determine them. From far away the target looks nearly the same from
+both sides of the zero-angle line, so the fit starts from both.
 
 Source: RAM 2002, "Visual Servoing": the robot shall reach a point on the zero-angle line of the target.
 Method: chosen; Gauss-Newton least squares, as in Hartley and Zisserman, "Multiple View Geometry",
-appendix 6, with the pose known before, if any, as further equations.
+appendix 6, with the previously known pose, if any, as further equations.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ import numpy as np
 from mission_control.vision.landmark import DISCS_M, PITCH_M, Disc, Floats, Sighting
 
 PIXEL_ERROR_PX = 0.25  # measured: a disc's centre on a link of 30 dB
-PITCH_ERROR_RAD = math.radians(3.0)  # measured: starts and stops tilt the body by so much
+PITCH_ERROR_RAD = math.radians(3.0)  # measured: tilt of the body at starts and stops
 MOST_STEPS = 12  # chosen: 4 to 6 are enough from the starts used
-_ENOUGH = 1e-5  # chosen: metres or radians; a hundredth of what matters
-_LEAST_SLANT_RAD = math.radians(12.0)  # chosen: two starts that do not fall together on the zero-angle line
+_ENOUGH = 1e-5  # chosen: metres or radians; a hundredth of the relevant accuracy
+_LEAST_SLANT_RAD = math.radians(12.0)  # chosen: keeps the two starts distinct on the zero-angle line
 _LEAST_RANGE_M = 0.05  # chosen: nearer the camera touches the board
 
 
@@ -55,7 +55,7 @@ SCOUT_CAMERA = CameraModel(
     forward_m=0.019,
     tilt_rad=math.radians(4.0),
 )
-"""The Scout's, at 320 × 240 pixels; a test holds it to the simulated one."""
+"""The Scout's camera, at 320 × 240 pixels; a test compares it with the simulated one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,11 +64,11 @@ class TargetPose:
 
     Attributes:
         ahead_m: Before the board.
-        left_m: Left of the zero-angle line, seen by who faces the board.
-        heading_rad: 0 faces the board squarely, counter-clockwise is positive.
-        pitch_rad: How much higher the camera looks than its tilt says.
-        residual_px: Root mean square of what the fit leaves of the eight coordinates.
-        covariance: Of (ahead, left, heading, pitch), shape (4, 4).
+        left_m: Left of the zero-angle line, for an observer who faces the board.
+        heading_rad: 0: faces the board at a right angle; counter-clockwise is positive.
+        pitch_rad: Upward rotation of the camera beyond its tilt.
+        residual_px: Root mean square of the fit's residuals of the eight coordinates.
+        covariance: Covariance of (ahead, left, heading, pitch), shape (4, 4).
     """
 
     ahead_m: float
@@ -94,7 +94,7 @@ class TargetPose:
         return math.remainder(-self.off_axis_rad - self.heading_rad, math.tau)
 
     def moved(self, forward_m: float, turn_rad: float) -> TargetPose:
-        """Return the pose after the robot drove an arc, as sure as its wheels are.
+        """Return the pose after the robot drove an arc, with the uncertainty of its wheels added.
 
         Args:
             forward_m: Way of its middle.
@@ -116,10 +116,10 @@ class TargetPose:
 def discs_in_picture(
     ahead_m: float, left_m: float, heading_rad: float, pitch_rad: float = 0.0, camera: CameraModel = SCOUT_CAMERA
 ) -> Floats:
-    """Return where a robot at this pose sees the discs: as ``Sighting.blobs_px``.
+    """Return the places of the discs in the picture of a robot at this pose, as ``Sighting.blobs_px``.
 
     Raises:
-        ValueError: A disc is not before the camera.
+        ValueError: A disc is not in front of the camera.
     """
     seen, depths = _project(np.array([ahead_m, left_m, heading_rad, pitch_rad]), camera)[:2]
     if float(depths.min()) < _LEAST_RANGE_M:
@@ -128,7 +128,7 @@ def discs_in_picture(
 
 
 def estimate_poses(sighting: Sighting, camera: CameraModel = SCOUT_CAMERA) -> list[TargetPose]:
-    """Return the poses from which the landmark looks like this, the likeliest first.
+    """Return the poses that explain this sighting, the likeliest first.
 
     Args:
         sighting: Where its discs are.
@@ -146,7 +146,7 @@ def estimate_poses(sighting: Sighting, camera: CameraModel = SCOUT_CAMERA) -> li
 
 
 def refine_pose(sighting: Sighting, before: TargetPose, camera: CameraModel = SCOUT_CAMERA) -> TargetPose | None:
-    """Return the pose that explains both the sighting and what was known before, None if none does.
+    """Return the pose that explains both the sighting and the expected pose; None if there is no such pose.
 
     Args:
         sighting: Where its discs are.
@@ -182,7 +182,7 @@ def _project(pose: Floats, camera: CameraModel) -> tuple[Floats, Floats, Floats]
     rise = above * up_cos - forward * up_sin
     scale = camera.focal_px / depth
     seen = np.stack([camera.centre_px[0] - scale * left, camera.centre_px[1] - scale * rise], axis=1)
-    # How forward and left change with (ahead, left, heading); pitch turns depth into rise.
+    # Derivatives of forward and left by (ahead, left, heading); pitch converts depth into height.
     d_forward = np.stack([np.full(4, cos), np.full(4, -sin), left], axis=1)
     d_left = np.stack([np.full(4, -sin), np.full(4, -cos), -(forward + camera.forward_m)], axis=1)
     slopes = np.empty((4, 2, 4))
@@ -195,11 +195,11 @@ def _project(pose: Floats, camera: CameraModel) -> tuple[Floats, Floats, Floats]
 
 
 def _fit(blobs_px: Floats, camera: CameraModel, start: Floats, information: Floats | None) -> TargetPose | None:
-    """Return the pose of the least squares, None if the steps lead behind the board.
+    """Return the pose of the least squares; None if the steps lead behind the board.
 
     Args:
-        blobs_px: Seen.
-        start: (ahead, left, heading, pitch); also the expected pose, as far as ``information`` says.
+        blobs_px: The discs' places in the picture.
+        start: (ahead, left, heading, pitch); also the expected pose, weighted by ``information``.
         information: Inverse covariance of the expected pose; None expects nothing but a small pitch.
     """
     if information is None:
@@ -213,7 +213,7 @@ def _fit(blobs_px: Floats, camera: CameraModel, start: Floats, information: Floa
         normal = weight * jacobian.T @ jacobian + information
         gradient = weight * jacobian.T @ (blobs_px - seen).ravel() - information @ (pose - start)
         step = np.linalg.solve(normal + np.diag(1e-9 * np.diag(normal)), gradient)
-        # A long step leaves the region where the slopes hold; far off a third of the range is enough.
+        # A long step leaves the region in which the derivatives are valid; far away, a third of the range is enough.
         longest = max(
             float(np.abs(step[:2]).max()) / (0.3 * max(abs(pose[0]), 0.2)), float(np.abs(step[2:]).max()) / 0.3
         )

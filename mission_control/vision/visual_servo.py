@@ -1,4 +1,4 @@
-"""Visual servo: tracker, pose and servo law in one, from pictures to commands, for a behavior.
+"""Visual servo: combines tracker, pose and servo law, so that pictures go in and commands come out.
 
 Source: RAM 2002, "Visual Servoing".
 """
@@ -15,19 +15,19 @@ from mission_control.vision.skeleton_tracking import TargetTracker, Track
 from mission_control.vision.target_pose import TargetPose
 
 LATENCY_S = 0.1  # chosen: from a frame's capture until its command turns the wheels, on one machine
-NEAREST_STOP_M, FARTHEST_STOP_M = 0.40, 1.2  # measured: nearer the T leaves the picture, further the line is unsure
+NEAREST_STOP_M, FARTHEST_STOP_M = 0.40, 1.2  # measured: nearer, the T leaves the picture; farther, the line is unsure
 LONGEST_GAP_S = 0.5  # chosen: the robots' own watchdog has stopped the wheels by then
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ServoStep:
-    """The decision of one picture.
+    """The decision from one picture.
 
     Attributes:
-        command: What the robot shall do now.
-        stage: Of the approach.
-        track: What the tracker said.
-        pose: Where the robot stands, None as long as the target is not in sight.
+        command: Command for the robot.
+        stage: Stage of the approach.
+        track: Result of the tracker.
+        pose: Pose of the robot; None while the target is not in sight.
     """
 
     command: SpeedCommand
@@ -41,7 +41,7 @@ class VisualServo:
 
     Args:
         stop_m: Distance of the place from the board, along the zero-angle line.
-        latency_s: From a frame's capture until its command turns the wheels.
+        latency_s: Time from a frame's capture until its command turns the wheels.
 
     Raises:
         ValueError: From ``stop_m`` away the landmark does not fit into the picture, or is too small.
@@ -53,7 +53,7 @@ class VisualServo:
         if not 0 <= latency_s < LONGEST_GAP_S:
             raise ValueError(f"a latency of {latency_s} s is not within 0 to {LONGEST_GAP_S} s")
         self.tracker = TargetTracker()
-        """For a look at its models."""
+        """The tracker; debug views show its models."""
         self._filter = PoseFilter()
         self._approach = Approach(stop_m)
         self._latency_s = latency_s
@@ -63,22 +63,22 @@ class VisualServo:
 
     @property
     def stage(self) -> Stage:
-        """Of the approach."""
+        """Stage of the approach."""
         return self._approach.stage
 
     @property
     def approaches(self) -> int:
-        """How often the robot came near the board."""
+        """Number of approaches to the board."""
         return self._approach.approaches
 
     @property
     def spread_m(self) -> float:
-        """Standard deviation of the place of the last pose; infinite: there is none."""
+        """Standard deviation of the place of the last pose; infinite: there is no pose."""
         return self._filter.spread_m
 
     @property
     def searched_rad(self) -> float:
-        """The robot's turn since it last saw the target; after a full turn the target is not there."""
+        """The robot's turn since the last sighting; after a full turn the target is not there."""
         return self._approach.searched_rad
 
     def see(self, frame: Picture, elapsed_s: float) -> ServoStep:
@@ -86,10 +86,10 @@ class VisualServo:
 
         Args:
             frame: Grey levels 0 to 255, shape (240, 320), row 0 on top.
-            elapsed_s: Since the picture before; of no meaning for the first, and the first after ``resumed``.
+            elapsed_s: Time since the last picture; ignored for the first picture, and the first after ``resumed``.
 
         Raises:
-            ValueError: It is no grey picture, or time runs backwards.
+            ValueError: The array is not a grey picture, or time runs backwards.
         """
         if elapsed_s < 0:
             raise ValueError(f"a picture comes {-elapsed_s} s before the one before it")
@@ -104,7 +104,7 @@ class VisualServo:
         return ServoStep(command, self._approach.stage, track, pose)
 
     def resumed(self) -> None:
-        """Begin again with acquisition, the robot standing still; how often it approached is kept."""
+        """Begin again with acquisition, the robot standing still; the number of approaches is kept."""
         self.tracker.forget()
         self._filter.forget()
         self._approach.resumed()
@@ -112,7 +112,7 @@ class VisualServo:
         self._is_fresh = True
 
     def _dead_reckon(self, elapsed_s: float) -> None:
-        """Move the pose by what the wheels did between the two pictures."""
+        """Move the pose by the wheels' motion between the two pictures."""
         begin_s, self._now_s = self._now_s, self._now_s + elapsed_s
         forward_m = turn_rad = 0.0
         while self._sent:

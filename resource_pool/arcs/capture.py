@@ -22,7 +22,7 @@ class CaptureArc(VideoDriveArc):
 
     roles: ClassVar[Mapping[str, str] | Sequence[str]] = (*VideoDriveArc.roles, "framegrabber")
     receiver: ClassVar[str] = "framegrabber"
-    """Role of the RC that receives and delivers."""
+    """Role of the RC that receives and delivers pictures."""
     gives_pictures = True
     accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
 
@@ -30,7 +30,7 @@ class CaptureArc(VideoDriveArc):
     def cameras(cls) -> Mapping[str, tuple[str, str]]:
         """Return role of each RC with a camera → roles of its video frequency and of its receiver.
 
-        Pictures of a camera that is not the ARC's body have the camera's role as last segment of their address.
+        If a camera is not the ARC's body, its role is the last segment of the address of its pictures.
         """
         return {cls.body: ("video_frequency", cls.receiver)}
 
@@ -41,7 +41,7 @@ class CaptureArc(VideoDriveArc):
         await asyncio.gather(*switching, *tuning)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer the receivers, too: switch on a transmitter that one does not receive."""
+        """Also answer the receivers: switch on the transmitter that a receiver reports as missing."""
         match asked.body:
             case NothingHeard(rc=rc, epoch=epoch):
                 cameras = {self.rc(receiver): camera for camera, (_, receiver) in self.cameras().items()}

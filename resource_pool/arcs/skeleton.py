@@ -1,4 +1,4 @@
-"""A complete ARC, to be copied: a robot that drives with its lamp on."""
+"""A complete ARC to copy from: a robot that drives with its lamp on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from resource_pool.rcs.skeleton import Shine
 
 
 class LitDriveArc(DriveArc):
-    """The set of ``DriveArc`` and a lamp, which shines during a grant as brightly as its owner says."""
+    """The set of ``DriveArc`` and a lamp; during a grant the lamp has the brightness that the owner chose."""
 
     roles: ClassVar[Sequence[str]] = (*DriveArc.roles, "lamp")
     commands: ClassVar[Mapping[type[Command], str]] = {**DriveArc.commands, Shine: "lamp"}

@@ -1,1 +1,1 @@
-"""One folder per kind of device that is no robot."""
+"""One folder per kind of device other than robots."""

@@ -1,4 +1,4 @@
-"""Driver interface: the protocols between RCs and hardware. A driver knows one device, but no ARC, no epoch and no bus.
+"""Driver interface: the protocols between RCs and hardware. A driver knows one device, but no ARC, epoch or bus.
 
 The simulated drivers, a radio on a serial port and a grabber behind V4L2 all fit these protocols. A mission names a
 driver: one of ``BUILT_IN`` for its kind, or ``package.module:Class``.
@@ -43,9 +43,9 @@ class DriverSite:
 
     Attributes:
         parameters: The RC's parameters; the driver's own are in ``options``, checked by its ``options_type``.
-        tell: Publishes one line to the mission's log.
-        fail: Ends the RC because of this bug or fault; its creator restarts it, and it opens the device again.
-        folder: Folder of the mission on this machine, for results that are computed only once; None: no folder.
+        tell: Publishes one line in the mission's log.
+        fail: Ends the RC because of this bug or fault. Its creator restarts the RC, which opens the device again.
+        folder: Cache folder of the mission on this machine; None: no folder.
         remark: Shows one line beside the RC's state until the next one; empty: nothing.
     """
 
@@ -80,18 +80,18 @@ class RadioDriver(Protocol):
     async def open(self) -> None:
         """Open the device.
 
-        When: before readiness, and after ``close`` if it comes back (``driver_exchange``). Raise ``HardwareFault`` if
-        it is missing.
+        When: before readiness, and again after ``close`` if a driver exchange brings this driver back. Raise
+        ``HardwareFault`` if it is missing.
         """
 
     async def transmit(
         self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
     ) -> float | None:
-        """Return when the packet is on the air. Not: queue it. The arguments after ``payload`` are for audits only.
+        """Send the packet and return when it is on the air. Not: queue it. Arguments after ``payload`` are for audits.
 
         Returns:
-            Its time on the air from the call on, mission seconds, by which the RC manager plans if it is longer than
-            declared; None: about the duration of this call, which raises an alarm only.
+            Time on the air, in mission seconds from the call on; the RC manager plans with it if it is longer than
+            declared. None: unknown. Then the duration of this call is used, for an alarm only.
 
         Raises:
             HardwareFault: The packet was not sent.
@@ -106,7 +106,7 @@ class AnsweringRadio(Protocol):
     """A radio on which robots reply."""
 
     def hear(self, network_id: int, heard: Callable[[bytes], None]) -> None:
-        """Ask this robot for replies with packets that are sent to it anyway, from the next one on.
+        """Ask this robot for replies from now on, together with packets that are sent anyway.
 
         When: once for each robot whose protocol reads replies. What: call ``heard``, in the event loop, with each
         reply, and with no bytes if the robot was asked and did not reply in time. Add the time of a reply on the air to
@@ -116,7 +116,7 @@ class AnsweringRadio(Protocol):
 
 @runtime_checkable
 class AdjustableDriver(Protocol):
-    """A driver that can apply changed options and parameters of its RC while it runs."""
+    """A driver that can apply changed options and RC parameters at run time."""
 
     def adjust(self, site: DriverSite) -> None:
         """Apply ``site.parameters``, whose options are checked, from the next packet or picture on.
@@ -136,8 +136,8 @@ class Picture:
         width_px: Columns.
         height_px: Rows.
         transmitters: Number of transmitters on the frequency; -1: unknown to the hardware.
-        robot: The transmitting robot, if it is exactly one and known to the hardware; else empty.
-        kind: Worst fault of the picture, for counts only: ``clean``, ``torn``, …; empty: unknown.
+        robot: The transmitting robot, if there is exactly one and the hardware knows it; else empty.
+        kind: Worst fault of the picture (``clean``, ``torn``, …), for statistics only; empty: unknown.
     """
 
     captured_s: float
@@ -167,10 +167,10 @@ class FramegrabberDriver(Protocol):
 
 @runtime_checkable
 class YieldingDriver(Protocol):
-    """A framegrabber's driver that delivers fewer pictures while its host is busy; it says so by ``site.remark``."""
+    """A framegrabber driver that delivers fewer pictures while its host is busy, and reports it by ``remark``."""
 
     def allowed_hz(self) -> float:
-        """Return how many pictures a second it delivers at most now."""
+        """Return the present limit of its picture rate, Hz."""
 
 
 class RobotProtocol(Protocol):
@@ -187,7 +187,7 @@ class RobotProtocol(Protocol):
 
 
 class MalformedReply(Refusal):
-    """The bytes are no reply of this kind of robot."""
+    """The bytes are not a reply of this kind of robot."""
 
     code = "driver.malformed_reply"
     remedy = "Check that robot and protocol are of one kind, and that no two robots have the same network id."
@@ -201,7 +201,7 @@ class ReplyReader(Protocol):
         """Return the reply as the struct that the RC's class declares in ``reports``.
 
         Raises:
-            MalformedReply: The bytes are none.
+            MalformedReply: The bytes are not a reply of this kind of robot.
         """
 
 
@@ -210,8 +210,8 @@ class ScoutReports(msgspec.Struct, frozen=True):
 
     Attributes:
         battery_share: Charge of its battery, 0 to 1.
-        tilt_rad: Angle between its upper side and the vertical; pi: it lies on its back.
-        motor_load_share: How hard its motors work, 0 to 1.
+        tilt_rad: Angle between its up axis and the vertical; pi: the Scout lies on its back.
+        motor_load_share: Load of its motors, 0 to 1.
     """
 
     battery_share: Share
@@ -264,7 +264,7 @@ def driver_class(path: str, resource: str) -> Callable[[DriverSite], Any]:
     """Return the class at ``package.module:Class``; imports its file.
 
     Raises:
-        UnknownDriver: There is none.
+        UnknownDriver: There is no such class.
     """
     module_name, _, class_name = path.partition(":")
     try:

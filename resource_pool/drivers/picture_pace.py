@@ -1,8 +1,8 @@
-"""Pace of a renderer: how many pictures a second it draws, so that pictures fall first where a processor is full.
+"""Pace of a renderer: limits its picture rate, so that on a full processor pictures are dropped before control suffers.
 
-Control goes before pictures. A renderer's event loop shares the processors with ARCs and RCs, so where it wakes too
-late, they do as well. If it is late too often, the renderer draws fewer pictures; once it has been in time for a while,
-it draws more, up to the rate asked for. Before it tries a rate again that was too much, it waits longer each time.
+Control has priority over pictures. A renderer's event loop shares the processors with ARCs and RCs: if the loop wakes
+too late, so do they. If the loop is late too often, the renderer lowers its rate. After a while without delays it
+raises the rate again, up to the requested one. Before it retries a rate that was too high, it waits longer each time.
 
 Rules of this file: pure; times are arguments, in seconds of the machine; the caller owns the clock.
 """
@@ -15,16 +15,16 @@ LATE_S = 0.01  # measured: 1 of 250 pictures of 30 Scouts on two cores with othe
 WINDOW_S = 2.0  # chosen: 30 pictures at 15 a second; a slice of 5 s has two
 LATE_SHARE = 1 / 15  # chosen: between the two measured shares
 LATE_LEAST = 2  # chosen: one late picture proves nothing
-CALM_WINDOWS, CALM_MOST = 2, 16  # chosen: it falls in one window, rises in two, and tries too much twice a minute
-SLOWER, FASTER = 2 / 3, 5 / 4  # chosen: a little more than halved in two windows, doubled in six
-LEAST_HZ = 1.0  # chosen: a person and a motion detector still see that the picture lives
+CALM_WINDOWS, CALM_MOST = 2, 16  # chosen: falls after one window, rises after two, overshoots twice a minute
+SLOWER, FASTER = 2 / 3, 5 / 4  # chosen: the rate is a little more than halved in two windows, and doubled in six
+LEAST_HZ = 1.0  # chosen: a person and a motion detector still notice changes in the picture
 
 
 class PicturePace:
     """The allowed rate of one renderer.
 
     Args:
-        asked_hz: Pictures a second that its mission asks for.
+        asked_hz: Picture rate that the mission file requests.
     """
 
     def __init__(self, asked_hz: float) -> None:
@@ -34,18 +34,18 @@ class PicturePace:
         self._needed, self._too_much_hz = CALM_WINDOWS, math.inf
 
     def ask(self, asked_hz: float) -> None:
-        """Ask for another rate; it is allowed as far as it lies below the present limit, or if there is none."""
+        """Request another rate; it is allowed up to the present limit, or in full without a limit."""
         was_free, self.asked_hz = self.allowed_hz >= self.asked_hz, asked_hz
         self.allowed_hz = asked_hz if was_free else min(self.allowed_hz, asked_hz)
 
     def delivered(self, late_s: float, now_s: float) -> bool:
-        """Count a picture; return whether the allowed rate has changed.
+        """Count a delivered picture; return whether the allowed rate has changed.
 
         Args:
-            late_s: Time by which the event loop was too late for it.
-            now_s: Time of its delivery.
+            late_s: Delay of the event loop for this picture.
+            now_s: Time of delivery.
         """
-        if now_s >= self._from_s + 2 * WINDOW_S:  # there were no pictures: nobody held the grabber
+        if now_s >= self._from_s + 2 * WINDOW_S:  # no pictures meanwhile, because no ARC held the framegrabber
             self._begin_window(now_s)
         self._pictures += 1
         self._late += late_s > LATE_S
@@ -57,7 +57,7 @@ class PicturePace:
         return self.allowed_hz != before
 
     def remark(self) -> str:
-        """Return one line for people; empty while the rate is the one asked for.
+        """Return one line for people; empty while the rate is the requested one.
 
         Example:
             >>> pace = PicturePace(15.0)

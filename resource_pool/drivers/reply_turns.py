@@ -3,8 +3,8 @@
 Rules of this file:
 
 * A robot is asked at most once in ``every_s``.
-* A reply that has not come when its robot is asked again is lost; it is reported once.
-* The reply to one packet counts for whichever packet asked last: a robot answers with its present state.
+* A reply that has not arrived when its robot is asked again is lost; the loss is reported once.
+* A reply counts for the packet that asked last, because a robot answers with its present state.
 
 Pure; times are mission seconds.
 """
@@ -18,7 +18,7 @@ INSTANT_S = 1e-9  # chosen: far above the rounding of mission times, far below a
 
 @dataclass(frozen=True, slots=True)
 class ReplyTurn:
-    """What one packet does.
+    """The role of one packet in asking for replies.
 
     Attributes:
         asks: True: it asks its robot for a reply.
@@ -38,7 +38,7 @@ class ReplyTurns:
         self._open: set[int] = set()
 
     def take(self, network_id: int, now_s: float) -> ReplyTurn:
-        """Return what the packet does that is sent to this robot now, never before an earlier one."""
+        """Return the turn of a packet that is sent to this robot now; times must not decrease."""
         asked_s = self._asked_s.get(network_id)
         if asked_s is not None and now_s < asked_s + self._every_s - INSTANT_S:
             return ReplyTurn()

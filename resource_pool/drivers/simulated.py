@@ -21,13 +21,13 @@ from scout_model import radio_link
 from scout_model.errors import MalformedPacket
 from scout_model.scout import clip_wheel_speed
 
-REPLY_EVERY_S = 0.5  # chosen: a person reads a gauge no faster; mission seconds, on a faster clock machine seconds
-FIRST_REPLY_BITS = radio_link.packet_bits(bytes(4))  # chosen: a Scout's; afterwards the robot's last reply is known
+REPLY_EVERY_S = 0.5  # chosen: a person reads a gauge no faster; mission seconds, machine seconds if the clock is faster
+FIRST_REPLY_BITS = radio_link.packet_bits(bytes(4))  # chosen: a Scout's; later the last reply's length is known
 WORLD_START_S = 20.0  # chosen: the world compiles its model before it answers
 
 
 async def meet_world(site: DriverSite) -> WorldModel:
-    """Return the world's model as soon as the world answers.
+    """Ask the world for its model, and ask again until it answers.
 
     Raises:
         HardwareFault: The world did not answer within ``WORLD_START_S``.
@@ -41,7 +41,7 @@ async def meet_world(site: DriverSite) -> WorldModel:
 
 
 def world_of(site: DriverSite) -> str:
-    """Return the address of the world that plays this hardware."""
+    """Return the address of the world that simulates this hardware."""
     return address(Subsystem.RESOURCE_POOL, site.parameters.world)
 
 
@@ -49,8 +49,8 @@ class RadioOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Options of a simulated radio.
 
     Attributes:
-        bits_per_s: Its bit rate; a packet that takes longer than its ARC declared raises an alarm, and the longer time
-            counts.
+        bits_per_s: Its bit rate. If a packet takes longer than its ARC declared, the radio raises an alarm and the RC
+            manager plans with the longer time.
     """
 
     bits_per_s: Annotated[float, msgspec.Meta(gt=0)] = 115_200.0
@@ -83,7 +83,8 @@ class SimulatedRadio:
     ) -> float | None:
         """Send the packet without an acknowledgment, as on the air.
 
-        Return the duration of its bytes, and of a reply as long as the robot's last one if it asks for one.
+        Return the time of its bytes on the air. If it asks for a reply, add the time of a reply as long as the robot's
+        last.
         """
         air_time_s = radio_link.packet_bits(payload) / self._bits_per_s
         asks = network_id in self._hearing and self._ask(network_id)
@@ -103,13 +104,13 @@ class SimulatedRadio:
         return air_time_s + reply_bits / self._bits_per_s
 
     def hear(self, network_id: int, heard: Callable[[bytes], None]) -> None:
-        """Ask this robot for a reply each ``REPLY_EVERY_S``; one that has not come by then is lost."""
+        """Ask this robot for a reply every ``REPLY_EVERY_S``; a reply that has not arrived by then is lost."""
         self._hearing[network_id] = heard
         if self._replies is None:
             self._replies = self._site.bus.subscribe(self._world, Conversation.REPLIES, ReplyOnAir, self._heard)
 
     async def close(self) -> None:
-        """Hear no more replies."""
+        """Stop receiving replies."""
         if self._replies is not None:
             self._replies.close()
 
@@ -130,7 +131,7 @@ class SimulatedRadio:
 
 
 class SimulatedRobotProtocol:
-    """Encodes the packets that every simulated robot reads; derive and add those of the kind."""
+    """Encodes the packets that every simulated robot understands; derive and add the packets of your kind of robot."""
 
     def __init__(self, site: DriverSite) -> None:
         self._site = site

@@ -1,9 +1,9 @@
-"""Driver of the simulated receiver and framegrabber: draws the received pictures in the receiver's process.
+"""Driver of the simulated receiver and framegrabber: renders the received pictures in the RC's process.
 
 It draws only the cameras of robots that transmit on the tuned frequency, and only while it is tuned. A thread of its
-own draws and owns the renderer; on a virtual clock the loop draws, which takes no time. In both cases the driver
-delivers the picture of a frame ``capture_delay_s`` after the frame's time, or as soon afterwards as it is drawn. Where
-the processors are full it draws fewer pictures, see ``picture_pace``.
+own owns the renderer and draws; on a virtual clock the event loop draws, in no virtual time. In both cases the driver
+delivers the picture of a frame ``capture_delay_s`` after the frame's time, or as soon as it is drawn if that is later.
+If the processors are full, it draws fewer pictures; see ``picture_pace``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.drivers.world_messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, forget, prepare, probe, probe_once
 
-CAMERAS_KEPT = 2  # chosen: one experiment, or two by turns; 20 MB each
+CAMERAS_KEPT = 2  # chosen: enough for one experiment, or for two that alternate; 20 MB each
 EARLY_S = 1 / 120  # chosen: a quarter of a frame, so that rounded frame times skip no frame
 
 
@@ -41,8 +41,8 @@ class GrabberOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Options of a simulated framegrabber.
 
     Attributes:
-        capture_delay_s: Time from a frame to its delivery, seconds: the camera sends it row by row, and the grabber
-            has it after its last row.
+        capture_delay_s: Time from a frame to its delivery, seconds. The camera sends a frame row by row, so the
+            framegrabber has it only after the last row.
     """
 
     capture_delay_s: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1 / 30
@@ -74,7 +74,7 @@ class SimulatedFramegrabber:
         self._site.remark(self._pace.remark())
 
     def allowed_hz(self) -> float:
-        """Return how many pictures a second are drawn at most; see ``YieldingDriver.allowed_hz``."""
+        """Return the present limit of the picture rate; see ``YieldingDriver.allowed_hz``."""
         return self._pace.allowed_hz
 
     async def open(self) -> None:
@@ -159,7 +159,7 @@ class SimulatedFramegrabber:
             tuned.deliver(picture)
 
     def _keep_pace(self, due_s: float) -> None:
-        """Compare the time of a delivery with the earliest possible one: due, and drawn without a wait."""
+        """Compare the time of a delivery with the earliest possible one: frame due, and drawn without a wait."""
         clock = self._site.clock
         now_s = clock.now_s()
         if self._pace.delivered((now_s - due_s) / clock.rate, now_s / clock.rate):
@@ -168,7 +168,7 @@ class SimulatedFramegrabber:
 
 @dataclass(frozen=True, slots=True)
 class _Tuned:
-    """The receiver of a picture; after a tuning, the receiver first has to lock."""
+    """The tuned frequency and the listener for its pictures; with ``is_new`` the receiver has to lock first."""
 
     frequency: str
     deliver: Callable[[Picture], None]
@@ -236,16 +236,16 @@ def _new_camera(mjcf: str, backend: str) -> Any:
 
 @functools.lru_cache(maxsize=CAMERAS_KEPT)
 def _lasting_camera(mjcf: str, backend: str) -> Any:
-    """Return the camera for all worlds of this model that this process runs on a virtual clock, one after the other.
+    """Return the camera that all worlds of this model share in this process, one after the other on virtual clocks.
 
-    One thread draws all of them, and a picture depends only on the world's state. So the pictures that one world's
-    camera caches are valid for the next world too.
+    One thread draws all worlds, and a picture depends only on the world's state. So pictures cached for one world are
+    valid for the next.
     """
     return _new_camera(mjcf, backend)
 
 
 def _choose(wanted: str, folder: Path | None) -> tuple[GlSupport | None, str]:
-    """Return the OpenGL support, if it matters, and the camera to use."""
+    """Return the OpenGL support (if the choice depends on it) and the camera to use."""
     if wanted == "paint":
         return None, "paint"
     support = probe() if folder is None else probe_once(folder)

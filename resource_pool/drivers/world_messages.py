@@ -34,7 +34,7 @@ class RadioPacket(Message, frozen=True, tag="RadioPacket/2"):
         number: Its number among the packets of its radio since the radio was opened.
         air_time_s: Duration of its bits.
         robot_stop: For the audit: number of the robot's last stop when the payload was made.
-        asks: True: the robot shall reply.
+        asks: True: the packet asks the robot for a reply.
     """
 
     radio: Mention
@@ -69,7 +69,7 @@ class AskWorld(Message, frozen=True):
 
 
 class WorldModel(Message, frozen=True):
-    """Answer to ``AskWorld``: all that another process needs to draw and receive the same pictures.
+    """Answer to ``AskWorld``: everything that another process needs to render the same pictures.
 
     Attributes:
         mjcf: The compiled world's XML.
@@ -92,10 +92,11 @@ class WorldState(Message, frozen=True):
     Attributes:
         frame: Number of the frame.
         at_s: Mission time of the state.
-        state: float64 vector, little endian; only the model knows its meaning.
+        state: float64 vector, little endian, to be read by ``Camera.show`` of the same model.
         transmitting: Robot → video frequency of its transmitter, if it is on.
         on_since: Robot that transmits → first frame on this frequency.
-        motors: Robot that transmits → speed of its wheels, 0 to 1 of their limit; a missing robot stands still.
+        motors: Robot that transmits → speed of its wheels as a share of their limit, 0 to 1; a robot without an entry
+            stands still.
     """
 
     frame: Count

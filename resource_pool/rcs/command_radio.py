@@ -2,13 +2,14 @@
 
 Rules of this file:
 
-* One packet at a time is on the air, and each keeps it for its packet time, or longer if it takes longer.
-* All packets but safe packets are sent in admitted turns. If an ARC declared too little time, the radio logs it, and
-  tells the RC manager the longest time, if the driver reports times on the air. The duration of a call of the driver
-  is no such time: it has the pauses of this process in it.
+* Only one packet at a time is on the air. It occupies the air for its packet time, or longer if it really takes longer.
+* All packets except safe packets are sent in admitted turns. If a packet takes longer than its ARC declared, the radio
+  logs that. If the driver reports times on the air, the radio also reports the longest time to the RC manager. The
+  duration of a driver call is not reported, because it includes pauses of this process.
 * The last packet to each robot of an ARC is its safe packet. The radio repeats a failed safe packet until it is sent.
-* A reply is published as it came; three lost in a row are one warning, the next reply one notice.
-* If the radio fails while it serves its streams, this RC ends; its creator restarts it and it opens the device again.
+* A reply is published unchanged. Three lost replies in a row make one warning, the next reply makes one notice.
+* If the radio fails while it serves its streams, this RC ends. Its creator restarts it, and the new process opens the
+  device again.
 
 Source: IROS 2001, section 4.3; RAM 2002, "Sharable Resources".
 """
@@ -109,7 +110,7 @@ class CommandRadio(ResourceController[RcParameters]):
             self._schedule.connect(hold.arc, hold.use.streams or [DEFAULT_DRIVE_USAGE], hold.rank)
         except ValueError as error:
             raise ImpossibleUse(f"{self.name}: {error}") from None
-        self._slow.forget(hold.arc)  # of an earlier connection, whose last packet was under way at its end
+        self._slow.forget(hold.arc)  # of an earlier connection whose last packet was still being sent when it ended
 
     async def make_safe(self, hold: Hold) -> None:
         """Drop the ARC's packets, and send its robots their safe packets last."""
@@ -166,7 +167,7 @@ class CommandRadio(ResourceController[RcParameters]):
         )
 
     def rc_state(self) -> RcState:
-        """Return also the packets that take longer than declared."""
+        """Return also the packet times that are longer than declared."""
         measured = self._slow.told([hold.arc for hold in self.holds.holds()])
         return msgspec.structs.replace(super().rc_state(), measured=measured)
 
@@ -227,19 +228,19 @@ class CommandRadio(ResourceController[RcParameters]):
             waiting.on_air.set_exception(fault)
 
     def _listen(self, network_id: int, robot: str) -> None:
-        """Hear this robot's replies, if the radio can."""
+        """Receive this robot's replies, if the radio can."""
         if isinstance(self._driver, AnsweringRadio) and self._links.add(network_id, robot):
             self._heard_robots.add(network_id)
             self._driver.hear(network_id, functools.partial(self._heard, network_id))
 
     async def driver_exchanged(self) -> None:
-        """Hear the same robots."""
+        """Receive replies of the same robots with the new driver."""
         if isinstance(self._driver, AnsweringRadio):
             for network_id in sorted(self._heard_robots):
                 self._driver.hear(network_id, functools.partial(self._heard, network_id))
 
     def _heard(self, network_id: int, payload: bytes) -> None:
-        """Publish a reply, or count one that is lost if there are no bytes."""
+        """Publish a reply; if there are no bytes, count a lost reply."""
         if payload:
             self.bus.publish(self.address, Conversation.REPLIES, Reply(network_id, payload))
         news = self._links.heard(network_id) if payload else self._links.lost(network_id)
@@ -258,7 +259,7 @@ class CommandRadio(ResourceController[RcParameters]):
 
     async def _send_next(self) -> None:
         async with self._air:
-            await self.clock.sleep_until_s(self._air_free_s)  # first, because a later packet may be first in order
+            await self.clock.sleep_until_s(self._air_free_s)  # first, because a later packet may precede in order
             sending = self._schedule.take(self.clock.now_s())
             if sending is None:
                 return
@@ -310,7 +311,7 @@ class CommandRadio(ResourceController[RcParameters]):
             self.publish_event(packet.arc, f"on {self.name}: {news}")
 
     def _measured(self, sending: Sending, took_s: float) -> None:
-        """Publish the longest time of these packets if it is longer than declared, and news."""
+        """Publish the longest time of these packets if it is new and longer than declared."""
         if self._slow.took(sending.packet.arc, sending.kind, sending.air_time_s, took_s, self.clock.now_s()):
             self.changed()
 

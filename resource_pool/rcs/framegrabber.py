@@ -1,8 +1,8 @@
 """RC of a framegrabber behind a tuned receiver: pictures of one frequency, for the ARC that holds it.
 
 Pictures are published under the ARC's address with the connection's epoch; subscribers drop pictures of other epochs.
-Those of a further camera of the ARC have an address below it, so that each camera's newest picture is delivered.
-If the hardware knows the transmitting robots, a picture is delivered only if exactly the expected robot transmits.
+Pictures of a further camera of the ARC have a subaddress, so that each camera's newest picture is delivered. If the
+hardware identifies transmitting robots, a picture is delivered only if exactly the expected robot transmits.
 
 Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
 """
@@ -31,7 +31,7 @@ from resource_pool.resource_controller import RcParameters, ResourceController
 
 log = logging.getLogger(__name__)
 
-SILENT_S = 0.5  # chosen: a packet has its turn on the radio within 0.3 s, and its robot appears two pictures later
+SILENT_S = 0.5  # chosen: a packet gets its turn on the radio within 0.3 s, and its robot appears two pictures later
 ARC_REPLY_S = 1.0  # chosen: the ARC asks a robot before it answers; machine seconds
 
 
@@ -62,7 +62,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     alike_most = 5  # measured: a second one in a process costs a third of its memory, and five draw a fifth of a core
     commands = Tune
     driver_kind = "framegrabber"
-    closed_most_s = 5.0  # chosen: a camera starts in two; its RC waits for no call of its driver
+    closed_most_s = 5.0  # chosen: a camera starts within two; its RC waits for no driver call
     driver_parameters = frozenset({"options", "frame_rate_hz"})
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
@@ -74,7 +74,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._silent_since_s = math.inf
 
     async def connect(self) -> None:
-        """Open the device, so that the first grant is as quick as later ones."""
+        """Open the device now, so that the first grant is as fast as later ones."""
         await super().connect()
         await self._driver.open()
 
@@ -89,7 +89,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._driver.stop()
 
     async def driver_exchanged(self) -> None:
-        """Deliver on."""
+        """Continue the delivery with the new driver."""
         if self._tuned is not None:
             self._driver.tune(*self._tuned)
         else:
@@ -125,10 +125,10 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         return False
 
     def statistics(self) -> dict[str, float]:
-        """Count delivered pictures, and pictures dropped because no, several or another robot transmitted.
+        """Count delivered pictures, and pictures dropped because no robot, several robots or another robot transmitted.
 
-        Also the rate that was asked for, and the rate that the driver allows now: it yields where its host is busy.
-        If the hardware knows the faults of its pictures, count the pictures of each kind too, delivered or dropped.
+        Also return the requested rate, and the rate that the driver allows now; the driver lowers it on a busy host. If
+        the hardware knows the faults of its pictures, count the pictures of each kind too, delivered or dropped.
         """
         driver, asked_hz = self._driver, self.parameters.frame_rate_hz
         return {
@@ -169,7 +169,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self.bus.publish(f"{at}/{order.camera}" if order.camera else at, Conversation.FRAMES, frame)
 
     def _heard_nothing(self, hold: Hold) -> None:
-        """Ask the ARC to switch a silent transmitter on: it was reset, or missed its packet."""
+        """Ask the ARC to switch a silent transmitter on, because the transmitter was reset or missed its packet."""
         now_s = self.clock.now_s()
         self._silent_since_s = min(self._silent_since_s, now_s)
         if now_s - self._silent_since_s >= SILENT_S:

@@ -1,7 +1,7 @@
 """Robot: base class of the RCs of robots with a body, reached through a command radio.
 
-Any operator may stop a robot at any time, without a grant and past ARC and RC manager, so that a stop needs only robot,
-radio and hub. The stop outlives this process.
+Any operator may stop a robot at any time without a grant. A stop bypasses ARC and RC manager, so it needs only robot,
+radio and hub. The stop stays in force if this process is restarted.
 
 Source: IROS 2001, section 2; RAM 2002, "Robots for Surveillance and Reconnaissance".
 """
@@ -37,7 +37,7 @@ from resource_pool.stop_messages import AskStop, EmergencyQuestion, EmergencySto
 log = logging.getLogger(__name__)
 
 OPERATORS = (f"{Subsystem.UI_CONSOLE}/", f"{Subsystem.BACKBONE}/")
-"""Subsystems whose components may stop a robot past its holder: they act for people."""
+"""Subsystems whose components may stop any robot without a grant, because they act for people."""
 
 RADIO_REPLY_S = 0.5  # chosen: a radio that needs longer for one packet counts as absent
 
@@ -48,7 +48,7 @@ class RobotParameters(RcParameters, frozen=True, kw_only=True):
     Attributes:
         network_id: Its address on the command radio, 1 to 254.
         protocol: Name of the driver that encodes its packets; empty: the name in ``driver``.
-        battery_alarm_share: Charge of its battery below which there is an alarm, 0 to 0.9; 0: no alarm.
+        battery_alarm_share: Battery charge below which an alarm is raised, 0 to 0.9; 0: no alarm.
     """
 
     network_id: int
@@ -70,8 +70,8 @@ class RobotRc(ResourceController[P], Generic[P]):
     """Encodes commands as packets of the robot's protocol; the radio sends them at the ARC's rate.
 
     Derive, set ``commands``, and ``reports`` if the protocol is a ``ReplyReader``, and override ``obey``; a command
-    with ``moves`` reaches it only while no stop is in force. Each command is published when it is applied, and a halt
-    without a command, too: localizers listen.
+    with ``moves`` reaches ``obey`` only while no stop is in force. Each applied command is published, and so is a halt
+    without a command, because localizers need both.
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RobotParameters
@@ -104,7 +104,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         )
 
     async def connect(self) -> None:
-        """Hear the robot's replies, too."""
+        """Also subscribe to the robot's replies."""
         await super().connect()
         if self._radio:
             self._reports.listen(address(Subsystem.RESOURCE_POOL, self._radio), self.parameters.network_id)
@@ -122,13 +122,13 @@ class RobotRc(ResourceController[P], Generic[P]):
         self._holder, self._halt_at_s, self._frequency = hold, None, ""
 
     async def make_safe(self, hold: Hold) -> None:
-        """Send no further command; the radio sends the safe packet at its own disconnection."""
+        """Send no further command; the radio sends the safe packet when the radio is disconnected."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
         self.cease()
         self._tell_halted(hold)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer operators, too, who need no grant to stop the robot."""
+        """Also answer operators, because they may stop the robot without a grant."""
         match asked.body:
             case AskStop():
                 return self._latch.state
@@ -149,7 +149,7 @@ class RobotRc(ResourceController[P], Generic[P]):
                 return await super().answer(asked)
 
     async def command(self, asked: Envelope[Message]) -> Message:
-        """Publish what was applied, too, with the motion that it makes."""
+        """Also publish the applied values, with the resulting motion."""
         done = await super().command(asked)
         if isinstance(done, Applied):
             values = {**done.values, **self.motion_of(done.values)}
@@ -158,7 +158,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         return done
 
     def permit(self, order: Command) -> None:
-        """Refuse to move while a stop is in force, or if the sender did not know the last one."""
+        """Refuse motion while a stop is in force, or if the sender did not know the last stop."""
         if order.moves:
             self._latch.require_moving(order.after_stop)
 
@@ -180,18 +180,18 @@ class RobotRc(ResourceController[P], Generic[P]):
 
     # ------------------------------------------------------------------ hooks
     async def halt(self, hold: Hold) -> None:
-        """Bring the robot to rest. When: at ``Halt``, and in silence. Override if that takes more than a packet."""
+        """Bring the robot to rest. When: at ``Halt``, and if commands stop. Override if one packet does not suffice."""
         await self._load(hold, self._protocol.halt())
 
     def motion_of(self, values: Mapping[str, float]) -> Mapping[str, float]:  # noqa: ARG002
-        """Return ``forward_m_s`` and ``turn_rad_s`` of a command with these applied values, unless they stand there.
+        """Return ``forward_m_s`` and ``turn_rad_s`` of a command, if the applied values do not contain them.
 
-        When: before a command that was applied is published. Override if the robot has commands in other numbers.
+        When: before an applied command is published. Override if the robot has commands in other quantities.
         """
         return {}
 
     def cease(self) -> None:
-        """Make no further packet by itself. When: at once at an emergency stop, and at the end of a hold."""
+        """Generate no further packets. When: at once at an emergency stop, and at the end of a hold."""
 
     # ------------------------------------------------------------------ for derived classes
     async def move(self, hold: Hold, order: Command, packet: bytes, *, is_moving: bool = True) -> None:
@@ -201,16 +201,17 @@ class RobotRc(ResourceController[P], Generic[P]):
             hold: Of the command.
             order: The command.
             packet: In the robot's protocol.
-            is_moving: False: the robot stands with this packet, so silence afterwards is none.
+            is_moving: False: the robot stands still with this packet, so it needs no halt if commands stop.
 
         Raises:
-            EmergencyStopped: The robot was stopped meanwhile, and perhaps freed again; the packet is not sent.
+            EmergencyStopped: The robot was stopped meanwhile, even if the stop is lifted by now; the packet is not
+                sent.
         """
-        self.watch_silence(is_moving=is_moving)  # first, because meanwhile the hold may end or the answer be lost
+        self.watch_silence(is_moving=is_moving)  # first, because the hold may end or the answer may be lost meanwhile
         await self._move(hold, order, packet, lasts_s=COMMAND_TIMEOUT_S, afterwards=self._protocol.halt())
 
     def watch_silence(self, *, is_moving: bool) -> None:
-        """Halt if no command follows within ``COMMAND_TIMEOUT_S``; with ``is_moving`` false, never: it stands."""
+        """If the robot moves, halt it unless a command follows within ``COMMAND_TIMEOUT_S``."""
         self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if is_moving else None
         self._driven.set()
 
@@ -218,7 +219,8 @@ class RobotRc(ResourceController[P], Generic[P]):
         """Send a packet that moves the robot once, in the stream of this kind; raises as ``move``.
 
         Afterwards the radio repeats a packet that changes nothing, because a repeated drive or halt could cancel the
-        motion. With ``goes_on`` the radio goes on with the packet before, because this one concerns another part.
+        motion. With ``goes_on`` the radio continues to repeat the previous packet, because this packet concerns another
+        part of the robot.
         """
         as_it_is = b"" if goes_on else self._protocol.transmitter(bool(self._frequency), self._frequency)
         await self._move(hold, order, packet, at_once=True, afterwards=as_it_is, kind=kind)
@@ -226,11 +228,11 @@ class RobotRc(ResourceController[P], Generic[P]):
             self._stands(hold)
 
     def stop_packet(self) -> bytes:
-        """Return the packet of an operator's stop; override if parts of the robot move on at a halt."""
+        """Return the packet of an operator's stop; override if a halt does not stop all parts of the robot."""
         return self._protocol.halt()
 
     def statistics(self) -> dict[str, float]:
-        """Count halts for lack of commands, emergency stops, and replies, too."""
+        """Also count halts for lack of commands, emergency stops and replies."""
         stops = float(self._latch.state.number)
         own = {"command_timeouts": self._timeouts, "emergency_stops": stops}
         return {**super().statistics(), **own, **self._reports.statistics()}
@@ -281,7 +283,7 @@ class RobotRc(ResourceController[P], Generic[P]):
         self.bus.publish(self.address, Conversation.EVENTS, self._latch.state)
 
     def _keep_stop(self) -> None:
-        """Save the stop for the next process of this RC; a full disk must not prevent the stop."""
+        """Save the stop for the next process of this RC; a write error must not prevent the stop."""
         if self._stop_file is None:
             return
         try:
@@ -294,7 +296,7 @@ class RobotRc(ResourceController[P], Generic[P]):
             )
 
     def _stands(self, hold: Hold) -> None:
-        """Record that the robot stands still, unless it has another holder by now."""
+        """Record that the robot stands still, unless another ARC holds it by now."""
         if self._holder is not None and self._holder.epoch == hold.epoch:
             self._halt_at_s = None
 
@@ -361,7 +363,7 @@ class RobotRc(ResourceController[P], Generic[P]):
                 self._tell_halted(hold)
 
     def _silent_too_long(self) -> bool:
-        """Return whether still no command has come after the sleep."""
+        """Return whether no command has arrived during the sleep."""
         return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s
 
 

@@ -1,4 +1,4 @@
-"""A complete RC on a complete driver, to be copied: a lamp that is dark without a holder."""
+"""A complete RC and driver to copy from: a lamp that is off while no ARC holds it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from resource_pool.resource_controller import RcParameters, ResourceController
 
 
 class Shine(Command, frozen=True):
-    """Shine this brightly, 0 (dark) to 1."""
+    """Set the lamp's brightness, 0 (off) to 1."""
 
     brightness: Share
 
@@ -33,12 +33,12 @@ class PaintedLamp:
         self._site, self._color = site, site.options(self.options_type).color
 
     async def set_brightness(self, share: float) -> None:
-        """Return when the lamp has this brightness, 0 to 1; a real driver raises ``HardwareFault`` if it has not."""
+        """Set the brightness, 0 to 1. A real driver raises ``HardwareFault`` if the lamp does not obey."""
         self._site.tell(f"shines {self._color} at {share:.0%}" if share else "is dark")
 
 
 class Lamp(ResourceController[RcParameters]):
-    """The RC: carry out a command, return the applied values; and know the safe state."""
+    """The RC: carries out commands, returns the applied values, and defines the safe state."""
 
     commands, driver_kind = Shine, "lamp"
 
@@ -48,16 +48,16 @@ class Lamp(ResourceController[RcParameters]):
         self._share = 0.0
 
     async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
-        """Go dark."""
+        """Switch the lamp off."""
         self._share = 0.0
         await self._driver.set_brightness(0.0)
 
     async def driver_exchanged(self) -> None:
-        """Shine on with another driver, or with the old one again."""
+        """Set the present brightness on the driver that works now."""
         await self._driver.set_brightness(self._share)
 
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
-        """Shine."""
+        """Set the brightness."""
         if not isinstance(order, Shine):
             return await super().obey(hold, order)
         self._share = min(1.0, max(0.0, order.brightness))

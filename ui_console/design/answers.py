@@ -1,4 +1,4 @@
-"""Answers of the designer's server to one page; the page knows an answer by its fields."""
+"""Answers of the designer's server to one page; the page recognizes the kind of an answer by its fields."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ui_console.design.views import OfferView
 
 
 class AskAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An offer asks for answers before it is taken at an element."""
+    """An offer that needs answers to its questions before it is applied at an element."""
 
     ask: OfferView
     path: Path
@@ -20,8 +20,8 @@ class RefusalAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         refused: The reason.
-        remedy: An action against it; may be empty.
-        is_change: True: the page meant to change, save or read the draft.
+        remedy: Advice; may be empty.
+        is_change: True: the message was to change, save or read the draft.
     """
 
     refused: str
@@ -34,7 +34,7 @@ class FileChangedAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 
     Attributes:
         file_changed: The event, for people.
-        name: Another file of the same folder for the draft; empty: its own.
+        name: Another file in the same folder for the draft; empty: its own.
     """
 
     file_changed: str
@@ -49,7 +49,7 @@ class NoticeAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SavedAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The draft is saved in this file, with so many problems."""
+    """The draft is saved in this file, with this number of problems."""
 
     saved: str
     problems: int

@@ -36,10 +36,10 @@ class TypeEntry:
 
     Attributes:
         name: Its name in mission files.
-        class_path: The class that runs it.
+        class_path: Class of the component.
         role: Its role.
         needs: Role → type of resource that an ARC needs.
-        uses: Types of resource a resource must be tied to.
+        uses: Types of resource to which a resource must be linked.
         is_stock: True: the project ships it.
         is_declared: True: the designed file declares it.
     """
@@ -54,7 +54,7 @@ class TypeEntry:
 
 
 def stock() -> Element:
-    """Return the project's own types, as a mission without anything else."""
+    """Return the project's own types, as a mission without other content."""
     return outline(shipped_text())
 
 
@@ -69,7 +69,7 @@ def stock_type(name: str) -> Element | None:
 
 
 def stock_resource(kind: str) -> Element | None:
-    """Return the first shape of a resource of this type."""
+    """Return the initial content of a resource of this type."""
     return next((one for one in _shapes() if one.text("type") == kind), None)
 
 
@@ -93,7 +93,7 @@ def entries(mission: Element) -> list[TypeEntry]:
 
 
 def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
-    """Return the description of a type, as lines to read.
+    """Return the description of a type, as lines for people.
 
     Args:
         entry: The type.

@@ -1,6 +1,6 @@
 """Effect of a page's change on a draft, and the sections of the view for all pages.
 
-Pure: a draft and a change in, another draft or typed refusal out; a draft in, sections as JSON out.
+Pure: from a draft and a change to another draft or a typed refusal; from a draft to sections as JSON.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class MustAsk(DesignRefused):
     """
 
     code = "design.must_ask"
-    remedy = "Answer what it asks."
+    remedy = "Answer the questions of the addition."
 
     def __init__(self, offer: Offer) -> None:
         super().__init__(f"{offer.label} asks for: {', '.join(one.name for one in offer.asks)}")
@@ -49,7 +49,7 @@ class MustAsk(DesignRefused):
 
 
 def changed(draft: Draft, change: Change) -> Draft:
-    """Return the draft after a change; itself if that changes nothing.
+    """Return the draft after a change; if it changes nothing, return the same draft.
 
     Raises:
         MustAsk: The addition needs answers first.
@@ -76,7 +76,7 @@ def changed(draft: Draft, change: Change) -> Draft:
 
 
 def touched_by(change: Change, before: Draft, after: Draft) -> Path:
-    """Return the changed element, by its path afterwards; for a parameter the element that has it."""
+    """Return the path of the changed element after the change; for a parameter, the path of its element."""
     if isinstance(change, Undo):
         path = follower(before, after)(before.mission.nearest(before.step.touched))
     else:
@@ -85,10 +85,10 @@ def touched_by(change: Change, before: Draft, after: Draft) -> Path:
 
 
 def sibling_file(source: str, name: str) -> FilePath:
-    """Return a mission file in the folder of another one; an empty name means that one.
+    """Return the path of a mission file in the folder of another one; an empty name means that other file.
 
     Raises:
-        DesignRefused: The name is no name of a mission file.
+        DesignRefused: The name is not a legal name of a mission file.
     """
     if not name:
         return FilePath(source)
@@ -125,7 +125,7 @@ def _property(draft: Draft, change: SetProperty) -> Property:
 
 
 def _place(draft: Draft, path: Path, parent: Path, before: int | None) -> int:
-    """Return the new number of an element, counted without the element itself."""
+    """Return the new number of an element among its siblings, not counting the element itself."""
     count = len(draft.mission.at(parent).children)
     number = count if before is None else before
     is_later_sibling = bool(path) and parent == path[:-1] and number > path[-1]

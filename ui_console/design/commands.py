@@ -1,4 +1,4 @@
-"""Commands that change a mission while it is designed, as values, and their refusals. Pure; they are in ``effects``."""
+"""Commands that change a designed mission, as values, and their refusals. Pure; ``effects`` defines the commands."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ P = ParamSpec("P")
 
 
 class DesignRefused(Refusal):
-    """A command is not possible; the draft is as it was."""
+    """A command is not possible; the draft is unchanged."""
 
     code = "design.refused"
     remedy = "Choose something else."
@@ -48,12 +48,12 @@ class TextState:
 
 @dataclass(frozen=True)
 class DesignCommand:
-    """A change that can be carried out on any text.
+    """A change that can be applied to any text.
 
     Attributes:
-        effect: Returns the text afterwards; its first argument is the text before.
+        effect: Returns the new text; its first argument is the old text.
         arguments: Its other arguments.
-        named: Those of them that are given by name.
+        named: Keyword arguments.
     """
 
     effect: Callable[..., TextState]
@@ -61,7 +61,7 @@ class DesignCommand:
     named: dict[str, Any]
 
     def carry_out(self, text: bytes) -> TextState:
-        """Return the text after the command, and the element it touched.
+        """Return the text after the command, and the element that it touched.
 
         Raises:
             Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: the command is not possible.
@@ -70,7 +70,7 @@ class DesignCommand:
 
 
 def command(effect: Callable[Concatenate[bytes, P], TextState]) -> Callable[P, DesignCommand]:
-    """Return the function that makes a command of an effect's arguments behind the text."""
+    """Return a function that creates a command from an effect's arguments (all but the text)."""
 
     def made(*arguments: P.args, **named: P.kwargs) -> DesignCommand:
         return DesignCommand(effect, arguments, named)

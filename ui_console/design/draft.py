@@ -1,7 +1,7 @@
-"""A mission while it is designed: a text, its problems, its rehearsal, and the steps to undo.
+"""A mission during its design: a text, its problems, its rehearsal, and the steps to undo.
 
-Pure: a draft and a command in, another draft out. The text is the only truth: the tree, the problems and the dry run
-are read from it, so the page shows the mission that ``check`` and ``up`` will read. To undo restores the bytes.
+Pure: a draft and a command go in, another draft comes out. The text is the only source: tree, problems and dry run are
+read from it, so the page shows the mission that ``check`` and ``up`` will read. Undo restores the bytes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from backbone.naming import is_legal
 from ui_console.design.catalogue import new_text
 from ui_console.design.commands import DesignCommand, NothingToUndo, TextState
 
-UNDO_MOST = 1000  # chosen: more than a sitting; a mission file is small
+UNDO_MOST = 1000  # chosen: more than one session; a mission file is small
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class Draft:
     """A mission being designed; immutable.
 
     Attributes:
-        source: The file it is from or for; need not exist.
-        step: The text as it is now.
+        source: The mission file; need not exist yet.
+        step: The present text.
         past: Earlier texts, the last one last.
-        future: Texts that were undone, the next one last.
-        saved: Content of the file, as far as is known; None: there is no file.
+        future: Undone texts, the next one last.
+        saved: Last known content of the file; None: there is no file.
         classes: Facts of the classes of its own types, by which their parameters are checked.
     """
 
@@ -60,9 +60,9 @@ class Draft:
         """Return the draft of a file's content with its problems; remove the remains of a killed save.
 
         Raises:
-            MissionInvalid: The file cannot be read, or is no XML.
+            MissionInvalid: The file cannot be read, or is not XML.
         """
-        with contextlib.suppress(OSError):  # the file can be opened all the same
+        with contextlib.suppress(OSError):  # the file can be opened nevertheless
             remove_leftover(FilePath(source).resolve())
         report = Report(source)
         text = read_bytes(FilePath(source), report)
@@ -83,7 +83,7 @@ class Draft:
 
     @property
     def is_changed(self) -> bool:
-        """Whether it differs from the file."""
+        """Whether the text differs from the file."""
         return self.text != self.saved
 
     @cached_property
@@ -100,7 +100,7 @@ class Draft:
 
     @property
     def problems(self) -> tuple[Fault, ...]:
-        """The faults ``scout-backbone check`` would report, but for classes not looked up; none: all is fine."""
+        """The faults that ``scout-backbone check`` would report, except for classes not looked up; empty: no fault."""
         return self._read if isinstance(self._read, tuple) else ()
 
     @property
@@ -115,7 +115,7 @@ class Draft:
 
     # ------------------------------------------------------------------ steps
     def do(self, command: DesignCommand) -> Draft:
-        """Return the draft after a command; itself if that changes nothing.
+        """Return the draft after a command; if it changes nothing, return the same draft.
 
         Raises:
             Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: the command is not possible.
@@ -123,10 +123,10 @@ class Draft:
         return self._after(command.carry_out(self.text))
 
     def taken_from(self, text: bytes) -> Draft:
-        """Return the draft with the file's present content; undo restores the text before.
+        """Return the draft with the file's present content; undo restores the previous text.
 
         Raises:
-            MissionInvalid: The text is no XML.
+            MissionInvalid: The text is not XML.
         """
         outline(text)
         return replace(self._after(TextState(text)), saved=text)
@@ -161,11 +161,11 @@ class Draft:
         return replace(self, classes=classes)
 
     def kept(self, source: str) -> Draft:
-        """Return the same draft, saved under this path."""
+        """Return the same draft, saved at this path."""
         return replace(self, source=source, saved=self.text)
 
     def element_of(self, fault: Fault) -> Path:
-        """Return the element of a problem: the last one that begins before its place."""
+        """Return the element of a problem: the last element that begins before the problem's place."""
         before = bisect.bisect_right(self._elements, (fault.line, fault.column), key=lambda element: element.place)
         return self._elements[max(0, before - 1)].path
 

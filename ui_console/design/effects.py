@@ -1,12 +1,13 @@
-"""All commands, each with its effect: a text and its arguments in, another text and the touched element out.
+"""All commands and their effects: text and arguments go in, another text and the touched element come out.
 
-Pure. The text is the only truth: each change reads the elements' places from it anew.
+Pure. The text is the only source: each change reads the elements' places from it again.
 
 Rules of this file:
 
-* A command is carried out whole or refused whole. A refusal is typed and has a remedy.
-* A command is refused if the text cannot express it or would become ambiguous: a wrong place, a name that is taken. An
-  incomplete text, with an empty section or a wish without a resource, is a problem as of ``scout-backbone check``.
+* A command is carried out completely or refused. A refusal is typed and has a remedy.
+* A command is refused if the text cannot express the result or would become ambiguous: a wrong place, a name that is
+taken. An incomplete text (an empty section, a wish without a resource) is no refusal but a problem, as in
+``scout-backbone check``.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from backbone.naming import legal
 from ui_console.design.catalogue import stock_resource, stock_type
 from ui_console.design.commands import DesignRefused, ElementNameTaken, TextState, command
 
-LAST_NETWORK_ID = 254  # as the reader has it
-BODY_STEP_M = 1.0  # chosen: distance of the robots' first places, half of it from the wall; none touch
+LAST_NETWORK_ID = 254  # as in the reader
+BODY_STEP_M = 1.0  # chosen: distance between the robots' first places, half of it to the wall, so that no bodies touch
 WORLD_NAMED_BY = (WORLD, "localizer")  # parameters whose value is the world's name
 RADIO_RATE = {"period-s": "0.1", "packet-time-s": "0.002"}  # chosen: as mission.xml, a fiftieth of a radio
 
@@ -40,7 +41,7 @@ def _added(text: bytes, parent: Path, element: NewElement, at: int | None = None
 
 
 def _section(text: bytes, tag: str) -> tuple[bytes, Path]:
-    """Return a text with this section of the mission, and the section's path."""
+    """Return a text that has this section of the mission, and the section's path."""
     root = outline(text)
     found = root.first(tag)
     if found is None:
@@ -53,7 +54,7 @@ def _section(text: bytes, tag: str) -> tuple[bytes, Path]:
 
 @command
 def add_type(text: bytes, name: str) -> TextState:
-    """Declare a type that the project ships, where it may be changed; a declared one stays."""
+    """Declare a type that the project ships, so that it may be changed; an existing declaration stays."""
     text, section = _section(text, "types")
     for declared in outline(text).at(section).all("type"):
         if declared.text("name") == name:
@@ -101,7 +102,7 @@ def add_behavior(text: bytes, parent: Path, kind: str, name: str, priority: int 
 
 
 class _Marked:
-    """Finds an element again after other sections of the file were added or filled."""
+    """Keeps track of an element while other sections of the file are added or filled."""
 
     def __init__(self, text: bytes, path: Path) -> None:
         self.text, self._below = text, path[1:]
@@ -115,7 +116,7 @@ class _Marked:
 
 @command
 def claim_arc(text: bytes, behavior: Path, kind: str, minimum_runtime_s: str) -> TextState:
-    """Set the ARC that a behavior claims, in place of its present one."""
+    """Set the ARC that a behavior claims; it replaces the present one."""
     node = outline(text).at(behavior)
     if node.tag != "behavior":
         raise DesignRefused(f"a <{node.tag}> claims no ARC", remedy="Pick a behavior.")
@@ -130,7 +131,7 @@ def claim_arc(text: bytes, behavior: Path, kind: str, minimum_runtime_s: str) ->
 
 @command
 def add_resource(text: bytes, kind: str, name: str) -> TextState:
-    """Add a piece of hardware in its first shape, tied to existing hardware, and its body if there is a world."""
+    """Add hardware with its initial content and links to existing hardware; add its body if there is a world."""
     _free(outline(text), "resource", name)
     _must_have_type(text, kind)
     text, section = _section(text, "resources")
@@ -164,11 +165,11 @@ def add_world(text: bytes, width_m: str, depth_m: str) -> TextState:
 
 
 def _with_bodies(text: bytes, only: str = "") -> bytes:
-    """Return a text in which simulated robots have bodies: in a row near the lower wall, looking into the room.
+    """Return a text in which simulated robots have bodies, in a row near the lower wall, facing the room.
 
     Args:
         text: The text.
-        only: The one robot to get a body; empty: all robots without one.
+        only: The only robot that gets a body; empty: all robots without a body.
     """
     world = outline(text).first("world")
     section = outline(text).first("resources")
@@ -212,7 +213,7 @@ def _free_network_id(root: Element) -> int:
 
 @command
 def remove(text: bytes, path: Path) -> TextState:
-    """Remove an element and all in it; with a robot goes its body."""
+    """Remove an element and its content; with a robot, also its body."""
     node = outline(text).at(path)
     text = edit.remove(text, path)
     if node.tag == "resource":
@@ -248,13 +249,13 @@ def relocate(text: bytes, path: Path, parent: Path, at: int) -> TextState:
 
 @command
 def set_value(text: bytes, path: Path, attribute: str, value: str | None) -> TextState:
-    """Set an attribute; None leaves it out."""
+    """Set an attribute; None removes it."""
     return TextState(edit.set_attribute(text, path, attribute, value), path)
 
 
 @command
 def write_parameter(text: bytes, path: Path, name: str, value: str | None) -> TextState:
-    """Set a parameter of a behavior, a resource or a service; None leaves it out."""
+    """Set a parameter of a behavior, a resource or a service; None removes it."""
     node = outline(text).at(path)
     found = next((one for one in node.all("parameter") if one.text("name") == name), None)
     if found is None:
@@ -268,11 +269,11 @@ def write_parameter(text: bytes, path: Path, name: str, value: str | None) -> Te
 
 # ---------------------------------------------------------------------- names
 def _free(root: Element, tag: str, name: str) -> None:
-    """Refuse a name that is illegal, or another's of its kind.
+    """Refuse a name that is illegal, or that another element of the kind has.
 
     Raises:
-        IllegalName: It does not follow the rule for names.
-        ElementNameTaken: Another element has it.
+        IllegalName: The name does not follow the rule for names.
+        ElementNameTaken: Another element has the name.
     """
     legal(name)
     kinds = _ONE_SPACE if tag in _ONE_SPACE else (tag,)
@@ -285,7 +286,7 @@ _ONE_SPACE = ("resource", "behavior", "world")  # components of the mission; all
 
 
 def _is_named(root: Element, node: Element) -> bool:
-    """Return whether the element has a name of its own, so is no reference to another one."""
+    """Return whether the element has its own name, and is not a reference to another element."""
     return node.tag not in ("wish", "uses", "parameter") and node is not root
 
 

@@ -1,4 +1,4 @@
-"""Saving a draft: whole or not at all, and over another program's change only on request."""
+"""Saves a draft: completely or not at all, and over another program's change only on request."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class NotSaved(Refusal):
 
 
 def save(draft: Draft, path: Path, *, overwrite: bool = False) -> Draft:
-    """Write the draft's bytes and return it as saved there.
+    """Write the draft's bytes; return the draft as saved.
 
-    The file is replaced in one step: a program that reads it meanwhile gets the old or the new one. Its permissions
-    stay.
+    The file is replaced in one step: a program that reads it meanwhile gets either the old or the new content. Its
+    permissions stay.
 
     Args:
         draft: The draft.

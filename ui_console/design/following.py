@@ -1,6 +1,6 @@
 """The new path of an element after another designer changed the text, so that each cursor stays on its element.
 
-Pure: two drafts in, a function from the paths of the one to the paths of the other out.
+Pure: two drafts go in; a function from paths of the first to paths of the second comes out.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from ui_console.design.draft import Draft
 def follower(before: Draft, after: Draft) -> Callable[[Path], Path]:
     """Return the function from an element's path in one draft to its path in another one.
 
-    An element before or behind all changes is found by its place in the text; else, if its text is unique, by that;
-    else by its number in its parent. A removed element leads to its parent.
+    An element before or after all changes is found by its place in the text; another element by its text, if that is
+    unique, or else by its number in its parent. A removed element is mapped to its parent.
 
     Args:
         before: The draft of the given paths.
@@ -55,7 +55,7 @@ def follower(before: Draft, after: Draft) -> Callable[[Path], Path]:
 
 
 def _alike(one: bytes, other: bytes) -> int:
-    """Return the number of equal bytes from the beginning on."""
+    """Return the number of equal bytes at the beginning."""
     low, high = 0, min(len(one), len(other))
     while low < high:
         middle = (low + high + 1) // 2

@@ -1,7 +1,7 @@
-"""The draft file: unsaved changes, beside the mission file, so that no reload, restart or power cut loses them.
+"""The draft file: stores unsaved changes beside the mission file, so that no reload, restart or power cut loses them.
 
-It exists only while there are unsaved changes. It holds the text and the mission file's content when it was opened or
-saved last, so that another program's change is noticed after a restart too; the steps to undo are not kept.
+The file exists only while there are unsaved changes. It contains the text and the mission file's content at the last
+opening or saving, so that another program's change is detected even after a restart. The steps to undo are not stored.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ MOST_BYTES = 4 * MAX_BYTES  # two texts in Base64 and their envelope
 
 
 class DraftUnreadable(Refusal):
-    """The draft file is none, or cannot be read."""
+    """The draft file is not valid, or cannot be read."""
 
     code = "design.draft_unreadable"
     remedy = "Remove it to begin with what the mission file holds."
 
 
 class DraftNotKept(Refusal):
-    """What is not saved could not be kept either; it is only in the server's memory."""
+    """The unsaved changes could not be written to the draft file; they are only in the server's memory."""
 
     code = "design.draft_not_kept"
     remedy = "Save the mission, or free the disk."
@@ -44,7 +44,7 @@ class _DraftRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class DraftFile:
-    """The file that keeps one draft; only the designer that keeps it writes there.
+    """The draft file of one mission; only one designer writes to it.
 
     Args:
         source: The mission file.
@@ -56,12 +56,12 @@ class DraftFile:
         self._wrote: bytes | None = None
 
     def resume(self) -> Draft | None:
-        """Return what was kept; None: nothing was.
+        """Return the stored draft; None: there is no draft file.
 
         Raises:
-            DraftUnreadable: It is no draft.
+            DraftUnreadable: The file is not a draft.
         """
-        with contextlib.suppress(OSError):  # what there is can be read all the same
+        with contextlib.suppress(OSError):  # the existing file can be read nevertheless
             remove_leftover(self.path)
         try:
             if not self.path.exists():
@@ -80,10 +80,10 @@ class DraftFile:
         return Draft(self._source, TextState(kept.text), saved=kept.saved)
 
     def keep(self, draft: Draft) -> None:
-        """Write this draft to the draft file, or remove the file if there are no unsaved changes.
+        """Write this draft to the draft file; if there are no unsaved changes, remove the file.
 
         Raises:
-            DraftNotKept: The system refused, or another designer keeps its draft there.
+            DraftNotKept: The system refused, or another designer uses the draft file.
         """
         try:
             there = self.path.read_bytes() if self.path.exists() else None
@@ -105,7 +105,7 @@ class DraftFile:
 
 
 def path_of_draft(source: str) -> Path:
-    """Return where the draft of a mission file is kept.
+    """Return the path of a mission file's draft file.
 
     Example:
         >>> str(path_of_draft("missions/guard.xml"))

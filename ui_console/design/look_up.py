@@ -1,4 +1,4 @@
-"""Ask classes for their documentation and parameters, while a designer's event loop goes on."""
+"""Reads the documentation and parameters of classes without blocking the designer's event loop."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from backbone.mission.class_facts import ClassFacts
 
 
 async def look_up(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
-    """Return the facts of each class, read in another process; ``failure`` has the reason why a class has none.
+    """Return the facts of each class, read in another process; if a class has no facts, ``failure`` has the reason.
 
     Args:
-        class_paths: ``package.module:Class`` each. Their modules are run.
+        class_paths: Class paths ``package.module:Class``. Their modules are executed.
     """
     return await asyncio.to_thread(ask_classes, class_paths)

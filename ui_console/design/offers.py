@@ -1,6 +1,6 @@
-"""Offers of additions: their places, their questions, and the commands they become.
+"""Offers of additions: their places, their questions, and the resulting commands.
 
-Pure: a tree and an element in, offers out.
+Pure: a tree and an element go in, offers come out.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Prompt(msgspec.Struct, frozen=True):
         name: Name of the answer.
         doc: Its meaning.
         proposed: The proposed answer.
-        choices: Sensible answers, if they can be listed.
+        choices: Possible answers, if they can be listed.
         is_required: False: the answer may be empty.
     """
 
@@ -59,7 +59,7 @@ class Offer:
 
     @property
     def must_ask(self) -> bool:
-        """True if a question has no proposal, or several sensible answers."""
+        """True if a question has no proposal, or several possible answers."""
         return any(not asked.proposed or len(asked.choices) > 1 for asked in self.asks)
 
     def command(self, answers: Sequence[str]) -> DesignCommand:
@@ -76,7 +76,7 @@ class Offer:
 
 
 def offers(mission: Element, path: Path) -> list[Offer]:
-    """Return the possible additions: to an element first, then to its ancestors, each kind at the nearest place.
+    """Return the possible additions: first to an element, then to its ancestors, each kind at the nearest place.
 
     Args:
         mission: The whole file.
@@ -90,7 +90,7 @@ def offers(mission: Element, path: Path) -> list[Offer]:
 
 
 def offer_at(mission: Element, path: Path, label: str) -> Offer:
-    """Return the offer of this label at an element; for an addition to an ARC, a behavior stands for its ARC.
+    """Return the offer with this label at an element; a behavior also has the offers of its ARC.
 
     Raises:
         DesignRefused: The addition is not possible there.
@@ -110,7 +110,7 @@ def offer_at(mission: Element, path: Path, label: str) -> Offer:
 
 
 def free_name(mission: Element, wished: str) -> str:
-    """Return the name, or the first one like it with another number, that no component has.
+    """Return the name, or a similar name with the first number that no component has.
 
     Example: with ``scout1`` taken, ``scout1`` gives ``scout2``.
     """

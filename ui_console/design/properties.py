@@ -1,6 +1,6 @@
 """Properties of an element: its attributes and parameters, with their meanings and choices.
 
-Pure. Meanings and defaults are the schema's and, for parameters, the class's own.
+Pure. Meanings and defaults come from the schema; for parameters, from the class.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ui_console.design.effects import rename, set_value, write_parameter
 
 HAVE_PARAMETERS = ("behavior", "resource", "world")
 WITH_NAMES = ("host", "type", "resource", "world", "behavior", "target", "robot")
-"""Tags whose names other elements refer to; to set one is to rename."""
+"""Tags of elements to whose names other elements refer; setting such a name is a renaming."""
 
 
 class Property(msgspec.Struct, frozen=True):
@@ -26,12 +26,12 @@ class Property(msgspec.Struct, frozen=True):
 
     Attributes:
         name: Its name.
-        value: Its text; None: it is not written.
-        default: Its value if it is not written; None: it has none.
-        is_missing: True: it must be written, and is not.
+        value: Its text; None: not written in the file.
+        default: Its value if it is not written; None: no default.
+        is_missing: True: it is required, and not written.
         is_parameter: True: it is a parameter.
         doc: Its meaning and range.
-        choices: Sensible values, if they can be listed.
+        choices: Possible values, if they can be listed.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Property(msgspec.Struct, frozen=True):
     choices: tuple[str, ...] = ()
 
     def command(self, path: Path, tag: str, value: str) -> DesignCommand:
-        """Return the command that sets it; an empty text leaves it out."""
+        """Return the command that sets the property; an empty text removes it."""
         if self.is_parameter:
             return write_parameter(path, self.name, value or None)
         if self.name == "name" and tag in WITH_NAMES and value:
@@ -78,7 +78,7 @@ def properties(mission: Element, node: Element, facts: Mapping[str, ClassFacts])
 
 
 def choices(mission: Element, node: Element, attribute: str, words: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the sensible values of an attribute at its place; none if they cannot be listed."""
+    """Return the possible values of an attribute at its place; empty if they cannot be listed."""
     match node.tag, attribute:
         case (_, "host"):
             return _names(mission, "hosts")

@@ -13,7 +13,7 @@ import msgspec
 from ui_console.web.login import BeatRequest, Hello
 
 MOST_TEXT = 1024  # chosen: longer than any value a mission needs; a message is 4096 bytes at most
-MOST_ANSWERS = 16  # chosen: twice what any element asks for
+MOST_ANSWERS = 16  # chosen: twice the largest number that an element needs
 
 Number = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 PathSaid = Annotated[tuple[Number, ...], msgspec.Meta(max_length=32)]
@@ -25,7 +25,7 @@ class Select(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field=
 
     Attributes:
         path: The element.
-        number: Comes back with the element, so that a page knows to which of its choices the answer belongs.
+        number: Returned with the element, so that the page can match the answer to its choice.
     """
 
     path: PathSaid
@@ -49,7 +49,7 @@ class TakeOffer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fie
 
 
 class SetProperty(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="set"):
-    """Set an attribute or a parameter; empty text leaves it out."""
+    """Set an attribute or a parameter; an empty text removes it."""
 
     revision: int
     path: PathSaid
@@ -65,7 +65,7 @@ class MoveElement(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
         revision: Of the draft to change.
         path: The element.
         parent: Its new parent.
-        before: Its next sibling, by the sibling's present number; None: the element goes last.
+        before: Its next sibling, by the sibling's present number; None: the element becomes the last one.
     """
 
     revision: int
@@ -75,7 +75,7 @@ class MoveElement(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 
 
 class RemoveElement(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="remove"):
-    """Remove an element and all in it."""
+    """Remove an element and its content."""
 
     revision: int
     path: PathSaid
@@ -114,7 +114,7 @@ class TakeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class Rehearse(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="rehearse"):
-    """Begin or end to show the first minute of the schedule."""
+    """Begin or stop showing the first minute of the schedule."""
 
     is_shown: bool
 

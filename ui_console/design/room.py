@@ -1,7 +1,7 @@
-"""One mission file and the people who design it in their browsers: they share the draft, and each has a cursor.
+"""A mission file and the people who design it in their browsers: they share the draft, and each has a cursor.
 
-``changes`` decides the effect of a change; the room carries changes out in turn, shows them to all, and keeps the draft
-beside the file.
+``changes`` decides the effect of a change. The room carries out one change at a time, shows it to all pages, and stores
+the draft beside the file.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class DesignRoom:
 
     Args:
         draft: The mission.
-        kept: Keeps it until it is saved.
+        kept: The draft file, until the draft is saved.
         look_up: Asks classes for their documentation and parameters, see ``look_up.look_up``.
     """
 
@@ -136,7 +136,7 @@ class DesignRoom:
         self._send_people()
 
     def refused(self, client: Designer) -> None:
-        """Do nothing: a designer has no actions under way."""
+        """Do nothing, because a designer has no actions in progress."""
 
     def report_violation(self, who: str, violation: ProtocolViolation) -> None:
         """Show the designers a violation."""
@@ -146,7 +146,7 @@ class DesignRoom:
 
     # ------------------------------------------------------------------ messages of pages
     async def obey(self, client: Designer, intent: DesignIntent) -> None:
-        """Carry out a designer's messages one after the other; answer that designer with a refusal."""
+        """Carry out a designer's messages one after the other; send refusals to that designer."""
         is_change = isinstance(intent, Change | SaveFile | TakeFile)
         try:
             async with self._turn:
@@ -201,7 +201,7 @@ class DesignRoom:
         path = sibling_file(self.draft.source, intent.name)
         kept = await asyncio.to_thread(save, self.draft, path, overwrite=intent.overwrite)
         if kept.source != self.draft.source:
-            await self._keep(self.draft.kept(self.draft.source))  # saved elsewhere, it needs no draft file here
+            await self._keep(self.draft.kept(self.draft.source))  # saved elsewhere, so no draft file is needed
             self._kept = DraftFile(kept.source)
         await self._show(kept, client.welcome.user)
         await self._keep(kept)
@@ -225,13 +225,13 @@ class DesignRoom:
 
     # ------------------------------------------------------------------ tasks beside the pages
     async def prepare(self) -> None:
-        """Make the sections of the first view."""
+        """Create the sections of the first view."""
         async with self._turn:
             await self._show(self.draft, "")
         self._to_keep.clear()
 
     async def keep_on(self) -> None:
-        """Keep the draft beside the file whenever it has changed; until cancelled."""
+        """Write the draft file whenever the draft has changed; until cancelled."""
         while True:
             await self._to_keep.wait()
             async with self._turn:
@@ -239,13 +239,13 @@ class DesignRoom:
                 await self._keep(self.draft)
 
     async def keep_now(self) -> None:
-        """Return once the present draft is kept; an unchanged draft leaves no file."""
+        """Write the draft file for the present draft; for an unchanged draft, remove it."""
         if self.revision > 1:
             await self._keep(self.draft)
 
     async def _keep(self, draft: Draft) -> None:
         if self._keeping is not None:
-            await asyncio.wait({self._keeping})  # its task goes on if its caller was cancelled
+            await asyncio.wait({self._keeping})  # its task continues if its caller was cancelled
         self._keeping = asyncio.create_task(asyncio.to_thread(self._kept.keep, draft), name="design: keep")
         try:
             await asyncio.shield(self._keeping)
@@ -266,7 +266,7 @@ class DesignRoom:
 
     # ------------------------------------------------------------------ messages to pages
     async def _show(self, draft: Draft, user: str, chosen: tuple[Designer, Path] | None = None) -> None:
-        """Show this draft on all pages from now on, each with its cursor on the same element.
+        """Show this draft on all pages from now on; each cursor stays on its element.
 
         Args:
             draft: The draft.
@@ -311,7 +311,7 @@ class DesignRoom:
 
 
 def _classes_of(saved: bytes | None) -> set[str]:
-    """Return the classes that the mission file names: its author may run code here."""
+    """Return the classes that the mission file names; its author is trusted to run code here."""
     if saved is None:
         return set()
     try:

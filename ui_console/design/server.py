@@ -1,4 +1,4 @@
-"""The designer's server: its page, its socket, and the tasks beside them. No mission needs to be up."""
+"""The designer's server: page, socket and background tasks. No mission needs to be up."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from ui_console.web.page_server import PageServer, port_of
 
 
 def begin(source: str) -> tuple[Draft, DraftFile]:
-    """Return the draft of a mission file: unsaved changes of last time, else the file's content, else a new mission.
+    """Return the draft of a mission file: earlier unsaved changes, else the file's content, else a new mission.
 
     Raises:
-        NotSaved: There is no folder to save it in.
-        DraftUnreadable: The draft file holds no draft.
+        NotSaved: The folder of the file does not exist.
+        DraftUnreadable: The draft file is not valid.
         MissionInvalid: The file cannot be read, or is no XML.
     """
     folder = Path(source).parent
@@ -57,15 +57,15 @@ class DesignServer:
         end: asyncio.Event,
         encryption: SSLContext | None = None,
     ) -> None:
-        """Serve until the event is set; unsaved changes are kept beside the file; see ``Reception.open``.
+        """Serve until the event is set; unsaved changes are stored beside the file; see ``Reception.open``.
 
         Args:
             ready: Called with the port once the server listens.
-            end: Ends it.
+            end: Event that ends the server.
 
         Raises:
-            CannotListen: The address is not free, or not one of this machine.
-            BaseExceptionGroup: With the bug that ended it.
+            CannotListen: The address is in use, or does not belong to this machine.
+            BaseExceptionGroup: A bug ended the server; the group contains it.
         """
         room = self._room
         await room.prepare()

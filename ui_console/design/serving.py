@@ -20,7 +20,7 @@ async def serve_designer(file: str, rights: Mapping[str, TokenRights], options: 
     """Serve the designer until a signal ends it; return the command's exit code.
 
     Args:
-        file: Mission file to change, or to begin if there is none.
+        file: Mission file; it need not exist yet.
         rights: Token → its rights.
         options: Address and encryption.
 

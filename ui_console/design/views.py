@@ -1,6 +1,6 @@
-"""A draft as a page shows it: plain values, ready for JSON.
+"""The page's views of a draft: plain values, ready for JSON.
 
-Pure: a draft in, views out.
+Pure: a draft goes in, views come out.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class DraftStatus(msgspec.Struct, frozen=True):
 
 
 class ElementRow(msgspec.Struct, frozen=True):
-    """One element of the tree.
+    """A row of the tree: one element.
 
     Attributes:
         path: Its path.
@@ -72,13 +72,13 @@ class ElementRow(msgspec.Struct, frozen=True):
 
 
 class ProblemRow(msgspec.Struct, frozen=True):
-    """One problem, as ``scout-backbone check`` reports it.
+    """A problem, as ``scout-backbone check`` reports it.
 
     Attributes:
-        line: Of the text as it would be saved, from 1.
-        column: From 1.
+        line: Line in the text to be saved, from 1.
+        column: Column, from 1.
         message: The fault.
-        remedy: An action against it.
+        remedy: Advice.
         path: Its element.
     """
 
@@ -94,7 +94,7 @@ class PaletteRow(msgspec.Struct, frozen=True):
 
     Attributes:
         label: Its offer's, see ``offers``.
-        group: Its heading.
+        group: Heading of its group.
         name: Its name on the page.
         tag: Of its element.
         type: Component type whose class can be looked up; empty: none.
@@ -147,10 +147,10 @@ class TurnView(msgspec.Struct, frozen=True):
     """A turn of an ARC with a resource.
 
     Attributes:
-        from_s: When its RCs began to settle.
-        open_s: When the gate opened; ``to_s`` if never.
-        to_s: When it was free again.
-        who: In an ARC's row the resources it used, else the ARC.
+        from_s: Time at which its RCs began to settle.
+        open_s: Time at which the gate opened; ``to_s`` if it never opened.
+        to_s: Time at which the resource was free again.
+        who: In an ARC's row, the resources that it used; else the ARC.
     """
 
     from_s: float
@@ -173,7 +173,7 @@ class RehearsalView(msgspec.Struct, frozen=True):
     Attributes:
         end_s: Its length, mission seconds.
         rows: ARCs, then resources.
-        told: Outcome of each request, a line each.
+        told: Outcome of each request, one line each.
         never: Requests that never run and components without a host, with the reason.
     """
 
@@ -204,7 +204,7 @@ def status_view(draft: Draft, revision: int, changed_by: str) -> DraftStatus:
 
 
 def tree_view(draft: Draft) -> list[ElementRow]:
-    """Return every element but parameters, in the order of the text, each with its problems."""
+    """Return every element except parameters, in the order of the text, each with its problems."""
     about: dict[Path, list[str]] = {}
     for fault in draft.problems:
         path = draft.element_of(fault)
@@ -249,7 +249,7 @@ def places() -> dict[str, list[str]]:
 
 
 def palette(mission: Element, facts: Mapping[str, ClassFacts]) -> list[PaletteRow]:
-    """Return the rows that can be dragged into the tree: component types, wishes for resources, parts of a room.
+    """Return the rows that a person can drag into the tree: component types, wishes for resources, parts of a room.
 
     Args:
         mission: The designed file.
@@ -273,7 +273,7 @@ def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> E
 
     Args:
         draft: The draft.
-        path: The element; must be there.
+        path: The element; must exist.
         facts: Class path → facts of the class.
     """
     mission = draft.mission
@@ -298,13 +298,13 @@ def offer_view(offer: Offer, class_doc: str = "") -> OfferView:
 
     Args:
         offer: The offer.
-        class_doc: Documentation of its type's class, of which the first line is shown; empty: not known.
+        class_doc: Documentation of its type's class; the first line is shown. Empty: not known.
     """
     return OfferView(offer.label, class_doc.partition("\n")[0] or offer.doc, offer.asks)
 
 
 def rehearsal_view(dry: DryRun) -> RehearsalView:
-    """Return the turns of a dry run; of its last branch, the outcome of each request."""
+    """Return the turns of a dry run; for its last branch, only the outcome of each request."""
     seen = dry.timetable
     arcs = [
         RehearsalRow(one.arc, is_arc=True, turns=tuple(_turn(run, ", ".join(run.uses)) for run in seen.of_arc(one.arc)))

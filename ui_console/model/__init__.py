@@ -1,1 +1,1 @@
-"""Knowledge of a console: messages in, views out. Pure."""
+"""The model of a console: messages go in, views come out. Pure."""

@@ -1,13 +1,15 @@
-"""Alarms: conditions an operator must know now, few enough to be read.
+"""Alarms: conditions that an operator must know now, few enough to be read.
 
 Rules of this file: no bus, no clock, no screen; times are arguments.
 
-* A key identifies an alarm. A repeated alarm counts up and has to be acknowledged again; a condition that goes on is
-  one alarm.
-* A condition that ended is no alarm any more: the log has it. An event fades, the sooner the less it matters.
-* While the operator is away no alarm goes or fades: it is marked until a person acknowledges it.
-* One cause is one line: an alarm that follows from another one is listed below it, and acknowledged with it.
-* When the book is full, acknowledged alarms go before unacknowledged ones, and ended conditions before present ones.
+* A key identifies an alarm. A repeated alarm counts up and must be acknowledged again; a lasting condition is one
+alarm.
+* When a condition ends, its alarm is removed; the log has the event. The alarm of an event is removed after a time that
+  is shorter for lower severity.
+* While the operator is away, no alarm is removed: it is marked until a person acknowledges it.
+* One cause makes one line: an alarm that follows from another alarm is listed below it, and acknowledged with it.
+* When the book is full, acknowledged alarms are dropped before unacknowledged ones, and ended conditions before present
+  ones.
 """
 
 from __future__ import annotations
@@ -18,10 +20,10 @@ from msgspec.structs import replace
 
 from ui_console.model.views import NONE_S, AlarmKind, AlarmView, Severity
 
-ALARMS_KEPT = 200  # chosen: more than a person reads; all of them are in the recording
-FADES_AFTER_S = {Severity.NOTICE: 20.0, Severity.WARNING: 60.0}  # chosen: read twice; a real alarm never fades
+ALARMS_KEPT = 200  # chosen: more than a person reads; the recording has all alarms
+FADES_AFTER_S = {Severity.NOTICE: 20.0, Severity.WARNING: 60.0}  # chosen: time to read it twice; a real alarm stays
 
-AT_ONCE_S = 5.0  # chosen: a lease, and the time in which a component is back; what happens later has its own cause
+AT_ONCE_S = 5.0  # chosen: a lease, and the restart time of a component; later events have their own causes
 
 SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.STOPPED: Severity.ALARM,
@@ -44,15 +46,15 @@ SEVERITIES: dict[AlarmKind, Severity] = {
 """Severity of an alarm of a kind, unless the alarm has its own."""
 _WEIGHT = {Severity.ALARM: 0, Severity.WARNING: 1, Severity.NOTICE: 2}
 _CAUSES = (AlarmKind.LINK, AlarmKind.ABSENT, AlarmKind.LOST, AlarmKind.RC_DOWN)
-"""Kinds from which others follow, the most telling kind first."""
+"""Kinds from which other alarms follow, the most fundamental kind first."""
 _RANKS = len(_CAUSES) + 1
 
 
 class AlarmBook:
-    """The alarms of one console, or of all who share one model.
+    """The alarms of one console, or of all consoles that share one model.
 
     Args:
-        beside: A book whose operators' attention counts here too; None: this one has its own.
+        beside: Another book whose state of attention is used here, too; None: this book has its own.
     """
 
     def __init__(self, beside: AlarmBook | None = None) -> None:
@@ -62,11 +64,11 @@ class AlarmBook:
         self._own_away_since_s = NONE_S
         self._now_s = NONE_S
         self.forgotten = 0
-        """How many alarms were dropped because the book was full."""
+        """Number of alarms dropped because the book was full."""
 
     @property
     def away_since_s(self) -> float:
-        """Since when the operator is away; negative: the operator is there."""
+        """Mission time from which the operator is away; negative: the operator is present."""
         return self._beside.away_since_s if self._beside is not None else self._own_away_since_s
 
     def happened(
@@ -81,7 +83,7 @@ class AlarmBook:
         *,
         lasts: bool = False,
     ) -> None:
-        """Raise the alarm of an event, or with ``lasts`` of a condition until ``end``; a repeated call counts it up."""
+        """Raise the alarm of an event or, with ``lasts``, of a condition until ``end``; a repeated call counts up."""
         key, severity = key or alarm_key(kind, subject), severity or SEVERITIES[kind]
         former = self._alarms.pop(key, None)
         first_s, count = (former.first_s, former.count + 1) if former is not None else (at_s, 1)
@@ -113,7 +115,7 @@ class AlarmBook:
         remedy: str = "",
         severity: Severity | None = None,
     ) -> None:
-        """Raise the alarm of a condition until ``end``; a repeated call changes only the words."""
+        """Raise the alarm of a condition until ``end``; a repeated call changes only the text."""
         key = alarm_key(kind, subject)
         alarm = self._alarms.get(key)
         if alarm is not None and alarm.is_active:
@@ -122,7 +124,7 @@ class AlarmBook:
             self.happened(kind, subject, line, at_s, remedy, severity=severity, lasts=True)
 
     def end(self, kind: AlarmKind, subject: str, at_s: float) -> None:
-        """End the alarm of a condition: nothing is to be done about it any more."""
+        """End the alarm of a condition, because no action is needed any more."""
         key = alarm_key(kind, subject)
         alarm = self._alarms.get(key)
         if alarm is not None and alarm.is_active:
@@ -130,14 +132,14 @@ class AlarmBook:
             self._over.add(key)
 
     def hold(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
-        """Begin the alarm of a condition that holds, else end it."""
+        """If the condition holds, raise its alarm; otherwise end it."""
         if is_so:
             self.begin(kind, subject, line, at_s, remedy)
         else:
             self.end(kind, subject, at_s)
 
     def mended(self, kinds: Sequence[AlarmKind]) -> None:
-        """End the events of these kinds: the operator's wish has come true since."""
+        """End the alarms of events of these kinds, because the operator's wish has been fulfilled since."""
         for key, alarm in self._alarms.items():
             if alarm.kind in kinds and not alarm.is_active:
                 self._alarms[key] = replace(alarm, remedy="")
@@ -149,7 +151,7 @@ class AlarmBook:
         self._over.discard(alarm_key(kind, subject))
 
     def acknowledge(self, user: str, keys: Sequence[str] = ()) -> int:
-        """Note that the user has seen these alarms, or without a key all; return how many no person had seen before."""
+        """Record that the user has seen these alarms (without a key: all); return the number of newly seen ones."""
         seen = [alarm for key, alarm in self._alarms.items() if not keys or key in keys]
         seen = [alarm for alarm in seen if not alarm.acknowledged_by and self._is_shown(alarm)]
         for alarm in seen:
@@ -157,18 +159,18 @@ class AlarmBook:
         return len(seen)
 
     def attention(self, is_there: bool, at_s: float) -> None:
-        """Note that the operator came, or went."""
+        """Record that the operator is present or away."""
         if not is_there and self._own_away_since_s < 0:
             self._own_away_since_s = at_s
         elif is_there:
             self._own_away_since_s = NONE_S
 
     def look(self, now_s: float) -> None:
-        """Remove the alarms whose time to fade has come."""
+        """Remove the alarms of events whose time is over."""
         self._now_s = max(self._now_s, now_s)
 
     def views(self) -> list[AlarmView]:
-        """Return the alarms that are shown: unseen ones first, then by weight, newest first."""
+        """Return the alarms to show: unseen ones first, then by severity, newest first."""
         return in_order(filter(self._is_shown, self._alarms.values()))
 
     def _is_shown(self, alarm: AlarmView) -> bool:
@@ -179,14 +181,14 @@ class AlarmBook:
         return not (alarm.key in self._over or alarm.acknowledged_by or is_faded)
 
     def _forget_one(self) -> None:
-        """Forget the oldest alarm of the least weight: acknowledged or unseen and ended first, then any ended one."""
+        """Drop the oldest alarm of the least severity: acknowledged or unseen and ended first, then any ended one."""
 
         def weight(key: str) -> tuple[bool, bool]:
             alarm = self._alarms[key]
             is_unseen = not alarm.acknowledged_by and (alarm.while_away or key not in self._over)
             return is_unseen, alarm.is_active
 
-        alarm = self._alarms.pop(min(self._alarms, key=weight))  # of equals the first, which is the oldest
+        alarm = self._alarms.pop(min(self._alarms, key=weight))  # of equal alarms the first, because it is the oldest
         if self._is_shown(alarm) and not alarm.acknowledged_by:
             self.forgotten += 1
         self._over.discard(alarm.key)
@@ -203,7 +205,7 @@ def alarm_key(kind: AlarmKind, subject: str) -> str:
 
 
 def in_order(alarms: Iterable[AlarmView]) -> list[AlarmView]:
-    """Return the alarms as people read them: unseen ones first, then by weight, newest first."""
+    """Return the alarms in reading order: unseen ones first, then by severity, newest first."""
     return sorted(alarms, key=lambda one: (bool(one.acknowledged_by), _WEIGHT[one.severity], -one.last_s))
 
 
@@ -213,8 +215,9 @@ def one_line_for_one_cause(
     """Return the alarms in order; an alarm that follows from another one is listed with it.
 
     Args:
-        alarms: Any.
-        explained_by: Names of the components a subject depends on: its host's creator, the components it uses.
+        alarms: The alarms, in any order.
+        explained_by: Returns the names of the components on which a subject depends: its host's creator, the components
+            it uses.
     """
     causes = [one for one in alarms if _rank(one) < _RANKS]
     root_of = {one.key: _cause_of(one, causes, explained_by) for one in alarms}
@@ -231,7 +234,7 @@ def one_line_for_one_cause(
 def _cause_of(
     one: AlarmView, causes: Sequence[AlarmView], explained_by: Callable[[str], frozenset[str]]
 ) -> AlarmView | None:
-    """Return the alarm from which this one follows: of a higher rank, or equal and needing less, so never in a ring."""
+    """Return the alarm from which this one follows; it has a higher rank, or fewer needs, so there are no cycles."""
     rank, needs = _rank(one), explained_by(one.subject)
 
     def explains(cause: AlarmView) -> bool:
@@ -248,7 +251,7 @@ def _cause_of(
 def _rank(alarm: AlarmView) -> int:
     if alarm.is_active and alarm.kind in _CAUSES:
         return _CAUSES.index(alarm.kind)
-    return len(_CAUSES) if alarm.kind is AlarmKind.LOST else _RANKS  # a fall explains what happened around it
+    return len(_CAUSES) if alarm.kind is AlarmKind.LOST else _RANKS  # a crash explains alarms around it
 
 
 def _with(root: AlarmView, others: Sequence[AlarmView]) -> AlarmView:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from backbone.component.abilities import UNITS, unit_of
 
-AS_SPEED = {"rad/s": "+.1f", "m/s": "+.2f"}  # chosen: a tenth of a turn of a wheel, a centimeter; signs are directions
-SLICE_TOLD_S = 1.0  # chosen: a rest below a second is not worth a number
+AS_SPEED = {"rad/s": "+.1f", "m/s": "+.2f"}  # chosen: a tenth of a wheel turn, a centimeter; signs are directions
+SLICE_TOLD_S = 1.0  # chosen: a remaining time below a second is not shown
 
 
 def command_line(word: str, values: Mapping[str, float]) -> str:
@@ -21,7 +21,7 @@ def command_line(word: str, values: Mapping[str, float]) -> str:
 
 
 def values_line(values: Mapping[str, float]) -> str:
-    """Return applied values; a unit that all have stands once.
+    """Return applied values as text; a unit that all values have appears once.
 
     Example:
         >>> values_line({"left_rad_s": 4.0, "right_rad_s": -4.0})
@@ -53,7 +53,7 @@ def words_of(name: str) -> str:
 
 
 def slice_end_line(until_s: float, now_s: float) -> str:
-    """Return the remaining seconds of a slice, for people; empty: it has no end, or ends now."""
+    """Return the remaining seconds of a slice, for people; empty: the slice has no end, or ends now."""
     left_s = until_s - now_s
     if until_s < 0 or abs(left_s) < SLICE_TOLD_S:
         return ""

@@ -1,7 +1,7 @@
-"""What an operator can do with a kind of ARC: how fast its body moves, and which commands it takes. Pure.
+"""Abilities of a kind of ARC for an operator: the speeds of its body, and the commands that it accepts. Pure.
 
-Consoles draw stick, buttons, sliders and switches from it. An ARC declares its commands with the roles of the RCs that
-obey them; the limits of each field are those of the RC.
+Consoles generate stick, buttons, sliders and switches from the abilities. An ARC declares its commands with the roles
+of the RCs that obey them; the RC declares the limits of each field.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from ui_console.model.fields import label_of
 
 MOVE, HALT = "move", "halt"
 BY_STICK = frozenset({MOVE, "drive", HALT})
-"""Words of the commands that stick, pad and keys send; all others get a button."""
+"""Words of the commands that stick, pad and keys send; each other command gets a button."""
 
 
 class Reach(msgspec.Struct, frozen=True):
-    """Most that a stick asks of a body.
+    """Largest speeds that a stick requests from a body.
 
     Attributes:
         forward_m_s: Forward speed at full stick.
-        turn_rad_s: Turn rate on the spot, as fast as the body can.
+        turn_rad_s: Largest turn rate on the spot.
     """
 
     forward_m_s: float
     turn_rad_s: float
 
 
-SLOW = Reach(0.1, 1.0)  # chosen: of a robot whose limits are not known: a person steps aside in time
+SLOW = Reach(0.1, 1.0)  # chosen: for a robot with unknown limits; slow enough for a person to step aside
 
 
 class RoleCommand(msgspec.Struct, frozen=True):
@@ -42,8 +42,8 @@ class RoleCommand(msgspec.Struct, frozen=True):
     Attributes:
         role: Role of the RC that obeys it.
         title: For people: its words, and the role if several RCs of the ARC obey it.
-        form: Its fields, without those that a person cannot be asked for.
-        labels: Of the fields, with range and unit, for people.
+        form: Its fields, without the fields that a person cannot set.
+        labels: Labels of the fields with range and unit, for people.
     """
 
     role: str
@@ -57,7 +57,7 @@ class KindChoice(msgspec.Struct, frozen=True):
 
     Attributes:
         kind: Its name.
-        title: For people: its name and the roles of its RCs, which come with it.
+        title: For people: its name and the roles of its RCs.
     """
 
     kind: str
@@ -65,14 +65,14 @@ class KindChoice(msgspec.Struct, frozen=True):
 
 
 class ArcAbilities(msgspec.Struct, frozen=True):
-    """What an operator can do with an ARC.
+    """Abilities of an ARC for an operator.
 
     Attributes:
-        reach: Most speeds of its body; None: it cannot move.
-        can_halt: True if it takes a command to halt.
-        commands: Commands that a person can give, without those of the stick, in the order of their declaration.
-        gives_pictures: True if pictures of its robot come to consoles.
-        kinds: The kinds of ARC with such a body, that of this ARC first; empty: there is no choice.
+        reach: Largest speeds of its body; None: the body cannot move.
+        can_halt: True if it accepts a command to halt.
+        commands: Commands that a person can send, without the stick's commands, in the order of their declaration.
+        gives_pictures: True if consoles get pictures of its robot.
+        kinds: The kinds of ARC with the same body, this ARC's kind first; empty: there is no choice.
     """
 
     reach: Reach | None
@@ -82,7 +82,7 @@ class ArcAbilities(msgspec.Struct, frozen=True):
     kinds: list[KindChoice] = []
 
     def takes(self, word: str) -> bool:
-        """Return whether a person can give this command."""
+        """Return whether a person can send this command."""
         return any(command.form.word == word for command in self.commands)
 
     def moves(self, word: str) -> bool:
@@ -94,7 +94,7 @@ class ArcAbilities(msgspec.Struct, frozen=True):
 def arc_abilities(
     kind: str, types: Sequence[ComponentType], resources: Collection[Resource] = ()
 ) -> ArcAbilities | None:
-    """Return what an operator can do with this kind of ARC; None: the mission has no such kind.
+    """Return the abilities of this kind of ARC; None: the mission has no such kind.
 
     Args:
         kind: Its name.
@@ -134,7 +134,7 @@ def _asked(role: str, title: str, form: CommandForm) -> RoleCommand:
 
 
 def _is_odd(field: FieldForm) -> bool:
-    """Return whether a person cannot be asked for this field."""
+    """Return whether a person cannot set this field."""
     return field.kind is ValueKind.OTHER
 
 
@@ -144,7 +144,7 @@ def _title(form: CommandForm, role: str) -> str:
 
 
 def _limited(arc: ComponentType, form: CommandForm, role: str, by_name: dict[str, ComponentType]) -> CommandForm:
-    """Return the form as the RC of this role declares it; the ARC's own if the RC's type is unknown."""
+    """Return the form with the limits of this role's RC; if the RC's type is unknown, the ARC's form."""
     rc = by_name.get(arc.needs.get(role, ""))
     own = [one for one in rc.abilities.commands if one.word == form.word] if rc is not None else []
     return own[0] if own else form
@@ -162,7 +162,7 @@ def _reach(arc: ComponentType, by_name: dict[str, ComponentType]) -> Reach | Non
 
 
 def _most(form: CommandForm, limited: CommandForm, field: str) -> float | None:
-    """Return the largest value of a field as the RC limits it; None: it does not, the field's type does."""
+    """Return the RC's limit of a field; None: only the field's type limits it."""
     of_type, of_rc = _field(form, field), _field(limited, field)
     if of_rc is None or (of_type is not None and of_rc.most >= of_type.most):
         return None

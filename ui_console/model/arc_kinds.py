@@ -1,4 +1,4 @@
-"""Which kind of ARC a console claims for a robot. Pure."""
+"""Chooses the kind of ARC that a console claims for a robot. Pure."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class NoArcKind(Refusal):
 
 
 def arc_kind(robot: str, sight: Sight, types: Sequence[ComponentType], resources: Collection[Resource]) -> str:
-    """Return the kind of ARC to claim: one whose body is this robot, with the RCs that this sight needs and no others.
+    """Return the kind of ARC to claim: its body is this robot, and it has only the RCs that this sight needs.
 
     Args:
         robot: The robot, or another device that is a body of a kind; empty: any robot.
@@ -53,7 +53,7 @@ def kinds_beside(kind: ComponentType, types: Sequence[ComponentType], resources:
 
 
 def _body(kind: ComponentType) -> str:
-    """Return the type of the body of a kind of ARC; empty: it has none."""
+    """Return the type of the body of a kind of ARC; empty: no body."""
     return kind.needs.get(kind.abilities.body, "")
 
 
@@ -63,7 +63,7 @@ def _complete(kinds: Sequence[ComponentType], resources: Collection[Resource]) -
 
 
 def _badness(kind: ComponentType, sight: Sight) -> tuple[bool, int, str]:
-    """Return a key: kinds that suit the sight better sort first."""
+    """Return a sort key by which kinds that suit the sight better come first."""
     pictures, size = kind.abilities.gives_pictures, len(kind.needs)
     match sight:
         case Sight.PICTURES:

@@ -1,10 +1,11 @@
-"""Consent: one operator asks another for the robot they hold, or to lift the stop they set.
+"""Consent: one operator asks another to release a robot, or to lift a stop.
 
 Rules of this file: no bus, no clock, no screen; times are mission seconds and arguments.
 
-* An asker has at most one question of a topic open here; questions are answered in the order in which they came.
-* Each question gets exactly one answer. A question that times out is answered no: everything goes on as before.
-* A yes that gives the robot back answers only the first question for it; the other askers get the name of its user.
+* An asker has at most one open question of each topic here; questions are answered in order of arrival.
+* Each question gets exactly one answer. If a question times out, the answer is no, and nothing changes.
+* A yes that releases the robot answers only the first question for it; the other askers get the name of the first
+  asker.
 * If the operator releases the robot, every question for it is answered yes; if another ARC gets it, no.
 """
 
@@ -22,20 +23,20 @@ from backbone.mission_log.people import is_console
 from backbone.ranges import Line, Mention
 from backbone.wire import Message
 
-CONSENT_WITHIN_S = 8.0  # chosen: to look up from driving, read a line and press a key; a turn is shorter or as long
+CONSENT_WITHIN_S = 8.0  # chosen: time to look up from driving, read a line and press a key; a turn takes no longer
 MOST_OPEN = 8  # chosen: more people than share one robot
-MAX_WHY = 200  # chosen: a line a driver reads at a glance
+MAX_WHY = 200  # chosen: a line that a driver reads at a glance
 
 
 class Topic(StrEnum):
     """Subject of a question to another operator."""
 
-    TAKE = "take"  # to have the robot
-    LIFT = "lift"  # to let it move again
+    TAKE = "take"  # to get the robot
+    LIFT = "lift"  # to let the robot move again
 
 
 class AskConsent(Message, frozen=True):
-    """A console asks the console that holds the robot it waits for; answered within ``CONSENT_WITHIN_S``.
+    """Question to the console that holds the robot for which the sender waits; answered within ``CONSENT_WITHIN_S``.
 
     Attributes:
         robot: The robot asked for, for people.
@@ -52,10 +53,10 @@ class Consent(Message, frozen=True):
     """Answer to ``AskConsent``.
 
     Attributes:
-        is_given: True: the robot is being given back, or may move.
+        is_given: True: the robot is being released, or may move.
         user: The person who decided.
         reason: For people; empty: none was given.
-        is_here: False: the person asked is not there, so no person decided.
+        is_here: False: the operator is absent, so no person decided.
     """
 
     is_given: bool
@@ -86,17 +87,17 @@ class NoOperatorToAsk(Refusal):
 
 
 class NotAnOperator(Refusal):
-    """A component that is no console asked a person."""
+    """A component that is not a console asked an operator."""
 
     code = "consent.not_an_operator"
     remedy = "Claim the robot; the RC manager decides between programs."
 
 
 def require_console(asked: str, asker: str) -> None:
-    """Return if an operator asks.
+    """Check that the question comes from a console.
 
     Raises:
-        NotAnOperator: The asker is no console.
+        NotAnOperator: The asker is not a console.
     """
     if not is_console(asker):
         raise NotAnOperator(f"{asked} is asked by operators only, not by {asker}")
@@ -104,14 +105,14 @@ def require_console(asked: str, asker: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Sought:
-    """A question that is open.
+    """An open question.
 
     Attributes:
         asker: Address of the console that asks.
         user: The person at that console.
         robot: The robot asked for.
         why: The reason, for people.
-        until_s: The question times out then, which is a no.
+        until_s: Mission time at which the question times out; the answer is then no.
         topic: To have the robot, or to lift its stop.
     """
 
@@ -144,19 +145,19 @@ class ConsentDesk:
 
     @property
     def open(self) -> Sequence[Sought]:
-        """The questions that wait for an answer, the next one first."""
+        """The open questions, the next one first."""
         return tuple(self._open)
 
     def seek(self, asker: str, asked: AskConsent, now_s: float, within_s: float = CONSENT_WITHIN_S) -> Sought:
-        """Open a question for the robot that is held here; see ``open_question``."""
+        """Open a question for the robot that this console holds; see ``open_question``."""
         return self.open_question(Sought(asker, asked.user, asked.robot, asked.why, now_s + within_s))
 
     def open_question(self, sought: Sought) -> Sought:
         """Open a question.
 
         Raises:
-            AskedAlready: One of this asker on this topic is open.
-            TooManyAsk: ``MOST_OPEN`` are.
+            AskedAlready: A question of this asker on this topic is open.
+            TooManyAsk: ``MOST_OPEN`` questions are open.
         """
         if any((one.asker, one.topic) == (sought.asker, sought.topic) for one in self._open):
             raise AskedAlready(f"{sought.asker} has asked already", asker=sought.asker)
@@ -166,7 +167,7 @@ class ConsentDesk:
         return sought
 
     def decide(self, is_given: bool, reason: str = "") -> list[Settled]:
-        """Answer the first question; a yes for the robot also settles all others for it; return the settled ones."""
+        """Answer the first question; a yes for the robot settles all others for it, too. Return all settled ones."""
         if not self._open:
             return []
         first, others = self._open[0], self._open[1:]
@@ -177,13 +178,13 @@ class ConsentDesk:
         return settled
 
     def expire(self, now_s: float) -> list[Settled]:
-        """Settle as a no every question that timed out."""
+        """Settle every timed-out question with no."""
         late = [one for one in self._open if one.until_s <= now_s]
         self._open = [one for one in self._open if one.until_s > now_s]
         return [Settled(one, Consent(False, self._user, "no answer")) for one in late]
 
     def ended(self, is_given: bool, reason: str) -> list[Settled]:
-        """Settle all questions for the robot: this console holds none any more."""
+        """Settle all questions for the robot, because this console no longer holds it."""
         return self._close_takes(Consent(is_given, self._user, reason))
 
     def _close_takes(self, consent: Consent) -> list[Settled]:

@@ -1,10 +1,10 @@
-"""The pure console model: the knowledge of one console, and the views its screens show.
+"""The pure console model: the state of one console, and the views that its screens show.
 
 Rules of this file: no bus, no clock, no screen. Events go in, views come out; times are mission seconds, and *now* is
 an argument. Terminal, web page and scripts show the same views.
 
-The mission's part is a ``TeamModel`` of its own, which consoles in one process may share. This model has one operator's
-part: the robot wanted, the robot held, the pictures that arrive.
+A separate ``TeamModel`` has the mission's part; consoles in one process may share it. This model has one operator's
+part: the robot wanted, the robot held, the arriving pictures.
 """
 
 from __future__ import annotations
@@ -27,22 +27,23 @@ from ui_console.model.lifting import question_line
 from ui_console.model.order_board import OrderBoard
 from ui_console.model.team import TeamModel
 
-STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
-SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
+STALE_S = 1.0  # chosen: at 0.3 m/s a Scout moves three of its lengths in this time
+SILENT_S = 3.0  # chosen: time from the grant to the first picture: frequencies settle, drivers open
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
-ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
+ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be mistaken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 
 
 class ConsoleModel:
-    """The knowledge of one console; screens read it, events change it.
+    """The state of one console; screens read it, events change it.
 
     Args:
         name: Name of this console.
         user: The person at this console.
         team: Model of the mission; None: a new one.
-        sees: True if pictures are to come while a robot is held whose ARC gives any: their absence is an alarm then.
-        alarms: Book for this console's alarms; None: a book that only its operator reads.
+        sees: True if pictures are expected while a robot is held whose ARC gives any; their absence then raises an
+            alarm.
+        alarms: Book for this console's alarms; None: a book of its own.
     """
 
     def __init__(
@@ -64,28 +65,28 @@ class ConsoleModel:
         self.why: Why | None = None
         self.applied: events.CommandApplied | None = None
         self.abilities: ArcAbilities | None = None
-        """What the operator can do with the ARC that is asked for or held; None: not known."""
+        """Abilities of the requested or held ARC; None: not known."""
         self.orders = OrderBoard()
         """The operator's orders to robots."""
         self.sees = sees
-        """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
+        """Whether pictures are expected while a robot is held; settable: a page may show other ones meanwhile."""
         self._address = f"{Subsystem.UI_CONSOLE}/{name}"
         self._pictures: dict[str, deque[events.PictureSeen]] = {}
         self._sought: dict[tuple[str, Topic], Sought] = {}
         self.moment = 0
-        """Grows at each event from which on older presses count no more."""
+        """Grows at each event after which older key presses are ignored."""
         self._must_let_go = False
         self._went: views.LostView | None = None
         self._asked_whom: events.ConsentAsked | None = None
         self._heard: list[events.ConsentHeard] = []
-        self._refused = ""  # why the last claim was refused, if it was
-        self._blind = ""  # robot that is held without pictures to drive by
+        self._refused = ""  # reason of the refusal of the last claim, if it was refused
+        self._blind = ""  # robot that is held without usable pictures
         self.alarms = alarms or AlarmBook(beside=self.team.alarms)
         """Alarms of this console alone."""
 
     # ------------------------------------------------------------------ events in
     def apply(self, event: events.ConsoleEvent) -> None:
-        """Take the event in; an event of the whole mission goes to ``team``."""
+        """Apply the event; an event of the whole mission goes to ``team``."""
         match event:
             case events.Heard(body=Why() as why):
                 self.why = why
@@ -97,7 +98,7 @@ class ConsoleModel:
                 self._apply_own(event)
 
     def look(self, now_s: float) -> None:
-        """Raise and end the alarms that depend on time; call it right before a view is taken."""
+        """Raise and end the alarms that depend on time; call it right before a view."""
         self.team.look(now_s)
         self.alarms.look(now_s)
         stale = self._stale_line(now_s)
@@ -114,7 +115,7 @@ class ConsoleModel:
         return self.team.alarm_views(self.alarms)
 
     def acknowledge(self, key: str = "") -> int:
-        """Note that this console's user has seen one alarm and its consequences, or with an empty key all.
+        """Record that this console's user has seen one alarm and its consequences, or with an empty key all alarms.
 
         Returns:
             Number of alarms acknowledged.
@@ -125,17 +126,17 @@ class ConsoleModel:
         return self.team.alarms.acknowledge(self.user, keys) + self.alarms.acknowledge(self.user, keys)
 
     def dismiss_lost(self) -> None:
-        """Note that this console's user knows of the lost robot, and does not want it back."""
+        """Record that this console's user knows of the lost robot, and does not want it back."""
         self._went = None
 
     # ------------------------------------------------------------------ views out
     @property
     def reach(self) -> Reach | None:
-        """Most speeds of the body of the ARC; ``SLOW`` while they are not known; None: it cannot move."""
+        """Largest speeds of the ARC's body; ``SLOW`` while they are not known; None: the body cannot move."""
         return SLOW if self.abilities is None else self.abilities.reach
 
     def view(self, now_s: float) -> views.ConsoleView:
-        """Return everything a screen shows."""
+        """Return the content of a screen."""
         self.look(now_s)
         team = self.team
         return views.ConsoleView(
@@ -158,7 +159,7 @@ class ConsoleModel:
         )
 
     def own(self, now_s: float) -> views.OwnView:
-        """Return the robot this console wants and holds, with its state."""
+        """Return the robot that this console wants and holds, with its state."""
         held = self.held
         link_down_s = self.team.links.down_s(now_s)
         return views.OwnView(
@@ -186,7 +187,7 @@ class ConsoleModel:
 
     @property
     def mine(self) -> str:
-        """The robot that the operator has by the stick or by an order, of several the one at the stick; empty: none."""
+        """The robot that the operator has by stick or by order; of several, the one at the stick; empty: none."""
         return self.robot if self.held is not None or self.orders.of(self.robot) is not None else ""
 
     def other_screens(self) -> list[str]:
@@ -195,7 +196,7 @@ class ConsoleModel:
         return [f"your other screen on {screen.host} {screen.feedback or 'watches'}" for screen in own]
 
     def consent(self, now_s: float) -> views.ConsentView | None:
-        """Return the question this operator is to decide next; None: no question is open."""
+        """Return the next question for this operator; None: no question is open."""
         if not self._sought:
             return None
         first, *others = self._sought.values()
@@ -210,7 +211,7 @@ class ConsoleModel:
         )
 
     def asked_line(self, now_s: float) -> str:
-        """Return in one line the answers of other operators to this console's questions; empty: none was asked."""
+        """Return a line with other operators' answers to this console's questions; empty: no question was asked."""
         asked = self._asked_whom
         if asked is None:
             return ""
@@ -238,7 +239,7 @@ class ConsoleModel:
         ]
 
     def videos(self, now_s: float) -> list[views.VideoView]:
-        """Return how the pictures arrive, by robot; of a robot that was given back there are none."""
+        """Return the state of the pictures of each robot, without released robots."""
         return [_video(robot, seen, now_s) for robot, seen in sorted(self._pictures.items())]
 
     def links(self, now_s: float) -> list[views.LinkView]:
@@ -254,7 +255,7 @@ class ConsoleModel:
         return self.team.log(count)
 
     def status_line(self, now_s: float) -> str:
-        """Return in one line whether this console has its robot, and if not, why."""
+        """Return a line with the state of the claim: whether this console has its robot, and if not, why."""
         down_s = self.team.links.down_s(now_s)
         if down_s >= 0:
             mine = f"; {self.robot} is given back there by itself" if self.held is not None else ""
@@ -274,7 +275,7 @@ class ConsoleModel:
         wanted = self.robot or "a robot"
         why = self.why
         if why is not None and why.lines:
-            reason = why.lines[0].removeprefix(f"{why.name} {why.state}: ")  # which the line says in its own words
+            reason = why.lines[0].removeprefix(f"{why.name} {why.state}: ")  # for which the line has its own words
             return f"waiting for {wanted}: {self.team.people.named(reason)}"
         if self.lost is not None:
             return f"waiting for {wanted}: {self._why_lost(self.lost)}"
@@ -359,7 +360,7 @@ class ConsoleModel:
         return f"{who} {'lets you have' if heard.is_given else 'keeps'} {heard.robot}{reason}"
 
     def _is_held(self, now_s: float) -> bool:
-        """Return whether keys move a robot, as far as this console knows."""
+        """Return whether keys move a robot, according to this console's state."""
         return self.held is not None and self.team.links.down_s(now_s) < 0
 
     def _lost_view(self, now_s: float) -> views.LostView | None:
@@ -370,7 +371,7 @@ class ConsoleModel:
         return msgspec.structs.replace(went, may_retake=is_up and self.asked is None)
 
     def _stale_line(self, now_s: float) -> str:
-        """Return in one line the fault of the pictures of the robot held; empty: they are fresh."""
+        """Return a line with the fault of the held robot's pictures; empty: they are fresh."""
         if self.held is None or not self.sees or (self.abilities is not None and not self.abilities.gives_pictures):
             return ""
         seen = self._pictures.get(self.robot)

@@ -10,7 +10,7 @@ from backbone.debug_views import ViewEntry, ViewKind
 
 
 class ViewRow(msgspec.Struct, frozen=True):
-    """One view of a behavior.
+    """A debug view of a behavior.
 
     Attributes:
         view: Its name.
@@ -24,12 +24,12 @@ class ViewRow(msgspec.Struct, frozen=True):
 
 
 class SeenViews(msgspec.Struct, frozen=True):
-    """The views of the behavior that a page looks into.
+    """The debug views of the behavior that a page watches.
 
     Attributes:
-        behavior: Its name; empty: none is looked into.
-        views: Those it has shown so far, with their newest values.
-        trouble: Why there are none; empty: there is no trouble.
+        behavior: Its name; empty: no behavior is watched.
+        views: The views shown so far, with their newest values.
+        trouble: Why there are no views; empty: no trouble.
     """
 
     behavior: str = ""

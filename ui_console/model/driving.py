@@ -1,10 +1,9 @@
-"""Drive commands of a person, and for how long a pressed key counts.
+"""Drive commands of a person, and the time for which a key press counts.
 
-Rules of this file: no bus, no clock; times are seconds of the machine, for hands do not speed up
-with the mission's clock.
+Rules of this file: no bus, no clock; times are machine seconds, because hands do not follow the mission's clock.
 
-A terminal reports each press of a key and its repeats while the key is held, never its release. So a command lasts for
-a moment after the last press and ends by itself (dead-man).
+A terminal reports each press of a key and its repeats while the key is held, but never its release. So a command lasts
+for a moment after the last press and then ends by itself (dead-man's control).
 """
 
 from __future__ import annotations
@@ -17,8 +16,8 @@ from ui_console.model.arc_abilities import Reach
 from ui_console.model.grip import ControlGrip
 from ui_console.model.orders import Order
 
-FIRST_HOLD_S = 0.5  # chosen: bridges the pause of usual keyboards before they repeat; a press moves 0.5 s at most
-KEYS_LET_GO_S = 0.7  # chosen: a longer pause than keyboards make before they repeat (X: 0.66 s), so a hand let go
+FIRST_HOLD_S = 0.5  # chosen: bridges the delay of usual keyboards before they repeat; a press moves 0.5 s at most
+KEYS_LET_GO_S = 0.7  # chosen: longer than keyboards' delay before they repeat (X: 0.66 s), so the key was released
 REPEATED_HOLD_S = (0.15, FIRST_HOLD_S)  # chosen: bounds of the hold once the rhythm of the repeats is known
 HOLD_INTERVALS = 3.0  # chosen: two lost repeats are bridged
 REPEAT_EVERY_S = 0.1  # chosen: 10 Hz; commands end by themselves after 0.5 s at the robot
@@ -26,7 +25,7 @@ REPEAT_EVERY_S = 0.1  # chosen: 10 Hz; commands end by themselves after 0.5 s at
 
 @dataclass(frozen=True, slots=True)
 class MoveWish:
-    """Move at these speeds: what stick, pad, keys and page wish of any body.
+    """Move at these speeds; sent by stick, pad, keys and page for any body.
 
     Attributes:
         forward_m_s: Backward is negative.
@@ -52,10 +51,10 @@ class HaltWish:
 
 @dataclass(frozen=True, slots=True)
 class GiveWish:
-    """Give one command by its word.
+    """Send the command that has this word.
 
     Attributes:
-        word: As the ARC declares it.
+        word: Word that the ARC declares.
         values: Field → value; fields left out have their defaults.
         role: Role of the RC that obeys it; empty: the only one.
     """
@@ -87,11 +86,11 @@ class StopAll:
 
 @dataclass(frozen=True, slots=True)
 class OrderWish:
-    """Tell a robot to do something by itself.
+    """Order a robot to do a task by itself.
 
     Attributes:
         order: The order; without a robot it is for the one at the stick.
-        until_done: What follows waits until the order is over, and the robot is in hand again.
+        until_done: The next line waits until the order is over and the stick has the robot again.
     """
 
     order: Order
@@ -111,8 +110,8 @@ DIRECTIONS: dict[Direction, tuple[float, float]] = {
 }
 """Direction of a key → forward and right, as of a stick."""
 
-STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages send their wish
-SPEED, SPEED_LEAST, SPEED_MOST = 0.25, 0.05, 1.0  # chosen: shares of a robot's reach; a quarter of most is a walk
+STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages send
+SPEED, SPEED_LEAST, SPEED_MOST = 0.25, 0.05, 1.0  # chosen: shares of the largest speed; a quarter is walking speed
 SPEED_STEP = 0.05  # chosen: 19 key presses from the slowest to the fastest
 
 
@@ -135,7 +134,7 @@ def word_of(command: Command) -> str:
 
 
 def faster(speed: float, steps: int) -> float:
-    """Return another speed, within its bounds.
+    """Return the speed changed by this number of steps, within its bounds.
 
     Example:
         >>> faster(0.25, 1), faster(0.25, -9)
@@ -148,10 +147,10 @@ def move_by_stick(forward: float, right: float, speed: float, reach: Reach) -> M
     """Return the motion for a stick, a drag pad or a direction key.
 
     Law: the shares of forward speed and of turn rate together are at most the speed, so neither wheel of a robot with
-    two wheels turns faster than this share of its most. A turn on the spot has half of it.
+    two wheels turns faster than this share of its most. A turn on the spot uses half of it.
 
     Args:
-        forward: −1 (full backward) to 1 (full forward); beyond is clipped.
+        forward: −1 (full backward) to 1 (full forward); larger values are clipped.
         right: −1 (full left) to 1 (full right).
         speed: Share of the reach at full stick.
         reach: Of the body.
@@ -168,23 +167,23 @@ def move_by_stick(forward: float, right: float, speed: float, reach: Reach) -> M
 
 
 class DriveSpan:
-    """Finds where one drive of an operator begins and ends among the commands that were applied.
+    """Finds begin and end of an operator's drives among the applied commands.
 
-    Laws: begin and end take turns, a begin first; only a motion begins one.
+    Laws: begin and end alternate, and a begin comes first; only a motion begins a drive.
     """
 
     def __init__(self) -> None:
         self._began_s: float | None = None
 
     def begins(self, command: Command, at_s: float) -> bool:
-        """Take in an applied command; return True if a drive begins with it."""
+        """Record an applied command; return True if a drive begins with it."""
         if self._began_s is not None or not isinstance(command, Motion):
             return False
         self._began_s = at_s
         return True
 
     def ends(self, at_s: float) -> float | None:
-        """End the drive: the wheels stand, or the robot is gone. Return its duration, seconds; None: there was none."""
+        """End the drive: the wheels stand, or the robot is gone. Return its duration, seconds; None: no drive."""
         began_s, self._began_s = self._began_s, None
         return None if began_s is None else max(0.0, at_s - began_s)
 
@@ -192,8 +191,8 @@ class DriveSpan:
 class DeadMan:
     """Turns key presses into commands that repeat while a key is held, and one halt after it.
 
-    Laws: a command is due only within the hold of a press; every drive is followed by a halt; from ``require_let_go``
-    on a control that is held moves nothing until it was let go and pressed anew.
+    Laws: a command is due only within the hold of a press; every drive is followed by a halt; after ``require_let_go``
+    a held control moves nothing until it was released and pressed again.
     """
 
     def __init__(self) -> None:
@@ -205,13 +204,13 @@ class DeadMan:
 
     # ------------------------------------------------------------------ controls
     def press(self, drive: Motion, now_s: float, lasts_s: float | None = None) -> bool:
-        """Take in that a key is down, for the first time or again; return whether that counts.
+        """Record that a key is down, for the first time or repeated; return whether the press counts.
 
         Args:
             drive: The command of the key.
             now_s: When.
-            lasts_s: How long the press counts, for a control that reports repeatedly while it is held and reports its
-                release; None: for a key, whose repeat rate is measured.
+            lasts_s: Time for which the press counts, for a control that reports repeatedly while held and reports its
+                release; None: a key, whose repeat rate is measured.
         """
         grip, silence_s = (self._keys, KEYS_LET_GO_S) if lasts_s is None else (self._stick, lasts_s)
         if not grip.press(now_s, silence_s):
@@ -232,11 +231,11 @@ class DeadMan:
         return True
 
     def press_once(self, now_s: float) -> bool:
-        """Take in that a control for one command that moves the robot is pressed; return whether that counts."""
+        """Record a press of a control for a single command that moves the robot; return whether it counts."""
         return self._once.press(now_s, KEYS_LET_GO_S)
 
     def stop(self) -> None:
-        """Take in that all controls are released: a halt is due at once, also if none was held.
+        """Record the release of all controls: a halt is due at once, even if no control was held.
 
         A stick, pad or page reports its release by this call; keys show theirs by a pause.
         """
@@ -244,19 +243,19 @@ class DeadMan:
         self._stick.let_go()
 
     def require_let_go(self) -> None:
-        """Ignore presses until the control was let go; the present drive ends with a halt."""
+        """Ignore presses until the control was released; the present drive ends with a halt."""
         self._must_halt = self._must_halt or self._held is not None
         self._held = None
         for grip in self._grips:
             grip.require_let_go()
 
     def is_held_back(self, now_s: float) -> bool:
-        """Return whether a control is held that has to be let go before it moves anything."""
+        """Return whether a held control must be released before it moves anything."""
         return any(grip.is_held_back(now_s) for grip in self._grips)
 
     # ------------------------------------------------------------------ commands to send
     def due(self, now_s: float) -> Motion | HaltWish | None:
-        """Return the command to send now, if one is due; asking counts as sending."""
+        """Return the command to send now, if one is due; the returned command counts as sent."""
         if self._held is not None and now_s >= self._until_s:
             self._held, self._must_halt = None, True
         if self._held is None:
@@ -269,14 +268,14 @@ class DeadMan:
 
     @property
     def next_s(self) -> float | None:
-        """When the next command is due; None: not before a press."""
+        """Time at which the next command is due; None: not before a press."""
         if self._must_halt:
             return 0.0
         return None if self._held is None else min(self._next_s, self._until_s)
 
     @property
     def let_go_s(self) -> float | None:
-        """When every control that is held back counts as let go if it stays silent; None: none is held back."""
+        """Time at which every held-back control counts as released without further presses; None: none is held back."""
         return max((at_s for grip in self._grips if (at_s := grip.let_go_s) is not None), default=None)
 
     @property

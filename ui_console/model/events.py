@@ -48,7 +48,7 @@ class Asked(Event):
 
 @dataclass(frozen=True, slots=True)
 class AbilitiesKnown(Event):
-    """What the operator can do with the ARC that was asked for is known, or has to be asked for.
+    """The abilities of the requested ARC are known, or not known any more.
 
     Attributes:
         abilities: None: not known.
@@ -79,20 +79,20 @@ class Granted(Event):
 
     @property
     def after_s(self) -> float:
-        """How long the grant took, from the wish on, mission seconds."""
+        """Time from the request to the grant, mission seconds."""
         return self.at_s - self.asked_s
 
 
 @dataclass(frozen=True, slots=True)
 class CommandApplied(Event):
-    """A robot applied a command, perhaps clipped.
+    """A robot applied a command; its values may be clipped.
 
     Attributes:
         rc: The robot.
         epoch: Of the grant.
         command: Its word.
         values: After clipping.
-        took_s: From the wish to the answer, seconds of the machine; negative: not measured.
+        took_s: Time from the operator's action to the answer, machine seconds; negative: not measured.
     """
 
     rc: str
@@ -104,7 +104,7 @@ class CommandApplied(Event):
 
 @dataclass(frozen=True, slots=True)
 class CommandRefused(Event):
-    """A peer refused; with ``ends_claim`` the claim itself was refused, so the console waits for nothing any more."""
+    """A peer refused; with ``ends_claim`` the claim itself was refused, so the console no longer waits."""
 
     code: str
     detail: str
@@ -114,7 +114,7 @@ class CommandRefused(Event):
 
 @dataclass(frozen=True, slots=True)
 class LinkTrouble(Event):
-    """A peer did not answer: its action may or may not have happened.
+    """A peer did not answer; whether it acted is unknown.
 
     Attributes:
         detail: The unanswered question, for people.
@@ -126,7 +126,7 @@ class LinkTrouble(Event):
 
 
 def failed(at_s: float, error: Refusal | LinkError) -> CommandRefused | LinkTrouble:
-    """Return the event of a refusal, or of a missing answer."""
+    """Return the event for a refusal or a missing answer."""
     if isinstance(error, Refusal):
         return CommandRefused(at_s, code_of(error), error.detail, error.remedy)
     return LinkTrouble(at_s, str(error))
@@ -139,7 +139,7 @@ class GivenBack(Event):
     Attributes:
         reason: Why.
         confirmed: False if the ARC did not confirm it.
-        wanted: False if the operator did not release it: the robot was lost.
+        wanted: False if the robot was lost without a release by the operator.
     """
 
     reason: str
@@ -149,10 +149,10 @@ class GivenBack(Event):
 
 @dataclass(frozen=True, slots=True)
 class LetGoNeeded(Event):
-    """A control that is held moves nothing before it is let go, or may move the robot again.
+    """A held control must be released before it moves anything, or may move the robot again.
 
     Attributes:
-        is_needed: True: let go, then press anew.
+        is_needed: True: release it, then press again.
     """
 
     is_needed: bool
@@ -160,7 +160,7 @@ class LetGoNeeded(Event):
 
 @dataclass(frozen=True, slots=True)
 class MomentBegan(Event):
-    """A stop, a lift, a grant, a loss, or a broken link: earlier presses move nothing any more."""
+    """A stop, a lift, a grant, a loss, or a broken link: earlier presses are ignored from now on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,7 @@ class PictureSeen(Event):
 
 @dataclass(frozen=True, slots=True)
 class Attention(Event):
-    """The operator touched the console, or turned away from it.
+    """The operator used the console, or turned away from it.
 
     Attributes:
         is_there: False: the operator is away.
@@ -184,7 +184,7 @@ class Attention(Event):
 
 @dataclass(frozen=True, slots=True)
 class ConsentAsked(Event):
-    """This console asked other operators for a robot they hold, or to lift a stop they set.
+    """This console asked other operators to release a robot, or to lift a stop.
 
     Attributes:
         robot: The robot.
@@ -220,14 +220,14 @@ class ConsentHeard(Event):
 
 @dataclass(frozen=True, slots=True)
 class TurnedTo(Event):
-    """The stick turned to a robot that carries out an order of this console; it asks for nothing."""
+    """The stick turned to a robot that carries out an order of this console; no robot is requested."""
 
     robot: str
 
 
 @dataclass(frozen=True, slots=True)
 class OrderChanged(Event):
-    """An order of this console was given, or its state changed; of each order the last one has a final state."""
+    """An order of this console was given, or its state changed; the last event of each order has a final state."""
 
     given: GivenOrder
 
@@ -259,7 +259,7 @@ Said = (
     | Suspended
     | Why
 )
-"""Messages that components publish or answer, as they came over the bus."""
+"""Messages that components publish or answer, as received from the bus."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,12 +277,12 @@ class Heard(Event):
 
 @dataclass(frozen=True, slots=True)
 class LinkHeard(Event):
-    """This console's link to the hub came or went, or was measured.
+    """This console's link to the hub came up, went down, or was measured.
 
     Attributes:
         is_up: Whether messages pass.
-        latency_s: There and back, seconds of the machine; negative: not measured now.
-        until_s: The link counts as down if no newer measurement came by then.
+        latency_s: Round-trip time, machine seconds; negative: not measured now.
+        until_s: Time until which the link counts as up without a newer measurement.
     """
 
     is_up: bool
@@ -346,7 +346,7 @@ _WORDS: dict[type[object], str] = {
 
 
 def said(event: ConsoleEvent) -> ConsoleEvent | Said:
-    """Return the message that was heard; any other event as it is."""
+    """Return the message of a ``Heard``; return any other event unchanged."""
     return event.body if isinstance(event, Heard) else event
 
 
@@ -384,9 +384,9 @@ def event_json(event: ConsoleEvent) -> bytes:
 
 
 FOR_SCRIPTS = (Schedule, StoryEvent, OperatorActed, StopState, Disappeared, ProcessFell, LinkTrouble, CommandRefused)
-"""Events for a program that watches a mission; the other ones come several times a second."""
+"""Events for a program that watches a mission; the other events occur several times a second."""
 
 
 def for_scripts(event: ConsoleEvent) -> list[bytes]:
-    """Return the event as one line of JSON if it is one for watching programs, else no line."""
+    """Return the event as one line of JSON if it is for watching programs; otherwise no line."""
     return [event_json(event)] if isinstance(said(event), FOR_SCRIPTS) else []

@@ -1,4 +1,4 @@
-"""Fields of a command as a person reads and writes them. Pure."""
+"""Fields of a command in the form for people. Pure."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def has_range(field: FieldForm) -> bool:
 
 
 def default_text(field: FieldForm) -> str:
-    """Return the text that a field has at first; empty if it needs a value."""
+    """Return the initial text of a field; empty if the field needs a value."""
     if field.is_required:
         return ""
     if isinstance(field.default, bool):
@@ -58,10 +58,10 @@ def default_text(field: FieldForm) -> str:
 
 
 def read_fields(fields: list[FieldForm], texts: list[str]) -> dict[str, float | bool | str]:
-    """Return the values of typed texts; a field without a text is left out and has its default.
+    """Return the values of typed texts; a field without a text is left out, so its default applies.
 
     Raises:
-        WrongValue: A text is no value of its field, or is missing.
+        WrongValue: A text is not a legal value of its field, or a required text is missing.
     """
     values = {}
     for field, text in zip(fields, texts, strict=True):

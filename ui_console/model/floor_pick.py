@@ -1,10 +1,10 @@
-"""Floor pick: which place on the floor a point in a robot's picture shows. Pure.
+"""Floor pick: computes the place on the floor at a point of a robot's picture. Pure.
 
-The camera is a pinhole camera with square pixels, whose row 0 is on top; a column or row of a whole number is the
-middle of its pixel. The floor is flat, and the robot stands on it as its kind declares: a ramp, or a robot that
-accelerates, moves the place.
+The camera is a pinhole camera with square pixels, row 0 on top; an integer column or row is the middle of a pixel. The
+floor is assumed flat, and the camera at the height and tilt that the kind of robot declares: on a ramp, or while the
+robot accelerates, the result is displaced.
 
-Source: Hartley and Zisserman, "Multiple View Geometry", chapter 6: the ray of a pixel, met with a plane.
+Source: Hartley and Zisserman, "Multiple View Geometry", chapter 6: intersection of a pixel's ray with a plane.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from backbone.component.abilities import CameraForm
 from backbone.errors import Refusal
 
-MOST_A_PIXEL_M = 0.25  # chosen: a finger is pixels wide; a robot that stops so far beside is not where it was sent
+MOST_A_PIXEL_M = 0.25  # chosen: a finger covers several pixels; with a larger error the goal would be wrong
 
 
 class NoFloorThere(Refusal):
-    """The point shows no place on the floor that can be told."""
+    """No place on the floor can be determined for this point."""
 
     code = "console.no_floor_there"
     remedy = "Tap nearer to the lower edge of the picture, or tap the place on the map."
@@ -27,7 +27,7 @@ class NoFloorThere(Refusal):
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """Where a robot stood when its picture was taken.
+    """Pose of a robot at the time of its picture.
 
     Attributes:
         x_m: In the room's frame.
@@ -43,14 +43,14 @@ class Stand:
 def floor_place(
     column_px: float, row_px: float, size_px: tuple[int, int], camera: CameraForm, stand: Stand
 ) -> tuple[float, float]:
-    """Return the place on the floor that this point of the picture shows: x and y in meters, in the room's frame.
+    """Return the place on the floor at this point of the picture: x and y in meters, in the room's frame.
 
     Args:
         column_px: 0: the middle of the leftmost pixel.
         row_px: 0: the middle of the uppermost pixel.
         size_px: Width and height of the picture.
-        camera: The robot's.
-        stand: The robot's.
+        camera: Model of the robot's camera.
+        stand: Pose of the robot.
 
     Raises:
         NoFloorThere: The point is above the horizon, or so near to it that a pixel is wider than ``MOST_A_PIXEL_M``.
@@ -66,7 +66,7 @@ def floor_place(
     right = (column_px - (width_px - 1) / 2) / focal_px
     down = (row_px - (height_px - 1) / 2) / focal_px
     tilt_cos, tilt_sin = math.cos(camera.tilt_rad), math.sin(camera.tilt_rad)
-    falls, goes = down * tilt_cos - tilt_sin, tilt_cos + down * tilt_sin  # of a ray of depth 1
+    falls, goes = down * tilt_cos - tilt_sin, tilt_cos + down * tilt_sin  # direction of the ray, depth 1
     if falls <= 0.0:
         raise NoFloorThere("this point of the picture is above the horizon: no floor is there")
     depth_m = camera.height_m / falls

@@ -1,6 +1,7 @@
-"""Gauges: what a robot reports, as words, places in ranges and flags. Pure.
+"""Gauges: a robot's reports as texts, positions in ranges, and flags. Pure.
 
-Names and units come from the names of the reports' fields; ranges and meanings from their declaration, once known.
+Names and units come from the names of the reports' fields. Ranges and meanings come from their declaration, once it is
+known.
 """
 
 from __future__ import annotations
@@ -24,19 +25,19 @@ OF_THE_BUS = frozenset(
     for kind in (ranges.Meters, ranges.Radians, ranges.Speed, ranges.TurnRate, ranges.WheelSpeed, ranges.Measure)
     for limits in get_args(kind)[1:]
 )
-"""Ranges that only keep nonsense away: no hardware's own, and nothing is read from a place in one."""
+"""Generic ranges that only reject impossible numbers; a position in such a range has no meaning for people."""
 
 
 class GaugeView(msgspec.Struct, frozen=True):
-    """One value that a robot reports.
+    """A value that a robot reports.
 
     Attributes:
         name: For people.
-        text: The value with its unit; of a flag ``on`` or ``off``.
-        share: The value's place in its range, 0 at the least to 1 at the most; negative: it has no range.
+        text: The value with its unit; for a flag, ``on`` or ``off``.
+        share: Position of the value in its range, 0 (least) to 1 (most); negative: no range.
         is_share: True: the value itself is a share, such as a battery's charge.
-        flag: The value of a flag; None: it is no flag.
-        span: Its range with its unit; empty: it has none.
+        flag: The value of a flag; None: not a flag.
+        span: Its range with its unit; empty: no range.
         doc: Its meaning; empty: not known.
     """
 
@@ -54,7 +55,7 @@ def gauges(readings: Readings, reports: Sequence[FieldForm] = ()) -> list[GaugeV
 
     Args:
         readings: The values.
-        reports: Their declarations, as far as they are known.
+        reports: Their known declarations.
 
     Example:
         >>> values = {"tilt_rad": 0.5, "battery_share": 0.871, "up": True}

@@ -1,10 +1,10 @@
-"""State of one control: held or not, and let go or not since that was required.
+"""State of one control: whether it is held, and whether it was released since a release was required.
 
 Rules of this file: no bus, no clock; times are seconds of the machine.
 
-After a stop, a cut link or a change of holder a control that is still held must not move anything: only an operator who
-let go and presses anew reacts to the present situation. Keys report presses only, so a pause shows their release;
-sticks, pads and pages report it.
+After a stop, a cut link or a change of holder, a control that is still held must not move anything: only an operator
+who releases it and presses again reacts to the present situation. Keys report only presses, so a pause shows their
+release; sticks, pads and pages report the release.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ import math
 
 
 class ControlGrip:
-    """One control of an operator.
+    """A control of an operator.
 
-    Laws: after ``require_let_go`` no press counts until the control was let go; the release is reported, or is a
-    silence as long as the last press lasts.
+    Laws: after ``require_let_go`` no press counts until the control was released. A release is reported, or follows
+    from a silence longer than the last press lasts.
     """
 
     def __init__(self) -> None:
@@ -24,23 +24,23 @@ class ControlGrip:
         self._waits = False
 
     def require_let_go(self) -> None:
-        """Ignore presses until the control was let go."""
+        """Ignore presses until the control was released."""
         self._waits = True
 
     def let_go(self) -> None:
-        """Take in the release of the control: the next press counts, unless a release is required anew.
+        """Record the release of the control: the next press counts, unless a release is required again.
 
-        A control that was held a moment ago may still be held when a release is required right afterwards: screens also
-        report a release for other reasons.
+        Screens also report a release for other reasons. So if a release is required right afterwards, the control
+        counts as still held.
         """
         self._waits = False
 
     def press(self, now_s: float, lasts_s: float) -> bool:
-        """Take in that the control is held, for the first time or still; return whether that counts.
+        """Record that the control is held, for the first time or still; return whether the press counts.
 
         Args:
-            now_s: When.
-            lasts_s: A silence as long as this shows that it was let go.
+            now_s: Machine time of the press.
+            lasts_s: Silence after which the control counts as released.
         """
         counts = not self.is_held_back(now_s)
         self._until_s = now_s + lasts_s
@@ -49,10 +49,10 @@ class ControlGrip:
         return counts
 
     def is_held_back(self, now_s: float) -> bool:
-        """Return whether the control is held and has to be let go before it counts."""
+        """Return whether the control is held and must be released before it counts."""
         return self._waits and now_s < self._until_s
 
     @property
     def let_go_s(self) -> float | None:
-        """When a control that is held back counts as let go if no press follows; None: it is not held back."""
+        """Time at which a held-back control counts as released if no press follows; None: it is not held back."""
         return self._until_s if self._waits and self._until_s > -math.inf else None

@@ -1,7 +1,7 @@
-"""The mission's health as a console knows it, and the alarms that follow from it.
+"""The mission's health as known to a console, and the resulting alarms.
 
 Rules of this file: no bus, no clock, no screen; times are arguments. The launcher publishes the mission's health every
-second; a report that is too old counts no longer: then the mission is at best degraded, because the launcher is silent.
+second. If the newest report is too old, the launcher is silent, and the mission counts as degraded at best.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ class HealthBoard:
         self.rate = 1.0
         """Mission seconds per second of the machine."""
         self._said: MissionHealth | None = None
-        self._said_s: float | None = None  # or since when this console waits for the first report
+        self._said_s: float | None = None  # or the begin of the wait for the first report
         self._absent: frozenset[str] = frozenset()
 
     def take(self, said: MissionHealth, at_s: float) -> None:
-        """Take the launcher's report in."""
+        """Record the launcher's report."""
         self._said, self._said_s = said, at_s
         self._raise_alarms(said.absent, at_s)
 
     def look(self, now_s: float) -> None:
-        """Find out whether the launcher is silent; the wait for its first report begins with the first look."""
+        """Check whether the launcher is silent; the wait for its first report begins with the first call."""
         if self._said_s is None:
             self._said_s = now_s
         silence = self._silence(now_s)
@@ -44,7 +44,7 @@ class HealthBoard:
             self._raise_alarms([*(self._said.absent if self._said is not None else []), silence], now_s)
 
     def view(self, now_s: float) -> HealthView | None:
-        """Return the health and one line for each absence; None: the launcher had no time yet to report."""
+        """Return the health and one line for each absence; None: the first report is not due yet."""
         said, silence = self._said, self._silence(now_s)
         if silence is None:
             return HealthView(str(said.word), said.lines(now_s)) if said else None

@@ -1,4 +1,4 @@
-"""What a page is shown of the messages on the bus: a list of keys, and one message. Pure."""
+"""Views of messages on the bus for a page: a list of keys, and one message. Pure."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import msgspec
 from ui_console.model.key_table import KeyRow, with_words
 from ui_console.model.message_views import FieldRow
 
-MOST_LISTED = 100  # chosen: several screens; words find the others
+MOST_LISTED = 100  # chosen: several screens; a search finds the others
 
 
 class KeyOrder(StrEnum):
     """Orders of a list of keys."""
 
     KEY = "key"
-    BYTES = "bytes"  # those with the most bytes in a second first
+    BYTES = "bytes"  # largest byte rate first
 
 
 class KeyList(msgspec.Struct, frozen=True):
-    """Keys that a page lists.
+    """A list of keys for a page.
 
     Attributes:
         rows: At most ``MOST_LISTED``.
-        matching: Number of rows with the words.
+        matching: Number of rows that match the search words.
         heard: Number of all rows.
         dropped: Number of messages that came too fast to be counted.
     """
@@ -37,17 +37,17 @@ class KeyList(msgspec.Struct, frozen=True):
 
 
 class MessageShown(msgspec.Struct, frozen=True):
-    """The newest message that a page looks at.
+    """The newest message of the key that a page watches.
 
     Attributes:
-        number: Of those that were shown; between two of them more may have come.
+        number: Number among the shown messages; messages in between may be skipped.
         stamp_s: Mission time of its sending.
-        sequence: Its number among those of its sender.
-        cause: Id of the message that led to it.
+        sequence: Its number among the messages of its sender.
+        cause: Id of the message that caused it.
         size_bytes: Its length on the bus.
         rows: Its fields.
-        trouble: Why it is shown in another way than messages of its kind are; empty: it is not.
-        has_picture: True: a picture of it comes beside this.
+        trouble: Why its own view cannot show it; empty: no trouble.
+        has_picture: True: its picture is sent separately.
     """
 
     number: int
@@ -61,12 +61,12 @@ class MessageShown(msgspec.Struct, frozen=True):
 
 
 def key_list(rows: Sequence[KeyRow], words: str, order: KeyOrder, dropped: int) -> KeyList:
-    """Return the rows that have all of these words in key, sender or schema.
+    """Return the rows that contain all of these words in key, sender or schema.
 
     Args:
-        rows: In the order of keys.
+        rows: Rows in the order of keys.
         words: See ``with_words``.
-        order: Of the result.
+        order: Order of the result.
         dropped: Number of messages that came too fast to be counted.
     """
     found = with_words(rows, words)

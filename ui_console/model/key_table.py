@@ -1,4 +1,4 @@
-"""Keys of a mission with the rate and size of what is said at them, as ``scout-backbone top`` tells them. Pure."""
+"""Keys of a mission with the rate and size of their messages, as in ``scout-backbone top``. Pure."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ import msgspec
 from backbone.command_line.message_lines import short_key
 from backbone.printable_text import printable
 
-PART_S, PARTS = 0.5, 10  # chosen: a rate over five seconds is steady enough to read, and forgets soon
-MOST_KEYS = 2000  # chosen: ten times those of a mission of ten robots
+PART_S, PARTS = 0.5, 10  # chosen: a rate over five seconds is steady enough to read, and follows changes soon
+MOST_KEYS = 2000  # chosen: ten times the keys of a mission with ten robots
 
 
 class KeyRow(msgspec.Struct, frozen=True):
-    """One key, with one sender and one schema.
+    """A key with one sender and one schema.
 
     Attributes:
         key: Without ``scout/<mission>/``.
         source: Address of the sender; empty: the bytes are no message.
         schema: ``<Name>/<version>``; empty: the bytes are no message.
-        messages_per_s: Over the last seconds.
+        messages_per_s: Rate over the last seconds.
         bytes_per_s: Same.
-        mean_bytes: Of all messages so far; 0: none was heard.
-        heard_s: Mission time of the last one; −1: none was heard.
+        mean_bytes: Mean size of all messages so far; 0: no message yet.
+        heard_s: Mission time of the last message; −1: no message yet.
     """
 
     key: str
@@ -44,7 +44,7 @@ class KeyRow(msgspec.Struct, frozen=True):
 
 @dataclass(slots=True)
 class _Counts:
-    """What was heard of one row; ``parts`` are number of the part of time, messages and bytes in it."""
+    """Counts of one row; each of ``parts`` is a time slot's number with the messages and bytes in it."""
 
     since_s: float
     messages: int = 0
@@ -54,11 +54,11 @@ class _Counts:
 
 
 class KeyTable:
-    """Counts what is heard; its size is bounded however many keys and messages there are.
+    """Counts messages; its size is bounded for any number of keys and messages.
 
     Args:
-        since_s: Mission time since when everything is heard.
-        known: Key, sender and schema of rows that are shown even if nothing is heard of them.
+        since_s: Mission time from which all messages are received.
+        known: Key, sender and schema of rows that are shown even without messages.
     """
 
     def __init__(self, since_s: float, known: Iterable[tuple[str, str, str]] = ()) -> None:
@@ -73,9 +73,9 @@ class KeyTable:
         Args:
             key: With ``scout/<mission>/``.
             source: Address of the sender.
-            schema: Of the message.
+            schema: Schema of the message.
             size_bytes: Its length.
-            at_s: Mission time when it was heard.
+            at_s: Mission time of its arrival.
         """
         name = (short_key(key), source, schema)
         counts = self._rows.get(name)
@@ -93,7 +93,7 @@ class KeyTable:
 
         Args:
             now_s: Mission time.
-            rate: Mission seconds in one of those in which rates are told.
+            rate: Mission seconds per second of the shown rates.
         """
         return [_row(name, counts, now_s, rate) for name, counts in sorted(self._rows.items())]
 
@@ -103,7 +103,7 @@ class KeyTable:
 
 
 def with_words(rows: Iterable[KeyRow], words: str) -> list[KeyRow]:
-    """Return the rows that have all of these words in key, sender or schema; case does not matter.
+    """Return the rows that contain all of these words in key, sender or schema, ignoring case.
 
     Example:
         >>> rows = [KeyRow("resource_pool/eye/frames", "resource_pool/eye", "Frame/1"), KeyRow("a/b/log", "a/b", "")]
@@ -115,7 +115,7 @@ def with_words(rows: Iterable[KeyRow], words: str) -> list[KeyRow]:
 
 
 def _is_last(counts: _Counts, number: int) -> bool:
-    """Return whether this part of time is the last that was counted, as it stays if time falls."""
+    """Return whether this time slot is the last counted one; it stays the last if time goes back."""
     return bool(counts.parts) and number <= counts.parts[-1][0]
 
 

@@ -1,4 +1,4 @@
-"""Key view: the newest message of one key, and its numbers over time. Pure."""
+"""Key view: the newest message of one key, and plots of its numbers over time. Pure."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from ui_console.model.message_views import (
 )
 from ui_console.model.series import SPAN_S, Series
 
-MOST_SERIES = 200  # chosen: as many as a message has rows
+MOST_SERIES = 200  # chosen: the largest number of rows of a message
 
 
 class KeyView:
-    """What is shown of the messages of one key and schema; its size is bounded however many come.
+    """View of the messages of one key and schema; its size is bounded for any number of messages.
 
     Args:
-        schema: Of the messages.
-        views: Schema → how it is shown.
-        span_s: How much of the past its plots keep, mission seconds.
+        schema: Schema of the messages.
+        views: Schema → its view.
+        span_s: Time span of the plots, mission seconds.
     """
 
     def __init__(self, schema: str, views: Views, span_s: float = SPAN_S) -> None:
@@ -39,20 +39,20 @@ class KeyView:
         self.messages = 0
         """Number of messages so far."""
         self.trouble = ""
-        """Why the message is shown as a table of its fields; empty: its view shows it."""
+        """Why the message is shown only as a table of fields; empty: its own view shows it."""
 
     @property
     def at_s(self) -> float:
-        """Mission time of the newest message; −1: there was none."""
+        """Mission time of the newest message; −1: no message yet."""
         return self._newest[0] if self._newest is not None else -1.0
 
     def take(self, body: object, at_s: float, sequence: int) -> None:
         """Show a message.
 
         Args:
-            body: Its fields by name; or a list, or bytes, if its class is not known here.
+            body: Its fields by name; if its class is not known, a list or bytes.
             at_s: Mission time of its sending.
-            sequence: Number among those of its sender. The newest message, said again by a player, changes nothing.
+            sequence: Number among the messages of its sender. If a player repeats the newest message, nothing changes.
         """
         if self._newest == (at_s, sequence):
             return
@@ -65,11 +65,11 @@ class KeyView:
                 self._series_of(row.name).add(at_s, row.number)
 
     def series(self, name: str) -> Series | None:
-        """Return the numbers of a row over time; None: it has none."""
+        """Return the numbers of a row over time; None: the row has no numbers."""
         return self._series.get(name)
 
     def names(self) -> list[str]:
-        """Return the rows that have numbers, in their order in the newest message."""
+        """Return the rows with numbers, in the order of the newest message."""
         return [row.name for row in self.rows if row.name in self._series and row.number is not None]
 
     def _shown(self, body: object) -> tuple[Sequence[FieldRow], PixelPicture | None]:
@@ -82,7 +82,7 @@ class KeyView:
         return field_rows(body), None
 
     def _series_of(self, name: str) -> Series:
-        """Return the series, a new one in place of the one that was begun first if there are too many."""
+        """Return the row's series; if there are too many, a new series replaces the oldest one."""
         if name not in self._series:
             if len(self._series) >= MOST_SERIES:
                 del self._series[next(iter(self._series))]

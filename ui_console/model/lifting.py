@@ -2,9 +2,11 @@
 
 Rules of this file: no bus, no clock, no screen. The reasons: docs/decisions/0018.
 
-* To stop is one act, to lift another. A lift names the stop on the screen by its number: a newer stop is never lifted.
+* Stop and lift are separate actions. A lift names the stop on the screen by its number, so a newer stop is never
+  lifted.
 * An operator's own stop is lifted at once. Each other author of the stop is asked first.
-* One no keeps the stop, and so does silence. An author who left cannot be asked, and keeps no robot stopped.
+* A single no keeps the stop, and so does a missing answer. An author who has left is not asked; their stop does not
+  prevent the lift.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from ui_console.model.consent import MAX_WHY, Consent
 
 
 class AskLift(Message, frozen=True):
-    """A console asks a stop's author whether the robot may move again: at the author's console, or everywhere.
+    """Asks a stop's author whether the robot may move again, at the author's console or at all consoles.
 
     Attributes:
         robot: The robot.
@@ -42,7 +44,7 @@ class AskLift(Message, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class LiftNow:
-    """No other person has to be asked."""
+    """No other person must be asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,14 +83,14 @@ def decide_lift(stop: StopState, number: int, user: str, console: str) -> LiftDe
 
 
 def answer_of(author: Stopper, answers: Iterable[Consent]) -> Consent:
-    """Return the answer of an author asked at several consoles: one yes is a yes; an author at none has left."""
+    """Return an author's answer from several consoles: one yes is a yes; an author at no console has left."""
     here = [answer for answer in answers if answer.is_here]
     left = Consent(True, author_name(author), "is not here any more", False)
     return next((answer for answer in here if answer.is_given), here[0] if here else left)
 
 
 def is_agreed(answers: Iterable[Consent]) -> bool:
-    """Return whether the stop is lifted after these answers of all authors asked."""
+    """Return whether the stop is lifted after these answers of all asked authors."""
     return all(answer.is_given for answer in answers)
 
 
@@ -98,7 +100,7 @@ def authors(stop: StopState) -> tuple[Stopper, ...]:
 
 
 def author_name(author: Stopper) -> str:
-    """Return the author's name, for people; of a console without a person the console's name."""
+    """Return the author's name, for people; for a console without a person, the console's name."""
     return component_of(author.by) if "/" in author.by else author.by
 
 
@@ -111,10 +113,10 @@ def lift_line(stop: StopState, user: str, console: str, is_there: Callable[[Stop
     """Return in one line for people how the stop is lifted.
 
     Args:
-        stop: In force.
+        stop: The stop in force.
         user: The person who may want to lift it.
         console: Address of the console they sit at.
-        is_there: Returns whether this author is there, as far as is known.
+        is_there: Returns whether this author is present, as far as known.
     """
     match decide_lift(stop, stop.number, user, console):
         case AskFirst(others) if names := _names(author for author in others if is_there(author)):

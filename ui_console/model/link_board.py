@@ -15,7 +15,7 @@ from ui_console.model.alarms import AlarmBook
 from ui_console.model.events import LinkHeard
 from ui_console.model.views import NONE_S, AlarmKind, HostView, LinkView
 
-OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures come late
+OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures are late
 NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped from here"
 
 
@@ -29,7 +29,7 @@ class LinkBoard:
     def __init__(self, alarms: AlarmBook) -> None:
         self._alarms = alarms
         self.leases: Leases | None = None
-        """As last renewed."""
+        """The leases last renewed."""
         self._leases_s = NONE_S
         self._hosts: dict[str, tuple[float, HostLoad]] = {}
         self._overruns: dict[tuple[str, str], float] = {}
@@ -39,7 +39,7 @@ class LinkBoard:
 
     # ------------------------------------------------------------------ messages in
     def take_link(self, link: LinkHeard) -> None:
-        """Take in the state of the link, or a measurement of it."""
+        """Record the state of the link, or a measurement of it."""
         if link.is_up:
             self._link_heard_s = link.at_s
             latency_s = link.latency_s if link.latency_s >= 0 else self._link.latency_s
@@ -49,13 +49,13 @@ class LinkBoard:
         self._alarms.hold(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
 
     def take_load(self, load: HostLoad, at_s: float) -> None:
-        """Take in the load of a host."""
+        """Record the load of a host."""
         self._hosts[load.host] = (at_s, load)
         line = f"{load.host} is busy at {load.cpu:.0%} of its {load.cores} cores"
         self._alarms.hold(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
 
     def take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
-        """Take in the counts of a radio: late packets raise an alarm of their ARC."""
+        """Record the counts of a radio: late packets raise an alarm of their ARC."""
         self._radios[radio] = values
         known = {(radio, name.removeprefix("overruns_")) for name in values}
         self._overruns = {key: count for key, count in self._overruns.items() if key[0] != radio or key in known}
@@ -72,16 +72,16 @@ class LinkBoard:
                 self._alarms.happened(AlarmKind.DEADLINE, arc, line, at_s, remedy, f"deadline:{radio}:{arc}")
 
     def take_leases(self, leases: Leases, at_s: float) -> None:
-        """Take in the leases the RC manager renewed."""
+        """Record the leases the RC manager renewed."""
         self.leases, self._leases_s = leases, at_s
 
     def look(self, now_s: float) -> None:
-        """Find out whether the link is silent."""
+        """Check whether the link is silent."""
         self._alarms.hold(self.down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
 
     # ------------------------------------------------------------------ views out
     def radio_line(self, arc: str) -> str:
-        """Return for people how the packets of an ARC go over its radio; empty: no radio reported on it."""
+        """Return a line about an ARC's packets on its radio; empty: no radio reported on the ARC."""
         counts = [(radio, int(count)) for (radio, of), count in sorted(self._overruns.items()) if of == arc]
         return ", ".join(
             f"{radio} is missing" if self.is_missing(radio) else f"{radio}: {counted(late, 'packet')} late or lost"
@@ -89,7 +89,7 @@ class LinkBoard:
         )
 
     def down_s(self, now_s: float) -> float:
-        """Return since when the mission's hub is silent; negative: the link is up."""
+        """Return the time from which the mission's hub is silent; negative: the link is up."""
         link = self._link
         return NONE_S if link.is_up and now_s <= link.until_s else self._link_heard_s
 

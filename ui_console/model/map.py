@@ -1,4 +1,4 @@
-"""The map: the plan of the floor, where each body is believed to be and was, and what each robot sees.
+"""The map: the plan of the floor, the estimated place and trail of each body, and each robot's field of view.
 
 Rules of this file: no bus, no clock, no screen; messages go in, views come out; times are mission seconds, and *now* is
 an argument. Positions are in meters in the room's frame, see ``resource_pool.localization``.
@@ -23,11 +23,11 @@ from resource_pool.arc_client import FloorPlan, FloorShape, Pose, PoseSource
 from ui_console.model.floor_pick import NoFloorThere, Stand, floor_place
 from ui_console.model.link_board import LinkBoard
 
-STALE_S = 3.0  # chosen: at a Scout's 0.35 m/s it may be a meter away; localizers that are silent are asked every second
-TRAIL_STEP_M = 0.05  # chosen: half a Scout; a body that stands leaves no trail
-TRAIL_POINTS = 100  # chosen: five meters of way; ten robots cost a page 20 kB, and only while they move
-RECENT = 90  # chosen: three seconds at a camera's rate; the oldest picture to drive by is a second old
-LEAST_ROOM_M = 2.0  # chosen: a floor of which nothing is known is shown at least so large
+STALE_S = 3.0  # chosen: at a Scout's 0.35 m/s it may be a meter away; silent localizers are asked every second
+TRAIL_STEP_M = 0.05  # chosen: half a Scout; a body that stands still leaves no trail
+TRAIL_POINTS = 100  # chosen: five meters of way; ten robots cost a page 20 kB, only while they move
+RECENT = 90  # chosen: three seconds at a camera's rate; the oldest usable picture is a second old
+LEAST_ROOM_M = 2.0  # chosen: least size of an unknown floor
 
 SOURCES = {
     PoseSource.SIMULATOR: "from the simulator",
@@ -35,16 +35,16 @@ SOURCES = {
     PoseSource.DEAD_RECKONING: "dead reckoning",
     PoseSource.LANDMARK: "by a landmark",
 }
-"""For people, in the few words for which there is room beside a robot."""
+"""Short texts for people, for the space beside a robot."""
 
 
 class FloorView(msgspec.Struct, frozen=True):
-    """The plan of the floor, as a page draws it.
+    """The plan of the floor, for a page.
 
     Attributes:
         width_m: Along x.
         depth_m: Along y.
-        shapes: What stands on it.
+        shapes: Shapes on it.
         image: A JPEG that covers the whole floor, in base64; empty: none.
     """
 
@@ -60,17 +60,17 @@ class BodyView(msgspec.Struct, frozen=True):
     Attributes:
         name: Its name.
         is_robot: True for a robot of the mission; False for another body that a localizer knows.
-        x_m: Its believed place.
+        x_m: Its estimated place.
         y_m: Same.
         heading_rad: Counterclockwise from x.
         spread_m: Standard deviation of the place; 0: exact.
-        source: What the place rests on, for people.
+        source: Source of the place, for people.
         is_stale: True: the place is old, and the body may be elsewhere.
         age_s: Age of the place in whole seconds while it is stale; 0 while it is fresh.
-        trail: Where it was, oldest first: x and y in turn.
+        trail: Its past places, oldest first: x and y alternate.
         sees_rad: Angle of view of its camera while its holder gets pictures; 0: no ARC gets them.
-        link: How its commands go over the radio, for people; empty: not known.
-        does: What its holder does with it, for people: an order of any operator too; empty: nobody has it.
+        link: State of its commands on the radio, for people; empty: not known.
+        does: Activity of its holder, for people, including any operator's order; empty: no ARC holds it.
     """
 
     name: str
@@ -90,7 +90,7 @@ class BodyView(msgspec.Struct, frozen=True):
 
 @dataclass(slots=True)
 class _Track:
-    """What is known of the way of one body."""
+    """Places of one body over time."""
 
     now: Pose
     recent: deque[Pose] = field(default_factory=lambda: deque(maxlen=RECENT))
@@ -108,8 +108,8 @@ class MapBoard:
     """The map of a mission.
 
     Args:
-        picture: Of the mission.
-        links: Its radios.
+        picture: Model of the mission.
+        links: Links with the mission's radios.
     """
 
     def __init__(self, picture: MissionPicture, links: LinkBoard) -> None:
@@ -122,12 +122,12 @@ class MapBoard:
 
     # ------------------------------------------------------------------ messages in
     def take_plan(self, plan: FloorPlan) -> None:
-        """Take in the plan of the floor; the newest counts."""
+        """Record the plan of the floor; the newest plan is used."""
         self._told = plan
         self._lay_floor()
 
     def take_pose(self, pose: Pose) -> None:
-        """Take in where a body is believed to be; a message older than the last one changes nothing."""
+        """Record the estimated place of a body; a message older than the last one changes nothing."""
         track = self._tracks.get(pose.body)
         if track is not None and pose.at_s < track.now.at_s:
             return
@@ -139,21 +139,21 @@ class MapBoard:
         self._lay_floor()
 
     def take_types(self, types: Types) -> None:
-        """Take in the component types of the mission, which declare the robots' cameras."""
+        """Record the component types of the mission, which declare the robots' cameras."""
         self._types = {one.component_type.name: one.component_type for one in types.types}
 
     # ------------------------------------------------------------------ views out
     @property
     def floor(self) -> FloorPlan | None:
-        """The plan of the floor; None: no localizer told one, and no body has a place.
+        """The plan of the floor; None: no localizer sent one, and no body has a place.
 
-        Where no extent was told it holds every place so far. It is the same object until it changes.
+        Without a known extent, the floor covers all places so far. The object is the same until the plan changes.
         """
         return self._floor
 
     @property
     def names(self) -> list[str]:
-        """Every body that has a place, sorted."""
+        """All bodies with a place, sorted."""
         return sorted(self._tracks)
 
     def views(self, now_s: float) -> list[BodyView]:
@@ -166,7 +166,7 @@ class MapBoard:
         return [self._body(track, robots.get(name), owners, now_s) for name, track in sorted(self._tracks.items())]
 
     def where(self, body: str, at_s: float) -> Stand | None:
-        """Return where a body was at a time not long ago, by the pose nearest in time; None: it has no place."""
+        """Return a body's pose at a recent time (the pose nearest in time); None: no place is known."""
         track = self._tracks.get(body)
         if track is None:
             return None
@@ -176,7 +176,7 @@ class MapBoard:
     def pick(
         self, robot: str, column_px: float, row_px: float, size_px: tuple[int, int], at_s: float
     ) -> tuple[float, float]:
-        """Return the place on the floor that a point of a robot's picture shows: x and y in meters.
+        """Return the place on the floor at a point of a robot's picture: x and y in meters.
 
         Args:
             robot: The robot.
@@ -186,7 +186,7 @@ class MapBoard:
             at_s: Mission time of the picture.
 
         Raises:
-            NoFloorThere: The point shows no place on the floor of this room that can be told.
+            NoFloorThere: No place on the floor of this room can be determined for the point.
         """
         robots = self._picture.schedule.rcs if self._picture.schedule is not None else []
         camera = next((self._camera_of(rc) for rc in robots if rc.rc == robot), None)
@@ -204,7 +204,7 @@ class MapBoard:
 
     # ------------------------------------------------------------------ within
     def _lay_floor(self) -> None:
-        """Let the floor be as a localizer told it; where it told no extent, the floor holds every place so far."""
+        """Update the floor from the localizer's plan; without an extent, the floor covers all places so far."""
         told, (far_x_m, far_y_m) = self._told or FloorPlan(0.0, 0.0), self._far_m
         if told.width_m > 0.0 and told.depth_m > 0.0:
             self._floor = told
@@ -242,7 +242,7 @@ class MapBoard:
         return kind.abilities.camera if kind is not None else None
 
     def _gives_pictures(self, robot: RcView) -> bool:
-        """Return whether the ARC that holds the robot is of a kind whose owner gets pictures."""
+        """Return whether the owner of the ARC that holds the robot gets pictures."""
         at = [address(Subsystem.RESOURCE_POOL, holder.arc) for holder in robot.holders]
         arcs = [self._picture.components[arc] for arc in at if arc in self._picture.components]
         return any(arc.type in self._types and self._types[arc.type].abilities.gives_pictures for arc in arcs)

@@ -1,4 +1,4 @@
-"""Message views: how a message of a schema is shown. Pure.
+"""Message views: the presentation of messages by schema. Pure.
 
 A package names its views as entry points of the group ``scout_backbone.views``: tables of schema → class derived from
 ``MessageView``. A message of any other schema is shown as a table of its fields.
@@ -20,25 +20,25 @@ from backbone.printable_text import printable
 from backbone.spoken import counted
 
 GROUP = "scout_backbone.views"
-MOST_ROWS = 200  # chosen: several screens; a longer message is looked into by a view of its own
-MOST_ITEMS = 16  # chosen: a longer list is told by its length
-LONGEST_TEXT = 160  # chosen: a line of a wide terminal
+MOST_ROWS = 200  # chosen: several screens; a longer message needs its own view
+MOST_ITEMS = 16  # chosen: of a longer list only the length is shown
+LONGEST_TEXT = 160  # chosen: one line of a wide terminal
 UNREADABLE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
-"""What a view may raise at a message whose fields are not those that it expects."""
+"""Exceptions that a view may raise for a message with unexpected fields."""
 
 log = logging.getLogger(__name__)
 
 Fields = Mapping[str, object]
-"""Fields of a message by name, as a recording has them: numbers, texts, lists, mappings; bytes as base64."""
+"""Fields of a message by name, as in a recording: numbers, texts, lists, mappings; bytes as base64."""
 
 
 class FieldRow(msgspec.Struct, frozen=True):
-    """One row of a table.
+    """A row of a table.
 
     Attributes:
-        name: The field; within others ``outer.inner``, in a list ``outer.0``.
+        name: Name of the field; a nested one is ``outer.inner``, an item of a list ``outer.0``.
         text: Its value, for people.
-        number: Its value as a number, which can be plotted; None: it is none.
+        number: Its value as a number, for a plot; None: not a number.
     """
 
     name: str
@@ -66,17 +66,17 @@ class PixelPicture(msgspec.Struct, frozen=True):
 
 
 class MessageView:
-    """Shows each field of a message in a row. Derive from it to show the messages of a schema otherwise."""
+    """Shows each field of a message in a row. Derive from it for another presentation of a schema."""
 
     def rows(self, fields: Fields) -> Sequence[FieldRow]:
-        """Return the rows of the table; each with a number can be plotted.
+        """Return the rows of the table; rows with a number can be plotted.
 
-        When: for each message. Not: anything that takes long, or remembers.
+        When: for each message. Not: long computations, or state between messages.
         """
         return field_rows(fields)
 
     def picture(self, fields: Fields) -> PixelPicture | None:  # noqa: ARG002
-        """Return the picture in the message; None: it has none."""
+        """Return the picture in the message; None: no picture."""
         return None
 
 
@@ -84,11 +84,11 @@ class PictureView(MessageView):
     """Shows a message of ``width_px``, ``height_px`` and ``pixels`` as a picture, and its other fields as rows."""
 
     def rows(self, fields: Fields) -> Sequence[FieldRow]:
-        """Return all fields but the pixels."""
+        """Return all fields except the pixels."""
         return field_rows({name: value for name, value in fields.items() if name != "pixels"})
 
     def picture(self, fields: Fields) -> PixelPicture | None:
-        """Return the picture; None: it is not as large as it says."""
+        """Return the picture; None: the number of pixels does not match the stated size."""
         try:
             pixels = base64.b64decode(str(fields["pixels"]), validate=True)
         except binascii.Error:
@@ -105,7 +105,7 @@ VIEWS: Views = {"Frame/1": PictureView, "ViewPicture/1": PictureView}
 
 @cache
 def installed_views() -> Views:
-    """Return the views of the installed packages, by schema; one that cannot be loaded is left out."""
+    """Return the views of the installed packages, by schema; a view that cannot be loaded is left out."""
     found: dict[str, type[MessageView]] = {}
     for entry in entry_points(group=GROUP):
         try:
@@ -116,7 +116,7 @@ def installed_views() -> Views:
 
 
 def field_rows(body: object) -> list[FieldRow]:
-    """Return a row for each value within; at most ``MOST_ROWS``.
+    """Return a row for each value in a message; at most ``MOST_ROWS``.
 
     Example:
         >>> [(row.name, row.text, row.number) for row in field_rows({"at": {"x_m": 1.5}, "on": True, "rcs": ["radio"]})]
@@ -156,7 +156,7 @@ def _row(name: str, value: object) -> FieldRow:
 
 
 def _as_number(value: float) -> float | None:
-    """Return the number, of which a whole one may be too large to plot; None: it is."""
+    """Return the number as a float; None: the integer is too large to plot."""
     try:
         return float(value)
     except OverflowError:

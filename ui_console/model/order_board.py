@@ -1,4 +1,4 @@
-"""Order board: the orders of one operator, as a screen shows them. Pure."""
+"""Order board: the orders of one operator, for screens. Pure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from ui_console.model.events import OrderChanged
 from ui_console.model.order_view import OrderView
 from ui_console.model.orders import GivenOrder
 
-SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
+SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be mistaken for news
 
 
 class OrderBoard:
@@ -16,19 +16,19 @@ class OrderBoard:
         self._newest: dict[str, OrderChanged] = {}
 
     def take(self, changed: OrderChanged) -> None:
-        """Take a change in; an earlier order of the robot is forgotten, and its later end is no news."""
+        """Record a change; an earlier order of the robot is dropped, and its later end is ignored."""
         robot, given = changed.given.order.robot, changed.given
         known = self._newest.get(robot)
         if known is None or known.given.number <= given.number:
             self._newest[robot] = changed
 
     def of(self, robot: str) -> GivenOrder | None:
-        """Return the order of this robot that goes on; None: there is none."""
+        """Return the unfinished order of this robot; None: there is none."""
         known = self._newest.get(robot)
         return known.given if known is not None and not known.given.state.is_final else None
 
     def views(self, now_s: float) -> list[OrderView]:
-        """Return the orders that go on, and those that were over a moment ago, by robot."""
+        """Return the unfinished orders, and the orders that ended a moment ago, by robot."""
         return [
             OrderView(
                 robot=robot,

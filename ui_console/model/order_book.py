@@ -1,14 +1,14 @@
-"""Order book: what follows when an order is given, goes on, ends, or its operator touches the stick. Pure.
+"""Order book: decides the actions when an order is given, proceeds or ends, or the operator touches the stick. Pure.
 
 Laws:
 
-* A robot has at most one order that goes on; a newer one, a touch of the stick and the return of the robot end it.
+* A robot has at most one unfinished order. A newer order, a touch of the stick and the release of the robot end it.
 * A behavior is removed only when the stick has the robot, when the behavior of a newer order has it or waits for it
-  next, or when its operator wants it no more; so a robot is never free between stick and order.
-* Every behavior that was begun is removed, and removed once.
+next, or when the operator releases it. So a robot is never free between stick and order.
+* Every started behavior is removed exactly once.
 * Each order has at most one final state.
 
-Why a behavior that has finished stays until the stick has its robot: it holds the robot meanwhile.
+A finished behavior stays until the stick has its robot, because it holds the robot meanwhile.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Begin:
 
 @dataclass(frozen=True, slots=True)
 class Yield:
-    """Give the robot of this order from the stick to its behavior, which waits for it."""
+    """Hand the robot of this order from the stick over to the waiting behavior."""
 
     number: int
     order: Order
@@ -39,7 +39,7 @@ class Yield:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """Let the behavior of this order bring its robot to rest, and keep it."""
+    """Tell the behavior of this order to bring its robot to rest, and to keep it."""
 
     number: int
 
@@ -53,14 +53,14 @@ class EndBehavior:
 
 @dataclass(frozen=True, slots=True)
 class Take:
-    """Ask for this robot by the stick, which is higher than its order."""
+    """Claim this robot for the stick, which has a higher priority than the order."""
 
     robot: str
 
 
 @dataclass(frozen=True, slots=True)
 class ShowOrder:
-    """Show the order as it is now."""
+    """Show the present state of the order."""
 
     given: GivenOrder
 
@@ -69,10 +69,10 @@ Instruction = Begin | Yield | Rest | EndBehavior | Take | ShowOrder
 
 
 class OrderBook:
-    """The orders of one console; each method takes an event in and returns what to do now, in this order."""
+    """The orders of one console; each method handles an event and returns the actions, in order."""
 
     def __init__(self) -> None:
-        self._given: dict[int, GivenOrder] = {}  # those whose behavior is there, or is being started
+        self._given: dict[int, GivenOrder] = {}  # orders whose behavior runs or is being started
         self._removing: set[int] = set()
         self.last = 0
         """Number of the newest order; 0: none was given."""
@@ -80,49 +80,49 @@ class OrderBook:
     # ------------------------------------------------------------------ what is
     @property
     def orders(self) -> Mapping[str, GivenOrder]:
-        """Robot → its newest order whose behavior still has it; a final one keeps it for the operator."""
+        """Robot → its newest order whose behavior still has it; a finished one keeps it for the operator."""
         return {
             given.order.robot: given for number, given in sorted(self._given.items()) if number not in self._removing
         }
 
     @property
     def numbers(self) -> frozenset[int]:
-        """The orders whose behavior is there, or is being started, also those being removed."""
+        """The orders whose behavior runs, is being started or is being removed."""
         return frozenset(self._given)
 
     def get(self, number: int) -> GivenOrder | None:
-        """Return the order of this number; None: its behavior is gone, or it never was given."""
+        """Return the order with this number; None: its behavior is gone, or there was no such order."""
         return self._given.get(number)
 
     def goes_on(self, robot: str) -> bool:
-        """Return whether an order of this robot goes on."""
+        """Return whether this robot has an unfinished order."""
         given = self.orders.get(robot)
         return given is not None and not given.state.is_final
 
     # ------------------------------------------------------------------ events of the operator
     def give(self, order: Order) -> list[Instruction]:
-        """Take in a new order: the present one of its robot ends, and keeps the robot until the new one has it."""
+        """Handle a new order: the robot's present order ends, but keeps the robot until the new one has it."""
         self.last += 1
         before = self._finish_all(order.robot, BY_NEWER)
         self._given[self.last] = GivenOrder(order, self.last)
         return [*before, ShowOrder(self._given[self.last]), Begin(self.last)]
 
     def touched(self, robot: str) -> list[Instruction]:
-        """Take in that the operator wants this robot by the stick."""
+        """Handle the operator's wish to have this robot at the stick."""
         if robot not in self.orders:
             return []
         return [*self._finish_all(robot, BY_STICK), Take(robot)]
 
     def taken(self, robot: str) -> list[Instruction]:
-        """Take in that the stick has the robot: what has ended lets it go."""
+        """Handle the grant to the stick: ended orders release the robot."""
         return [self._remove(given.number) for given in self._of(robot) if given.state.is_final]
 
     def given_back(self, robot: str, why: str) -> list[Instruction]:
-        """Take in that the operator gives the robot back."""
+        """Handle the release of the robot by the operator."""
         return [*self._finish_all(robot, why, rests=False), *(self._remove(given.number) for given in self._of(robot))]
 
     def away(self, why: str) -> list[Instruction]:
-        """Take in that the operator is away: a robot goes back to the mission as soon as its order is over."""
+        """Handle the absence of the operator: a robot returns to the mission as soon as its order is over."""
         for number, given in self._given.items():
             self._given[number] = replace(given, order=replace(given.order, then_release=True))
         over = [robot for robot, given in self.orders.items() if given.state.is_final]
@@ -130,12 +130,12 @@ class OrderBook:
 
     # ------------------------------------------------------------------ events of the behaviors
     def based_on(self, number: int, by: str) -> list[Instruction]:
-        """Take in what the positions for this order come from."""
+        """Record the source of the positions for this order."""
         given = self._given.get(number)
         return [] if given is None or given.state.is_final else self._become(replace(given, by=by))
 
     def queued(self, number: int) -> list[Instruction]:
-        """Take in that the behavior of this order waits for its robot next: stick and earlier orders yield."""
+        """Handle that the behavior of this order is next in line for its robot: stick and earlier orders yield."""
         given = self._given.get(number)
         if given is None or given.state is not OrderState.STARTING:
             return []
@@ -146,7 +146,7 @@ class OrderBook:
         ]
 
     def runs(self, number: int) -> list[Instruction]:
-        """Take in that the behavior has the robot: earlier ones let it go."""
+        """Handle that the behavior has the robot: earlier orders release it."""
         given = self._given.get(number)
         if given is None or number in self._removing:
             return []
@@ -155,7 +155,7 @@ class OrderBook:
         return [*older, *(self._become(replace(given, state=OrderState.RUNNING, why="")) if is_new else [])]
 
     def waits(self, number: int, why: str) -> list[Instruction]:
-        """Take in that the behavior has no robot, or may not move it; a start that waits for the stick goes on."""
+        """Handle that the behavior has no robot, or may not move it; a start that waits for the stick continues."""
         given = self._given.get(number)
         if given is None or given.state.is_final or given.state is OrderState.STARTING:
             return []
@@ -163,12 +163,12 @@ class OrderBook:
         return self._become(now) if now != given else []
 
     def finished(self, number: int, *, is_done: bool, why: str, in_front: bool) -> list[Instruction]:
-        """Take in that the behavior has finished; it keeps the robot until it is removed.
+        """Handle that the behavior has finished; it keeps the robot until it is removed.
 
         Args:
             is_done: False: it failed.
-            why: What it told.
-            in_front: The operator's stick is at this robot: it takes the robot again, unless the order says otherwise.
+            why: Its report, for people.
+            in_front: True: the stick is at this robot, and takes it again unless the order forbids that.
         """
         given = self._given.get(number)
         if given is None or given.state.is_final:
@@ -177,18 +177,18 @@ class OrderBook:
         return [*final, *self._after(given, in_front=in_front)]
 
     def lost(self, number: int, why: str, *, in_front: bool) -> list[Instruction]:
-        """Take in that the behavior could not be started, or is gone."""
+        """Handle that the behavior could not be started, or is gone."""
         given = self._given.get(number)
         if given is None:
             return []
         was_final = given.state.is_final or number in self._removing
         final = [] if was_final else self._become(replace(given, state=OrderState.FAILED, why=why))
-        goes = [] if number in self._removing else [self._remove(number)]  # it may be gone only from sight
+        goes = [] if number in self._removing else [self._remove(number)]  # the behavior may only be unreachable
         takes = in_front and not was_final and not given.order.then_release
         return [*final, *([Take(given.order.robot)] if takes else []), *goes]
 
     def removed(self, number: int) -> None:
-        """Take in that the behavior is gone for good."""
+        """Handle that the behavior is gone for good."""
         self._removing.discard(number)
         self._given.pop(number, None)
 

@@ -1,4 +1,4 @@
-"""From an order to the behavior that carries it out: kind of ARC, localizer, path and parameters. Pure."""
+"""Determines the behavior that carries out an order: kind of ARC, localizer, path and parameters. Pure."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ui_console.model.profile import Sight
 
 LOCALIZER, SIMULATED_WORLD = "localizer", "simulated_world"
 FARTHEST_M = 1000.0  # chosen: the largest room
-EQUAL = 1  # chosen: the orders of a console are equals among each other
+EQUAL = 1  # chosen: all orders of a console have equal priority
 NEEDS_PLACES = frozenset({OrderKind.GO_TO, OrderKind.RETURN, OrderKind.FOLLOW})
 
 
 class NoLocalizer(Refusal):
-    """The mission has no component that knows where robots are."""
+    """The mission has no component that knows the places of robots."""
 
     code = "order.no_localizer"
     remedy = "Start a component of type localizer, as the mission file names it; or drive by the stick."
@@ -39,11 +39,11 @@ class CannotOrder(Refusal):
 
 @dataclass(frozen=True, slots=True)
 class FoundLocalizer:
-    """Who tells where robots are.
+    """A component that localizes robots.
 
     Attributes:
         address: Its address.
-        words: What positions come from, for people.
+        words: Source of the positions, for people.
     """
 
     address: str
@@ -54,10 +54,10 @@ def localizer_of(components: Sequence[ComponentState]) -> FoundLocalizer:
     """Return the mission's localizer, else its simulated world.
 
     Args:
-        components: Components of the mission that are there.
+        components: Running components of the mission.
 
     Raises:
-        NoLocalizer: It has neither.
+        NoLocalizer: The mission has neither.
     """
     for kind in (LOCALIZER, SIMULATED_WORLD):
         found = sorted(one.address for one in components if one.type == kind)
@@ -69,11 +69,11 @@ def localizer_of(components: Sequence[ComponentState]) -> FoundLocalizer:
 
 
 def kind_for(order: Order, types: Sequence[ComponentType], resources: Collection[Resource]) -> str:
-    """Return the kind of ARC that the order's behavior claims: one with pictures to watch, else one that drives.
+    """Return the kind of ARC that the order's behavior claims: for watching, one with pictures; else one that drives.
 
     Raises:
-        CannotOrder: No robot is named, it cannot with this hardware, the place is none, or the mission knows no such
-            behavior.
+        CannotOrder: No robot is named, its hardware does not suffice, the place is not valid, or the mission has no
+            such behavior.
         NoArcKind: No robot has this name.
     """
     if not order.robot:
@@ -85,7 +85,7 @@ def kind_for(order: Order, types: Sequence[ComponentType], resources: Collection
         place = f"{order.x_m:g}, {order.y_m:g}"
         raise CannotOrder(f"{place} is no place in a room", remedy=f"Give meters, at most {FARTHEST_M:g}.")
     watches = order.kind is OrderKind.WATCH
-    arc_kind(order.robot, Sight.NOTHING, types, resources)  # a wrong name is refused by its own sentence
+    arc_kind(order.robot, Sight.NOTHING, types, resources)  # a wrong name has its own refusal
     able = [
         one
         for one in types
@@ -120,17 +120,17 @@ def start_of(
     priority: int,
     runtime_s: float,
 ) -> Start:
-    """Return what starts the behavior of an order.
+    """Return the launch of an order's behavior.
 
-    Its path is the console's own with one node more: the stick goes before it, it goes before whatever the console's
-    priority outranks, and the orders of a console are equals, which have what they share in turns.
+    Its path is the console's path with one more node. So the stick has priority over the order, the order has priority
+    over everything below the console, and the orders of a console are equal and share resources in turns.
 
     Args:
         number: Of the order.
         kind: Of the ARC.
-        localizer: Who tells where robots are; None: the order needs none.
+        localizer: The localizer; None: the order needs none.
         console: Address of the console.
-        priority: Of the console, among the consoles and the mission.
+        priority: Priority of the console, among the consoles and the mission.
         runtime_s: Shortest useful time, seconds.
     """
     name = behavior_of(component_of(console), number)

@@ -1,4 +1,4 @@
-"""Places of the orders of a group: together on the floor. Pure."""
+"""Goals of the orders of a group, kept on the floor. Pure."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import replace
 from resource_pool.arc_client import FloorPlan
 from ui_console.model.orders import Order, OrderKind
 
-EDGE_M = 0.3  # chosen: a place beside a wall for a robot of 45 cm
+EDGE_M = 0.3  # chosen: distance from a wall for a robot of 45 cm
 
 
 def inside(orders: Sequence[Order], floor: FloorPlan | None) -> list[Order]:
-    """Return the orders of a group with their places moved together, as far as needed, so that none is off the floor.
+    """Return the orders of a group with their goals shifted together, so that no goal is off the floor.
 
-    A group that is wider than the floor begins at its edge. A robot that goes alone goes to the place as it was tapped.
+    A group that is wider than the floor begins at the floor's edge. A single robot goes exactly to the tapped place.
 
     Example:
         >>> wide = [Order(OrderKind.GO_TO, "scout1", -0.25, 1.0), Order(OrderKind.GO_TO, "scout2", 0.25, 1.0)]

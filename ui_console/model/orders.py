@@ -1,8 +1,8 @@
-"""Orders: what an operator tells a robot to do by itself. Pure.
+"""Orders: tasks that a robot carries out by itself for an operator. Pure.
 
-An order is a behavior that the console starts for one robot with the operator's priority. The robot carries it out
-until it is done, until the operator touches the stick or gives another order, or until the operator gives it back.
-``OrderBook`` decides what follows from each of these.
+An order is a behavior that the console starts for one robot with the operator's priority. It runs until it is done,
+until the operator touches the stick or gives another order, or until the operator releases the robot. ``OrderBook``
+decides the reactions to these events.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from enum import StrEnum
 
 
 class OrderKind(StrEnum):
-    """What a robot can be told to do; the value is the type of the behavior that does it."""
+    """Kinds of orders; the value is the type of the behavior that carries the order out."""
 
     GO_TO = "go_to"  # drive to a place
-    WATCH = "watch_for_motion"  # watch from where it stands
-    RETURN = "return_home"  # drive to the place where it stood when the mission began
-    FOLLOW = "follow"  # drive after another robot or body
+    WATCH = "watch_for_motion"  # watch from its present place
+    RETURN = "return_home"  # drive to its place at the begin of the mission
+    FOLLOW = "follow"  # follow another robot or body
 
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One order for one robot.
+    """An order for one robot.
 
     Attributes:
         robot: Name of the robot; empty: the one at the operator's stick.
-        x_m: Of the place to go to, in the room's frame; ``GO_TO`` only.
+        x_m: Goal in the room's frame; ``GO_TO`` only.
         y_m: Same.
         target: Name of the body to follow; ``FOLLOW`` only.
         then_release: The robot is given back when the order is done or failed; False: the operator has it again.
@@ -62,28 +62,28 @@ class Order:
 class OrderState(StrEnum):
     """State of an order; done, failed and ended are final."""
 
-    STARTING = "starting"  # its behavior starts; until it is ready the robot stays with the stick
+    STARTING = "starting"  # its behavior is starting; the stick keeps the robot until the behavior is ready
     RUNNING = "running"  # the robot carries it out
-    WAITING = "waiting"  # the robot is stopped, or a higher ARC has it
+    WAITING = "waiting"  # the robot is stopped, or an ARC of higher priority has it
     DONE = "done"  # its behavior has finished
     FAILED = "failed"  # its behavior cannot reach its aim, was refused, or is gone
     ENDED = "ended"  # the operator touched the stick, gave another order, or gave the robot back
 
     @property
     def is_final(self) -> bool:
-        """True if nothing more comes of the order."""
+        """True if the state is final."""
         return self in (OrderState.DONE, OrderState.FAILED, OrderState.ENDED)
 
 
 @dataclass(frozen=True, slots=True)
 class GivenOrder:
-    """An order that was given, as it is now.
+    """A given order and its present state.
 
     Attributes:
-        number: Of the order, from 1, unique at its console.
+        number: Number of the order, from 1, unique at its console.
         state: Its state.
-        why: Why it waits, failed or ended; of an order that is done what its behavior told; may be empty.
-        by: What the robot's position comes from, for people; empty: the order needs none, or it is not known yet.
+        why: Why it waits, failed or ended; for a done order, the report of its behavior; may be empty.
+        by: Source of the robot's position, for people; empty: not needed, or not known yet.
     """
 
     order: Order
@@ -106,11 +106,11 @@ class GivenOrder:
         return f"{self.order.robot}: {self.order.sentence} ({'; '.join(remarks)})"
 
 
-APART_M = 0.5  # chosen: robots of 11 cm pass each other, and one of 45 cm has a place of its own
+APART_M = 0.5  # chosen: robots of 11 cm can pass each other, and a robot of 45 cm has room
 
 
 def group(order: Order, robots: Sequence[str]) -> list[Order]:
-    """Return the order for each of these robots; places to go to lie side by side, ``APART_M`` from each other.
+    """Return the order for each of these robots; goals are side by side, ``APART_M`` from each other.
 
     Example:
         >>> [(each.robot, each.x_m) for each in group(Order(OrderKind.GO_TO, "", 2.0, 1.0), ["scout1", "scout2"])]

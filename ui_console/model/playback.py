@@ -1,4 +1,4 @@
-"""What a page shows of the playing of a recording."""
+"""State of the playback of a recording, for pages."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import msgspec
 
 
 class PlaybackView(msgspec.Struct, frozen=True):
-    """How far a recording was played.
+    """Position and state of the playback.
 
     Attributes:
         begin_s: Mission time of its first message.
-        end_s: Of its last.
-        at_s: The mission time that is shown.
-        is_playing: False: it stands still.
+        end_s: Mission time of its last message.
+        at_s: Shown mission time.
+        is_playing: False: paused.
         speed: Mission seconds per second of the machine while it plays.
     """
 

@@ -1,6 +1,7 @@
-"""How a console looks, and what its operator is to see of the robot.
+"""Appearance of a console, and the pictures that its operator needs.
 
-Rule of this file: no imports but the standard library's; the command line reads it before it knows the command.
+Rule of this file: imports only from the standard library, because the command line reads this file before it knows the
+command.
 """
 
 from __future__ import annotations
@@ -9,17 +10,17 @@ from enum import StrEnum
 
 
 class Profile(StrEnum):
-    """How a console looks."""
+    """Appearance of a console."""
 
     TERMINAL = "terminal"  # picture, tables, keys
-    PENDANT = "pendant"  # keys for one hand and the state of one robot; the picture is on a video monitor
+    PENDANT = "pendant"  # one-handed keys and the state of one robot; the picture is on a video monitor
     MONITOR = "monitor"  # tables only; drives nothing
-    HEADLESS = "headless"  # no screen: a gamepad drives one robot, and what changes is printed in lines
+    HEADLESS = "headless"  # no screen: a gamepad drives one robot, and changes are printed as lines
 
 
 class Sight(StrEnum):
-    """What the operator is to see of the robot."""
+    """Pictures that the operator needs of the robot."""
 
     PICTURES = "pictures"  # pictures come to this machine
-    BROADCAST = "broadcast"  # the robot transmits to a video monitor; a framegrabber is left to others
-    NOTHING = "nothing"  # no picture, so the robot waits for none to settle, and leaves the frequency to others
+    BROADCAST = "broadcast"  # the robot transmits to a video monitor; framegrabbers stay free for others
+    NOTHING = "nothing"  # no picture, so the grant needs no settling, and the frequency stays free for others

@@ -29,9 +29,9 @@ class RobotBoard:
     """State of the robots, from messages.
 
     Args:
-        picture: Of the mission.
+        picture: Model of the mission.
         alarms: Book of the alarms for stops.
-        links: The RCs that are missing.
+        links: Knows the missing RCs.
         lift_remedy: Remedy for a stop, for an operator of this console.
     """
 
@@ -44,7 +44,7 @@ class RobotBoard:
 
     # ------------------------------------------------------------------ messages in
     def take_schedule(self, schedule: Schedule) -> None:
-        """Take in the holders: a new hold counts as renewed when it began."""
+        """Record the holders: a new hold counts as renewed when it began."""
         self._renewed = {
             (rc.rc, holder.arc, holder.epoch): self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
             for rc in schedule.rcs
@@ -52,12 +52,12 @@ class RobotBoard:
         }
 
     def take_leases(self, leases: Leases, at_s: float) -> None:
-        """Take in the holds that were renewed."""
+        """Record the holds that were renewed."""
         for lease in leases.leases:
             self._renewed[lease.rc, lease.arc, lease.epoch] = at_s
 
     def take_stop(self, stop: StopState, at_s: float) -> None:
-        """Take in that a robot was stopped, or may move again; a message older than the last one changes nothing."""
+        """Record that a robot was stopped, or may move again; a message older than the last one changes nothing."""
         former = self._stops.get(stop.rc)
         if former is not None and (former.number, not former.is_stopped) > (stop.number, not stop.is_stopped):
             return
@@ -70,7 +70,7 @@ class RobotBoard:
             self._alarms.retract(AlarmKind.STOPPED, stop.rc)  # the log names who lifted it; nothing is left to do
 
     def take_readings(self, readings: Readings, at_s: float) -> None:
-        """Take in what a robot reports; a low battery is an alarm until it is charged or silent."""
+        """Record a robot's readings; a low battery raises an alarm until it is charged or the robot is silent."""
         known = self._readings.get(readings.rc)
         if readings.at_s < 0 or (known is not None and known.at_s > readings.at_s):
             return
@@ -81,7 +81,7 @@ class RobotBoard:
         self._alarms.hold(is_low, AlarmKind.BATTERY, readings.rc, line, at_s, "Bring it back while it can drive.")
 
     def take_types(self, types: Types) -> None:
-        """Take in what the robots of each type declare to report."""
+        """Record the report fields that each type of robot declares."""
         kinds = (one.component_type for one in types.types)
         self._reports = {kind.name: kind.abilities.reports for kind in kinds if kind.abilities.reports}
 
@@ -101,17 +101,17 @@ class RobotBoard:
         return sorted(in_schedule | {component_of(one.address) for one in there if one.is_robot})
 
     def stop_of(self, robot: str) -> StopState | None:
-        """Return the operator's stop in force on the robot."""
+        """Return the stop in force on the robot."""
         stop = self._stops.get(robot)
         return stop if stop is not None and stop.is_stopped else None
 
     def stop_view(self, robot: str, now_s: float, user: str = "", console: str = "") -> StopView | None:
-        """Return the same for a screen.
+        """Return the stop in force on the robot, as a view.
 
         Args:
             robot: The robot.
             now_s: Mission time.
-            user: The person who looks at it; empty: no particular person.
+            user: The person at the screen; empty: no particular person.
             console: Address of that person's console.
         """
         stop = self.stop_of(robot)
@@ -165,7 +165,7 @@ class RobotBoard:
         )
 
     def _is_there(self, author: Stopper) -> bool:
-        """Return whether the author of a stop is there; True as long as no message names the operators there."""
+        """Return whether the author of a stop is present; True until a message names the present operators."""
         there = self._picture.components
         at = {author.console, *(screen.address for screen in screens_of(author.by, there.values()))} & there.keys()
         return any(there[one].state not in LEAVING for one in at) or not there

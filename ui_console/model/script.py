@@ -1,12 +1,12 @@
-"""Driving by a script: one JSON object a line, each with the time since the grant from which it applies.
+"""Driving by a script: one JSON object per line; its time since the grant says when it takes effect.
 
 ``{"at_s": 0.5, "forward_m_s": 0.1, "turn_rad_s": 1}`` moves until the next line, and so does ``{"at_s": 0.7,
 "left_rad_s": 4, "right_rad_s": 4}`` by two wheels. ``{"at_s": 1, "halt": true}`` stops, ``{"at_s": 2, "give": "shine",
 "values": {"brightness": 0.5}, "role": ""}`` gives any command of the ARC, ``"jump": true`` is short for one.
-``{"at_s": 3, "order": "go_to", "x_m": 2, "y_m": 1, "until_done": true}`` tells the robot to do something by itself;
-with ``until_done`` the next line waits until the order is over. ``{"at_s": 3, "release": true}`` gives the robot back;
-the end of the script releases too. ``{"stop_robot": "scout2", "reason": "a child"}`` and ``{"stop_all": true}`` are
-emergency stops; without ``at_s`` they count as soon as they are read from a pipe, also before the grant.
+``{"at_s": 3, "order": "go_to", "x_m": 2, "y_m": 1, "until_done": true}`` gives the robot an order; with ``until_done``
+the next line waits until the order is over. ``{"at_s": 3, "release": true}`` gives the robot back; the end of the
+script releases too. ``{"stop_robot": "scout2", "reason": "a child"}`` and ``{"stop_all": true}`` are emergency stops;
+without ``at_s`` they take effect as soon as they are read from a pipe, even before the grant.
 
 Rules of this file: no bus, no clock, no files. Times are mission seconds since the grant.
 """
@@ -77,12 +77,12 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One line of a script: the wish from this time since the grant on.
+    """A line of a script: a command, and the time since the grant at which it takes effect.
 
     Attributes:
-        at_s: That time.
+        at_s: Time since the grant.
         wish: The command.
-        at_once: True: if it comes from a pipe, it applies now.
+        at_once: True: read from a pipe, it takes effect immediately.
     """
 
     at_s: float
@@ -97,10 +97,10 @@ class ScriptReader:
         self._number, self._last_s, self._released = 0, 0.0, False
 
     def read(self, text: str) -> Step | None:
-        """Return the step of the next line, None for an empty one.
+        """Return the step of the next line; None for an empty line.
 
         Raises:
-            WrongScript: A line is not valid; with its number and its fault.
+            WrongScript: The line is not valid; the error has its number and fault.
         """
         self._number += 1
         if not text.strip():
@@ -178,7 +178,7 @@ def read_script(text: str) -> list[Step]:
     """Return all steps of a script.
 
     Raises:
-        WrongScript: For the first wrong line.
+        WrongScript: A line is not valid; the first such line is reported.
 
     Example:
         >>> read_script('{"at_s": 0, "halt": true}')
@@ -191,14 +191,14 @@ def read_script(text: str) -> list[Step]:
 class ScriptPlayer:
     """Turns steps and time into commands.
 
-    Laws: no command before its time; a motion is repeated until the next line, as commands end by
-    themselves at the robot; nothing after ``GiveBack``, which comes exactly once; after ``require_let_go`` no command
-    that moves the robot before a halt: in a script this line stands for letting go of a control; no command between an
-    order that the script waits for and ``order_over``.
+    Laws: no command is due before its time. A motion is repeated until the next line, because commands expire at the
+    robot. ``GiveBack`` comes exactly once and last. After ``require_let_go`` no command that moves the robot is due
+    before a halt; in a script, a halt stands for the release of a control. No command is due between an order for which
+    the script waits and ``order_over``.
 
     Args:
-        steps: The whole script; None: they are added.
-        moves: Returns whether a command by its word moves the robot; None: each does.
+        steps: The whole script; None: steps are added later.
+        moves: Returns whether the command with this word moves the robot; None: all commands do.
     """
 
     def __init__(self, steps: list[Step] | None = None, moves: Callable[[str], bool] | None = None) -> None:
@@ -209,14 +209,14 @@ class ScriptPlayer:
         self._next_s = 0.0
         self._over = self.must_let_go = self._waits = False
         self.held_back = 0
-        """How many lines were left out because no halt came before them."""
+        """Number of lines skipped because no halt preceded them."""
 
     def require_let_go(self) -> None:
         """Ignore commands that move the robot until a line halts."""
         self._drive, self.must_let_go = None, True
 
     def order_over(self) -> None:
-        """Go on: the order that the script waits for is over."""
+        """Continue, because the order for which the script waits is over."""
         self._waits = False
 
     @property
@@ -226,7 +226,7 @@ class ScriptPlayer:
 
     @property
     def is_over(self) -> bool:
-        """True when the robot is to be given back or was."""
+        """True when the robot must be or was given back."""
         return self._over
 
     def add(self, step: Step) -> None:
@@ -234,11 +234,11 @@ class ScriptPlayer:
         self._steps.append(step)
 
     def end(self) -> None:
-        """Note that no step will follow."""
+        """Record that no step will follow."""
         self._ended = True
 
     def due(self, since_grant_s: float) -> list[Wish]:
-        """Return the commands to send now, in order; a command returned counts as sent.
+        """Return the commands to send now, in order; returned commands count as sent.
 
         Args:
             since_grant_s: Mission seconds since the grant.

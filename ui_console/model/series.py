@@ -1,26 +1,26 @@
-"""Series: a number over time, as a plot of any width shows it. Pure."""
+"""Series: a number over time, for plots of any width. Pure."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-SPAN_S = 60.0  # chosen: as much as the timeline of the resources
+SPAN_S = 60.0  # chosen: as for the timeline of the resources
 PARTS = 240  # chosen: two for each column of a wide terminal
 
 
 class Extent(NamedTuple):
-    """The numbers of a part of time."""
+    """Smallest and largest number in a time slot."""
 
     least: float
     most: float
 
 
 class Series:
-    """The least and most numbers in each part of the last minute, however many came.
+    """Smallest and largest numbers in each slot of the last minute; bounded memory for any number of values.
 
     Args:
-        span_s: How much of the past is kept, mission seconds.
+        span_s: Length of the kept past, mission seconds.
     """
 
     def __init__(self, span_s: float = SPAN_S) -> None:
@@ -29,13 +29,13 @@ class Series:
         self._parts: dict[int, Extent] = {}
         self._last = -math.inf
         self.newest: float | None = None
-        """The last number; None: there was none."""
+        """The last number; None: no number yet."""
 
     def __len__(self) -> int:
         return len(self._parts)
 
     def add(self, at_s: float, number: float) -> None:
-        """Take in a number; one that is not finite, or older than the span, is left out."""
+        """Record a number; a number that is not finite, or older than the span, is ignored."""
         if not (math.isfinite(number) and math.isfinite(at_s)):
             return
         part = math.floor(at_s / self._part_s)
@@ -49,7 +49,7 @@ class Series:
                 del self._parts[old]
 
     def columns(self, now_s: float, count: int) -> list[Extent | None]:
-        """Return the extents in so many equal parts of the span that ends now, oldest first; None: no number came."""
+        """Return the extents of this many equal parts of the span until now, oldest first; None: an empty part."""
         found: list[Extent | None] = [None] * count
         now = math.floor(now_s / self._part_s)
         for part, extent in self._parts.items():
@@ -60,9 +60,9 @@ class Series:
         return found
 
     def levels(self, now_s: float, count: int) -> list[float]:
-        """Return a number for each column: its most, or the one before where none came; none before the first.
+        """Return a number for each column: its largest, or the previous one for an empty column; None at the begin.
 
-        A number holds until the next one comes, so a line through these is what was known at each time.
+        A number holds until the next one arrives, so a line through these shows the known value at each time.
         """
         shown: list[float] = []
         for extent in self.columns(now_s, count):
@@ -73,6 +73,6 @@ class Series:
         return shown
 
     def extent(self, now_s: float) -> Extent | None:
-        """Return the least and most numbers of the span; None: no number came."""
+        """Return the smallest and largest numbers of the span; None: no number."""
         there = [one for one in self.columns(now_s, PARTS) if one is not None]
         return Extent(min(one.least for one in there), max(one.most for one in there)) if there else None

@@ -1,4 +1,4 @@
-"""The state of a console that has no screen, in lines of text.
+"""The state of a console without a screen, as lines of text.
 
 Rules of this file: a view in, lines out.
 """
@@ -15,7 +15,7 @@ NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 def state_lines(view: ConsoleView) -> Iterator[str]:
-    """Yield what the operator should know now, the hold of the robot first."""
+    """Yield the lines for the operator, the hold of the robot first."""
     own = view.own
     yield own.status
     if own.link_down_s >= 0:
@@ -38,7 +38,7 @@ def state_lines(view: ConsoleView) -> Iterator[str]:
 
 
 def news(before: Sequence[str], now: Sequence[str]) -> list[str]:
-    """Return the lines that say something new; a line of which only a number changed does not.
+    """Return the new lines; a line in which only a number changed is not new.
 
     Example:
         >>> news(["waiting: starts in 4.2 s"], ["waiting: starts in 3.9 s", "let go, then press anew"])

@@ -50,12 +50,12 @@ from ui_console.model.timeline import Timeline, TimelineView
 from ui_console.model.tree_board import TreeBoard
 from ui_console.model.views import LEAVING, AlarmKind, AlarmView, HealthView, NodeView, ParameterView, Severity
 
-STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
-PAST_S, NEXT_S = 60.0, 30.0  # chosen: as far as a person remembers, and as far as the schedule predicts
+STARVING_S = 30.0  # chosen: several turns, if turns take seconds
+PAST_S, NEXT_S = 60.0, 30.0  # chosen: a person's memory, and the range of the schedule's prediction
 
 
 class TeamModel:
-    """The knowledge of a console about the mission.
+    """The state of the mission as known to a console.
 
     Args:
         mission: Its name.
@@ -64,7 +64,7 @@ class TeamModel:
 
     def __init__(self, mission: str = "", lift_remedy: str = "Lift the stop when the robot may move.") -> None:
         self.picture = MissionPicture(mission)
-        """The mission as every observer sees it."""
+        """The model of the mission that all observers share."""
         self.alarms = AlarmBook()
         self.people = self.picture.people
         """The person at each console."""
@@ -90,7 +90,7 @@ class TeamModel:
 
     # ------------------------------------------------------------------ events in
     def apply(self, event: TeamEvent) -> None:
-        """Take the event in."""
+        """Apply the event."""
         if isinstance(event, LinkHeard):
             self.links.take_link(event)
         else:
@@ -142,7 +142,7 @@ class TeamModel:
             case FloorPlan():
                 self.map.take_plan(said)
             case Why() | Suspended():
-                """A question for one console, which keeps it."""
+                """Type of an event for one console only."""
             case _:
                 assert_never(said)
 
@@ -163,7 +163,7 @@ class TeamModel:
 
     # ------------------------------------------------------------------ views out
     def person(self, console_name: str) -> str:
-        """Return the name of the person at a console, also of one that has left; any other name stays as it is.
+        """Return the name of the person at a console, even if the console has left; return any other name unchanged.
 
         Args:
             console_name: Name or address of a console, or of its ARC.
@@ -171,7 +171,7 @@ class TeamModel:
         return self.people.person(console_name)
 
     def screens_of(self, user: str) -> list[ComponentState]:
-        """Return the consoles at which this person sits now."""
+        """Return the consoles that this person uses now."""
         return screens_of(user, self.picture.components.values())
 
     def tree(self) -> list[NodeView]:
@@ -179,12 +179,12 @@ class TeamModel:
         return self._tree.views(self._shown(), {at: since_s for at, (since_s, _) in self._lost.items()}, self.schedule)
 
     def requests(self) -> list[RequestView]:
-        """Return the requests by the names of people, running ones first, then by predicted start."""
+        """Return the requests with people's names, running ones first, then by predicted start."""
         rows = [self._request_row(request) for request in (self.schedule.requests if self.schedule else [])]
         return sorted(rows, key=_request_order)
 
     def timeline(self, now_s: float) -> TimelineView:
-        """Return who had which resource in the past seconds, who has it, and who gets it in the next."""
+        """Return the past, present and predicted holders of each resource."""
         return self._timeline.view(now_s, PAST_S, NEXT_S)
 
     def health(self, now_s: float) -> HealthView | None:
@@ -192,15 +192,15 @@ class TeamModel:
         return self._health.view(now_s)
 
     def parameters(self) -> list[ParameterView]:
-        """Return the parameters of the components that answered with theirs, by component and name."""
+        """Return the known parameters of components, by component and name."""
         return [view for _, view in sorted(self._parameters.items())]
 
     def components(self) -> list[ComponentState]:
-        """Return the components that are there, by address; their feedback names people."""
+        """Return the running components, by address; their feedback names people."""
         return [replace(component, feedback=self.people.doing(component)) for component in self._shown()]
 
     def component(self, name: str) -> ComponentState | None:
-        """Return the component of this name, if it is there."""
+        """Return the component of this name, if it runs."""
         return next((one for one in self._shown() if component_of(one.address) == name), None)
 
     def log(
@@ -209,8 +209,8 @@ class TeamModel:
         """Return the newest events, oldest first.
 
         Args:
-            count: At most so many.
-            asked: Only events that match; None: all.
+            count: Largest number of events.
+            asked: Search; None: all events.
             found: Matching events of the launcher's log; newer events of this console follow them.
         """
         log = self.picture.log
@@ -223,7 +223,7 @@ class TeamModel:
         return [*known, *news][-count:] if count else []
 
     def alarm_views(self, *own: AlarmBook) -> list[AlarmView]:
-        """Return the alarms of the mission and of these books: one line for one cause, by the names of people."""
+        """Return the alarms of the mission and of these books: one line for each cause, with people's names."""
         views = [view for book in (self.alarms, *own) for view in book.views()]
         return [self._located(view) for view in one_line_for_one_cause(views, self._explained_by)]
 
@@ -238,7 +238,7 @@ class TeamModel:
         for arc in before - now:
             self.alarms.end(AlarmKind.STARVING, arc, schedule.at_s)
         for rc in schedule.rcs:
-            is_down = rc.state == "down" and rc.rc not in self._left  # an RC that was stopped is not missed
+            is_down = rc.state == "down" and rc.rc not in self._left  # an RC that was stopped by request is not missing
             self.alarms.hold(is_down, AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
         self.robots.take_schedule(schedule)
 
@@ -254,7 +254,7 @@ class TeamModel:
 
     # ------------------------------------------------------------------ components
     def _shown(self) -> list[ComponentState]:
-        """Return the components that are there, and the lost behaviors, whose place is kept until they are back."""
+        """Return the running components, and the lost behaviors, whose place is kept until they are back."""
         behaviors = {at: one for at, (_, one) in self._lost.items() if _is_in(Subsystem.MISSION_CONTROL, at)}
         return [one for _, one in sorted({**behaviors, **self.picture.components}.items())]
 
@@ -270,7 +270,7 @@ class TeamModel:
         if component.state is LifeState.STOPPED:
             self._lost.pop(address, None)
             if known is None:
-                self.alarms.retract(AlarmKind.LOST, name)  # its last state came after the message of its loss
+                self.alarms.retract(AlarmKind.LOST, name)  # its last state arrived after the message of its loss
             return
         if component.state is LifeState.FAILED:
             self.alarms.happened(AlarmKind.LOST, name, f"{name} failed: {component.feedback}", at_s)
@@ -296,8 +296,8 @@ class TeamModel:
         is_arc = name in self._arcs
         self._arcs.discard(name)
         if is_arc and is_console(component.requester):
-            return  # it ends with its console, which has an alarm of its own
-        if is_arc or is_console(address):  # no component restarts these, and nothing is left to be mended
+            return  # it ends with its console, which has its own alarm
+        if is_arc or is_console(address):  # no component restarts these, and no action is left
             who = f"the console of {component.user}" if component.user else name
             line = f"{who} is lost: it ended without a word"
             self.alarms.happened(AlarmKind.LOST, name, line, at_s, severity=Severity.NOTICE)
@@ -307,7 +307,7 @@ class TeamModel:
         self.alarms.begin(AlarmKind.LOST, name, line, at_s)
 
     def _forget(self, name: str) -> None:
-        """Forget a component that left for good: consoles and their ARCs come and go all day."""
+        """Remove a component that left for good, because consoles and their ARCs come and go all day."""
         self._arcs.discard(name)
         self._needs.forget(name)
         self._tree.forget(name)
@@ -344,7 +344,7 @@ class TeamModel:
 
     # ------------------------------------------------------------------ changes of parameters
     def _take_change(self, change: SetParameter, address: str, at_s: float) -> None:
-        """Note the author of a change of a parameter; its new value comes right after, at the same time."""
+        """Record the author of a parameter's change; the new value arrives right afterwards, with the same time."""
         key = (component_of(address), change.name)
         before = self._parameters[key].value if key in self._parameters else ""
         self._parameters[key] = ParameterView(key[0], address, change.name, "", before, change.user, at_s)

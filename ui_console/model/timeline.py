@@ -4,7 +4,7 @@ Rules of this file: no bus, no clock, no screen. Schedules go in, in the order o
 *now* is an argument.
 
 * Turns of a resource with one holder at a time never overlap, in any order of the messages.
-* A turn stays for ``HISTORY_S`` after its end, then it is forgotten.
+* A turn is kept for ``HISTORY_S`` after its end.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from backbone.mission_log.people import is_console
 from backbone.naming import component_of
 from backbone.scheduling.views import RcView, RequestView, Schedule
 
-HISTORY_S = 180.0  # chosen: several rounds of a mission whose turns are seconds
-TURNS_KEPT = 400  # chosen: bounds the memory of a resource that changes hands twice a second
+HISTORY_S = 180.0  # chosen: several rounds, if turns take seconds
+TURNS_KEPT = 400  # chosen: bounds the memory for a resource that changes its holder twice a second
 
 
 class Certainty(StrEnum):
-    """Which part of the timeline a slice is in."""
+    """Part of the timeline in which a slice lies."""
 
     PAST = "past"
     NOW = "now"
@@ -39,11 +39,11 @@ class SliceView(msgspec.Struct, frozen=True):
     Attributes:
         who: Decision process.
         arc: Its ARC.
-        epoch: Of the grant; 0 for one that is predicted.
+        epoch: Epoch of the grant; 0 for a predicted turn.
         from_s: Begin.
-        to_s: End; of a running one the end of its slice, of a predicted one its shortest.
+        to_s: End; for a running turn, the end of its slice; for a predicted one, the earliest end.
         certainty: Past, now or next.
-        is_console: True if it is a console's.
+        is_console: True if the owner is a console.
     """
 
     who: str
@@ -56,7 +56,7 @@ class SliceView(msgspec.Struct, frozen=True):
 
 
 class TimelineRow(msgspec.Struct, frozen=True):
-    """One resource over time; slices by their begin."""
+    """A resource over time; slices in the order of their begin."""
 
     rc: str
     kind: str
@@ -87,7 +87,7 @@ class Timeline:
     """The turns of every resource.
 
     Args:
-        person: Returns the name of the person at a console, which may become known later than the console's hold.
+        person: Returns the name of the person at a console; the name may become known later than the console's hold.
     """
 
     def __init__(self, person: Callable[[str], str] = component_of) -> None:
@@ -96,7 +96,7 @@ class Timeline:
         self._at_s = 0.0
 
     def heard(self, schedule: Schedule) -> None:
-        """Take in a schedule; a schedule older than the last one changes nothing."""
+        """Record a schedule; a schedule older than the last one changes nothing."""
         if schedule.at_s < self._at_s:
             return
         self._at_s = schedule.at_s
@@ -156,7 +156,7 @@ def _update(row: _Row, rc: RcView, requests: dict[str, RequestView], at_s: float
 def _begun(
     row: _Row, rc: RcView, key: tuple[str, int], since_s: float, requests: dict[str, RequestView], at_s: float
 ) -> SliceView:
-    """Return a new turn; it began neither before the last one ended nor after the schedule that has it."""
+    """Return a new turn; its begin is not before the end of the last one, and not after the schedule's time."""
     arc, epoch = key
     earliest_s = 0.0 if rc.sharable else row.free_since_s
     from_s = min(max(since_s, earliest_s), max(at_s, earliest_s))

@@ -1,4 +1,4 @@
-"""The behavior tree as a console's table shows it.
+"""The behavior tree, for a console's table.
 
 Rules of this file: no bus, no clock, no screen. The board remembers the nodes' priorities from schedules and their ends
 from stories; the nodes that exist, and the lost ones, are arguments of a view.
@@ -39,21 +39,21 @@ class TreeBoard:
         self._priorities: dict[str, int] = {}
 
     def scheduled(self, schedule: Schedule) -> None:
-        """Take in the priorities of all nodes with a request."""
+        """Record the priorities of all nodes with a request."""
         self._priorities |= _priorities(schedule.requests)
 
     def told(self, story: StoryEvent) -> None:
-        """Take in that a node finished, if this is its own report."""
+        """Record that a node finished, if the event is the node's own report."""
         head, _, status = story.what.partition(": ")
         if head == "finished" and component_of(story.where) == story.subject and status in ("success", "failure"):
             self._finished[story.subject] = (story.at_s, NodeState(status))
 
     def begins(self, name: str) -> None:
-        """Forget the end of a node of this name: another life of it begins."""
+        """Delete the end of a node of this name, because the node starts again."""
         self._finished.pop(name, None)
 
     def forget(self, name: str) -> None:
-        """Forget a node that left for good."""
+        """Remove a node that left for good."""
         self._finished.pop(name, None)
         self._priorities.pop(name, None)
 
@@ -63,8 +63,8 @@ class TreeBoard:
         """Return the nodes, parents before children, siblings of higher priority first.
 
         Args:
-            components: Of the mission; behaviors among them are nodes, and execution units, which run modules, are not.
-            lost: Address of each lost node → since when.
+            components: Components of the mission; behaviors among them are nodes, execution units are not.
+            lost: Address of each lost node → time of the loss.
             schedule: The newest.
         """
         requests = {component_of(request.owner): request for request in (schedule.requests if schedule else [])}

@@ -1,4 +1,4 @@
-"""Content of screens as plain values: messages by the names of people, and a struct for each other kind of row.
+"""Content of screens as plain values: messages with people's names, and a struct for each other kind of row.
 
 Times ending in ``_s`` are mission seconds; ages and remaining times are seconds counted from the view's ``now_s``. A
 negative time, age or remaining time means that there is none.
@@ -20,17 +20,17 @@ from ui_console.model.order_view import OrderView
 from ui_console.model.timeline import TimelineView
 
 NONE_S = -1.0
-"""In place of a time, an age or a remaining time: there is none."""
+"""Value of a time, an age or a remaining time that does not exist."""
 
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
 """States of a component whose end raises no alarm."""
 
 
 class Severity(StrEnum):
-    """How much an alarm matters, most first."""
+    """Severity of an alarm, highest first."""
 
-    ALARM = "alarm"  # a robot may do something it should not, or nothing any more
-    WARNING = "warning"  # the mission goes on, less well
+    ALARM = "alarm"  # a robot may act wrongly, or not at all
+    WARNING = "warning"  # the mission continues with restrictions
     NOTICE = "notice"  # an operator should know
 
 
@@ -39,15 +39,15 @@ class AlarmKind(StrEnum):
 
     STOPPED = "stopped"  # an operator stopped a robot
     LOST = "lost"  # a component ended without a request to stop
-    ABSENT = "absent"  # a component is wanted and absent
+    ABSENT = "absent"  # a wanted component is absent
     UNSAFE = "unsafe"  # an RC did not reach its safe state
     RC_DOWN = "rc_down"  # the RC manager cannot reach an RC
     LINK = "link"  # this console has no link to the hub
     BATTERY = "battery"  # the battery of a robot is low
-    STALE_VIDEO = "stale_video"  # the picture the operator drives by is old
-    STARVING = "starving"  # a request waits long and no end is in sight
-    DEADLINE = "deadline"  # packets on a radio come too late
-    OVERLOAD = "overload"  # a host has no time to spare
+    STALE_VIDEO = "stale_video"  # the picture by which the operator drives is old
+    STARVING = "starving"  # a request waits long, and no end is predicted
+    DEADLINE = "deadline"  # packets on a radio are late
+    OVERLOAD = "overload"  # a host is overloaded
     TAKEN = "taken"  # another ARC got this console's robot
     REFUSED = "refused"  # a component refused a request of this console
     NO_ANSWER = "no_answer"  # a component did not answer this console
@@ -59,8 +59,8 @@ class StopView(msgspec.Struct, frozen=True):
     """An operator's stop that is in force.
 
     Attributes:
-        number: A lift names the stop by it.
-        reason: As its author gave it.
+        number: Number by which a lift names the stop.
+        reason: Reason given by its author.
         age_s: Age of the stop.
         is_confirmed: False if the wheels may still turn for a moment.
         by_user: Its first author, for people.
@@ -80,14 +80,14 @@ class StopView(msgspec.Struct, frozen=True):
 
 
 class VideoView(msgspec.Struct, frozen=True):
-    """Pictures of one robot as they arrive at this console.
+    """State of one robot's pictures at this console.
 
     Attributes:
         robot: The robot.
-        age_s: Since the newest was taken.
-        rate_hz: Pictures a second, lately.
-        latency_s: From capture to here, of the newest.
-        is_stale: True: do not drive by it.
+        age_s: Age of the newest picture.
+        rate_hz: Recent picture rate.
+        latency_s: Time from capture to arrival of the newest picture.
+        is_stale: True: do not drive by these pictures.
     """
 
     robot: str
@@ -98,11 +98,11 @@ class VideoView(msgspec.Struct, frozen=True):
 
 
 class RobotView(msgspec.Struct, frozen=True):
-    """One robot.
+    """A robot.
 
     Attributes:
         robot: Its name.
-        number: Its place in the list, from 1; the key that picks it.
+        number: Its place in the list, from 1, which is also its key.
         is_up: False if its RC cannot be reached.
         holder: Decision process that holds it; empty: none.
         arc: The holder's ARC.
@@ -112,14 +112,14 @@ class RobotView(msgspec.Struct, frozen=True):
         epoch: Of the grant.
         since_s: Since when.
         until_s: End of the slice.
-        lease_left_s: Until the hold ends unless it is renewed.
-        lease_age_s: Since the last renewal was heard.
-        because: Why the holder has it.
-        waiting: Decision processes that wait for it, the next first.
+        lease_left_s: Time until the hold ends unless it is renewed.
+        lease_age_s: Time since the last received renewal.
+        because: Why the holder has the robot.
+        waiting: Decision processes that wait for the robot, the next first.
         stop: The operator's stop in force; None: it may move.
-        video: Its pictures; None: this console gets none.
-        gauges: What it reports, shares first; empty: nothing.
-        reported_age_s: Age of that.
+        video: State of its pictures; None: this console gets none.
+        gauges: Its readings, shares first; empty: no readings.
+        reported_age_s: Age of the readings.
         feedback: Feedback of its RC.
     """
 
@@ -148,8 +148,8 @@ class RobotView(msgspec.Struct, frozen=True):
 class NodeState(StrEnum):
     """State of a node of the behavior tree."""
 
-    RUNNING = "running"  # holds its ARC, or needs none
-    WAITING = "waiting"  # wants its ARC
+    RUNNING = "running"  # holds its ARC, or needs no ARC
+    WAITING = "waiting"  # waits for its ARC
     IDLE = "idle"  # wants no time now
     SUCCESS = "success"
     FAILURE = "failure"
@@ -158,18 +158,18 @@ class NodeState(StrEnum):
 
 
 class NodeView(msgspec.Struct, frozen=True):
-    """A node of the behavior tree; they come parents before children, siblings of higher priority first.
+    """A node of the behavior tree; the order is parents before children, siblings of higher priority first.
 
     Attributes:
         name: Of the node and its component.
         type: Component type.
         parent: Name of its parent; empty for a root.
         depth: 0 for a root.
-        priority: Among its siblings, as far as it is known; None: nothing at or below it ever asked for an ARC.
+        priority: Priority among its siblings, if known; None: no node at or below it ever requested an ARC.
         state: Its state.
         since_s: Since when.
         feedback: Its activity, in its own words.
-        arc: The ARC it claims; empty: none yet.
+        arc: The ARC that it claims; empty: none yet.
         because: Why its ARC waits or runs.
     """
 
@@ -186,25 +186,25 @@ class NodeView(msgspec.Struct, frozen=True):
 
 
 class AlarmView(msgspec.Struct, frozen=True):
-    """One alarm.
+    """An alarm.
 
     Attributes:
         key: Key to acknowledge it.
         kind: Its subject.
-        severity: How much it matters.
+        severity: Its severity.
         subject: Name to ask ``why`` about.
         line: The event or condition, for people.
-        remedy: An action against it; empty: none is needed, or it is over.
-        first_s: When it happened first.
-        last_s: When it happened last, or since when it has been over.
-        count: How often.
-        is_active: True while it is so; False: it is over, or was an event.
+        remedy: Advice; empty: no action is needed, or it is over.
+        first_s: Time of its first occurrence.
+        last_s: Time of its last occurrence, or of its end.
+        count: Number of occurrences.
+        is_active: True while the condition lasts; False: it is over, or was an event.
         acknowledged_by: The person who acknowledged it; empty: none.
-        while_away: True if it came while the operator was away and is not acknowledged.
+        while_away: True if it was raised while the operator was away, and is not acknowledged.
         where: Type and machine of the subject, for people; empty: unknown.
-        robot: The robot it is about, whose row and picture to show; empty: none.
+        robot: The robot concerned, whose row and picture to show; empty: none.
         also: Consequences of the same cause, one line each.
-        keys: Keys to acknowledge this line and its consequences.
+        keys: Keys for the acknowledgment of this line and its consequences.
     """
 
     key: str
@@ -226,7 +226,7 @@ class AlarmView(msgspec.Struct, frozen=True):
 
 
 class HostView(msgspec.Struct, frozen=True):
-    """One machine of the mission: its creator's report, and the report's age."""
+    """A machine of the mission: its creator's report, and the report's age."""
 
     load: HostLoad
     age_s: float
@@ -238,8 +238,8 @@ class LinkView(msgspec.Struct, frozen=True):
     Attributes:
         name: ``hub``; ``commands`` to this console's robot; a radio's name.
         is_up: False if no message passes.
-        latency_s: There and back.
-        feedback: More about it for people.
+        latency_s: Round-trip time.
+        feedback: Further text for people.
     """
 
     name: str
@@ -249,14 +249,14 @@ class LinkView(msgspec.Struct, frozen=True):
 
 
 class ParameterView(msgspec.Struct, frozen=True):
-    """One parameter of a component, by its newest report.
+    """A parameter of a component, by its newest report.
 
     Attributes:
         component: Name of the component.
         address: Its address.
         name: Name of the parameter.
         value: As JSON.
-        before: As JSON, before the change that this console saw; empty: it saw none.
+        before: As JSON, before the last change that this console received; empty: no change received.
         changed_by: Author of the change.
         changed_s: Time of the change.
     """
@@ -271,15 +271,15 @@ class ParameterView(msgspec.Struct, frozen=True):
 
 
 class ConsentView(msgspec.Struct, frozen=True):
-    """An operator asks for the robot this console holds, or to lift a stop of this console's operator.
+    """A question of an operator: to get the robot that this console holds, or to lift a stop of its operator.
 
     Attributes:
         user: The operator who asks.
         robot: The robot.
         why: The reason, for people.
-        left_s: Seconds until the question times out, which is a no.
+        left_s: Seconds until the question times out; the answer is then no.
         others: Number of further questions.
-        topic: ``take``: to have the robot; ``lift``: to let it move again.
+        topic: ``take``: to get the robot; ``lift``: to let it move again.
         line: The question in one sentence, for people.
     """
 
@@ -293,13 +293,13 @@ class ConsentView(msgspec.Struct, frozen=True):
 
 
 class LostView(msgspec.Struct, frozen=True):
-    """A robot that this operator held and lost without releasing it.
+    """A robot that this operator lost without releasing it.
 
     Attributes:
         robot: The robot.
         why: The reason, for people.
         at_s: Time of the loss.
-        may_retake: True if the screen offers to take it back: it is there, and this console has no request.
+        may_retake: True if the screen offers to take it back: the robot is present, and this console has no request.
     """
 
     robot: str
@@ -309,28 +309,28 @@ class LostView(msgspec.Struct, frozen=True):
 
 
 class OwnView(msgspec.Struct, frozen=True):
-    """The robot this console wants or holds, and its operator's state.
+    """The robot that this console wants or holds, and its operator's state.
 
     Attributes:
         console: Its name.
         user: The person at it.
         robot: Robot wanted or held; empty: any, or none.
-        is_held: True: keys move it; never while the link is down.
+        is_held: True: keys move the robot; always False while the link is down.
         is_asked: True: it is wanted.
-        status: In one line: whether it is held, and if not, why.
+        status: One line: whether the robot is held, and if not, why.
         epoch: Of the grant; 0: none.
         until_s: End of the slice.
-        taken_because: While another ARC has the robot: the reason, and that ARC's owner.
+        taken_because: If another ARC has the robot: the reason, and that ARC's owner.
         applied: The last command applied, for people.
         stop: The stop in force on the robot held; None: it may move.
         away_since_s: Since when the operator is away.
-        consent: The question this operator is to answer; None: none.
-        asked: In one line the answers of other operators to this console's questions; empty: none was asked.
-        other_screens: Where else the same person sits, one line each: one person with several screens.
-        must_let_go: True: a control is held that moves nothing before it is let go and pressed anew.
-        lost: The robot lost without a release, until the operator takes one or dismisses it.
-        link_down_s: Since when the mission's hub is silent; negative: the link is up.
-        moment: Grows with each stop, lift, grant and loss; a press that began at an earlier one moves nothing.
+        consent: The next question for this operator; None: no question.
+        asked: One line with other operators' answers to this console's questions; empty: no question was asked.
+        other_screens: Other screens of the same person, one line each.
+        must_let_go: True: a held control moves nothing before it is released and pressed again.
+        lost: The robot lost without a release, until the operator takes a robot or dismisses the notice.
+        link_down_s: Time from which the mission's hub is silent; negative: the link is up.
+        moment: Grows with each stop, lift, grant and loss; a press that began at an earlier moment moves nothing.
         orders: The operator's orders, by robot.
     """
 
@@ -361,7 +361,7 @@ class HealthView(msgspec.Struct, frozen=True):
 
     Attributes:
         word: ``ok``, ``degraded`` or ``failed``.
-        lines: One line for each wanted and absent component: since when, why, and its remedy.
+        lines: One line for each wanted and absent component: begin, reason and remedy.
     """
 
     word: str
@@ -390,5 +390,5 @@ class ConsoleView(msgspec.Struct, frozen=True):
 
 
 def view_json(view: object) -> bytes:
-    """Return any view as JSON, messages in it too with their fields by name."""
+    """Return a view as JSON; messages in it are also encoded with field names."""
     return msgspec.json.encode(plain(view))

@@ -1,1 +1,1 @@
-"""One console in a mission: what it hears and says on the bus, and the devices that drive it."""
+"""A console in a mission: its communication on the bus, and the devices that drive a robot."""

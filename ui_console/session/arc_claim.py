@@ -1,7 +1,7 @@
-"""A console's claim on an ARC, for the robot of the console's parameters, from the take to the release.
+"""A console's claim on an ARC, for the robot in the console's parameters, from claim to release.
 
-The console claims as a behavior does, with a priority of its own beside the mission's. An ARC that was given back can
-rest for the next claim. Commands to the robot meanwhile are the part of ``controls``.
+The console claims as a behavior does, with its own priority beside the mission's. A released ARC can rest until the
+next claim. ``controls`` sends the commands to the robot.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ log = logging.getLogger(__name__)
 
 
 class ArcClaim:
-    """Claims at most one ARC at a time, keeps it while it waits and works, and gives it back.
+    """Claims at most one ARC at a time, keeps it while it waits and works, and releases it.
 
     Args:
         console: Its parameters name robot and kind of ARC.
         controls: Act on the ARC while it is claimed.
-        see: Called with the newest picture; None: nobody looks.
-        keeps_arc: Let an ARC rest that is given back.
-        shows_stops: Show stops of the robot that is held; False if the console watches all robots.
+        see: Called with the newest picture; None: no pictures are needed.
+        keeps_arc: True: a released ARC rests.
+        shows_stops: True: show stops of the held robot; False if the console watches all robots.
         taken: Called with the robot at each grant.
     """
 
@@ -82,12 +82,12 @@ class ArcClaim:
 
     @property
     def is_waiting(self) -> bool:
-        """True while the ARC is kept and not granted."""
+        """True while the ARC is kept without a grant."""
         return self._keeping is not None and not self.is_held
 
     # ------------------------------------------------------------------ claim
     def take(self) -> None:
-        """Claim the robot unless it is claimed; if its release is under way, right afterwards."""
+        """Claim the robot unless it is claimed; if a release is in progress, claim it right afterwards."""
         if self._giving_back.locked():
             self._takes_next = True
             self._decided.clear()
@@ -108,9 +108,9 @@ class ArcClaim:
         if not self.rests:
             self._arc = ArcClient(console.bus, wished.arc(console.bus), self)
         arc, self._last, self.is_asking = self._arc, claim, True
-        assert arc is not None  # noqa: S101  an ARC that rests exists
+        assert arc is not None  # noqa: S101  a resting ARC exists
         self._controls.connect(arc)
-        self._ear.close()  # the state it reported to the last ARC is new to this one
+        self._ear.close()  # this ARC does not know the state reported to the last one
         if wished.robot:
             console.start_task(self._ear.listen(wished.robot), "stop")
         if self._see is not None:
@@ -123,7 +123,7 @@ class ArcClaim:
         self._keeping = console.start_task(self._keep(arc, claim, rested), "arc")
 
     async def wait_granted(self) -> None:
-        """Return when the claim was granted.
+        """Wait until the claim is granted.
 
         Raises:
             Refusal: The claim was refused.
@@ -133,7 +133,7 @@ class ArcClaim:
             raise self.refusal
 
     async def _keep(self, arc: ArcClient, claim: tuple[str, dict[str, object]], rested: ArcClient | None) -> None:
-        """Keep the ARC as it was claimed; first end an ARC that rested and cannot be used any more."""
+        """Keep the claimed ARC; first end a resting ARC that cannot be used any more."""
         kind, parameters = claim
         rests, self.rests = self.rests, False
         try:
@@ -158,12 +158,12 @@ class ArcClaim:
 
     # ------------------------------------------------------------------ release
     async def give_back(self, reason: str, *, for_good: bool = False, wanted: bool = True) -> None:
-        """Give the robot back; afterwards nothing is claimed until the next ``take``.
+        """Release the robot; afterwards no ARC is claimed until the next ``take``.
 
         Args:
             reason: For people.
-            for_good: End the ARC also if it could rest.
-            wanted: False if the operator did not ask for it.
+            for_good: End the ARC even if it could rest.
+            wanted: False if the operator did not request the release.
         """
         async with self._giving_back:
             self._kinds.cancel()
@@ -186,7 +186,7 @@ class ArcClaim:
             self._record_given_back(reason, confirmed=confirmed, wanted=wanted)
 
     async def _let_go(self, arc: ArcClient, reason: str, *, for_good: bool) -> bool:
-        """Rest the ARC if the console keeps it, else end it; return whether the ARC confirmed that."""
+        """Let the ARC rest if the console keeps it, else end it; return whether the ARC confirmed that."""
         if self._keeps_arc and arc.granted is not None and not for_good:  # an ARC that waits could just be granted
             try:
                 await arc.rest()
@@ -227,7 +227,7 @@ class ArcClaim:
         """Answer a notice of the ARC.
 
         Raises:
-            NotMyArc: No ARC is claimed, or another one.
+            NotMyArc: No ARC is claimed, or the notice comes from another one.
         """
         if self._arc is None:
             raise NotMyArc(f"{self._console.name} claims no ARC")
@@ -237,12 +237,12 @@ class ArcClaim:
         """Show the grant; see ``ArcListener``."""
         if self._keeping is None:
             log.info("%s was granted after it was given back", notice.arc)
-            return  # the RC manager granted before it got the withdrawal; it revokes the RCs then
+            return  # the RC manager granted before it received the withdrawal; it will revoke the RCs
         robot, console = notice.robot or "no robot", self._console
         self._controls.require_let_go()
         await self._ear.listen(robot)
         if not self.is_held or self._arc is None or self._arc.epochs != notice.epochs:
-            return  # the ARC lost it again meanwhile
+            return  # the ARC lost the grant meanwhile
         again, self._grants = self._grants > 0, self._grants + 1
         console.report(f"drives {robot}")
         if not again:
@@ -269,10 +269,10 @@ class ArcClaim:
             self._console.show(events.Heard(self._console.clock.now_s(), notice))
 
     def _heard_stop(self, state: StopState) -> None:
-        """Show that the robot held was stopped or may move again: its driver has to know that first."""
+        """Show that the held robot was stopped or may move again; the driver must see that before the next command."""
         if self._arc is not None and self._arc.heard_stop(state):
             self._controls.require_let_go()
-        if self._shows_stops and state.number > 0:  # 0: it never was stopped
+        if self._shows_stops and state.number > 0:  # 0: never stopped
             self._console.show(events.Heard(self._console.clock.now_s(), state))
 
     def _saw(self, frame: Frame) -> None:

@@ -1,4 +1,4 @@
-"""The claim of a console, from its parameters."""
+"""The claim of a console, derived from its parameters."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
     Attributes:
         robot: Robot to claim; empty: any free one with a camera.
         kind: Component type of the ARC; empty: one for the robot, by ``sight``.
-        sight: What the operator is to see of the robot.
+        sight: Pictures that the operator needs of the robot.
         priority: Among the consoles and the mission; larger is higher.
-        minimum_runtime_s: Shortest useful time, seconds; only matters beside equals.
-        away_after_s: The console gives the robot back after so long without a touch of its operator, so that the robot
-            goes on with useful work; seconds of the machine; 0: never.
+        minimum_runtime_s: Shortest useful time, seconds; matters only among ARCs of equal priority.
+        away_after_s: Time without an operator's action after which the console releases the robot for useful work;
+            machine seconds; 0: never.
     """
 
     robot: str = ""

@@ -1,4 +1,4 @@
-"""The questions of other operators to one person, until each is answered; the rules are in ``consent``."""
+"""The open questions of other operators to one person; the rules are in ``consent``."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ConsentAnswers:
 
     Args:
         user: The person asked.
-        clock: The mission's time.
+        clock: The mission's clock.
         show: Called with each event for that person's screens.
         acted: Records the person's decisions.
     """
@@ -41,17 +41,17 @@ class ConsentAnswers:
         self._desk = ConsentDesk(user)
         self._answers: dict[tuple[str, Topic], asyncio.Future[Consent]] = {}
         self.yield_robot: Callable[[list[Settled]], None] = self.settle
-        """Called with the settled questions if the robot has to be released; it calls ``settle`` after that."""
+        """Called with the settled questions if the robot must be released; it calls ``settle`` afterwards."""
 
     async def seek(self, asker: str, user: str, robot: str, why: str, topic: Topic) -> Consent:
-        """Ask the person for a decision; silence is a no.
+        """Ask the person for a decision; without an answer in time it is no.
 
         Args:
             asker: Address of the console that asks.
             user: The person at that console.
             robot: The robot.
             why: The reason, for people.
-            topic: To have the robot, or to lift its stop.
+            topic: To get the robot, or to lift its stop.
 
         Raises:
             Refusal: See ``ConsentDesk.open_question``.
@@ -70,7 +70,7 @@ class ConsentAnswers:
             return Consent(False, self._user, "no answer")
 
     def decide(self, is_given: bool, reason: str = "") -> None:
-        """Answer the first question; a yes for the robot gives it back."""
+        """Answer the first question; a yes for the robot releases it."""
         settled = self._desk.decide(is_given, reason)
         if not settled:
             return
@@ -83,10 +83,10 @@ class ConsentAnswers:
             self.settle(settled)
 
     def ended(self, is_given: bool, reason: str) -> None:
-        """Answer all questions for the robot: this console holds none any more.
+        """Answer all questions for the robot, because this console no longer holds it.
 
         Args:
-            is_given: True: it was given back; False: another ARC has it now.
+            is_given: True: the robot was released; False: another ARC has it now.
             reason: For people.
         """
         self.settle(self._desk.ended(is_given, reason))

@@ -1,6 +1,6 @@
 """Consent over the bus: consoles ask each other for a robot; the rules are in ``consent``.
 
-Both sides are here, for a console that waits today holds a robot tomorrow.
+This file has both sides, because each console may wait for a robot or hold one.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ class Claim:
 
     Attributes:
         arc: Name of its ARC.
-        robot: The robot it wishes; empty: any.
+        robot: The requested robot; empty: any.
         called: Name of the robot, for people.
-        since_s: When the console requested it.
+        since_s: Time of the request.
     """
 
     arc: str
@@ -50,11 +50,11 @@ class Claim:
 
 
 class ConsentTalk:
-    """The questions a console asks, and the questions it answers.
+    """The questions that a console asks, and the questions that it answers.
 
     Args:
         console: The console.
-        give_back: Gives the robot back for the reason it is called with; returns when that is done.
+        give_back: Releases the robot for the given reason; returns when that is done.
     """
 
     def __init__(self, console: AnyObserver, give_back: Callable[[str], Awaitable[None]]) -> None:
@@ -64,10 +64,10 @@ class ConsentTalk:
 
     # ------------------------------------------------------------------ the side that waits
     def begin_ask(self, claim: Claim | None, why: str = "") -> None:
-        """Ask the consoles that hold the robot, and show their answers; do nothing while such a question is open.
+        """Ask the consoles that hold the robot, and show their answers; if such a question is open, do nothing.
 
         Args:
-            claim: The claim that waits; None: none does.
+            claim: The waiting claim; None: no claim waits.
             why: The reason, for people; empty: how long the console has waited.
         """
         if self._unanswered == 0:
@@ -93,7 +93,7 @@ class ConsentTalk:
         await asyncio.gather(*(self._ask_one(holder, question) for holder in holders))
 
     async def _who_holds(self, claim: Claim | None) -> list[str]:
-        """Return the addresses of the consoles that hold the robot, or else block the claim directly.
+        """Return the addresses of the consoles that hold the robot or directly block the claim.
 
         Raises:
             NoOperatorToAsk: No console blocks the claim, or there is no claim.
@@ -117,7 +117,7 @@ class ConsentTalk:
         console = self._console
         try:
             consent = await console.bus.ask(holder, question, Consent, within_s=CONSENT_WITHIN_S + REPLY_TIME_S)
-        except NoResponder:  # a console that is gone holds nothing: its ARC ends with it
+        except NoResponder:  # a console that is gone holds no robot, because its ARC ends with it
             consent = Consent(True, component_of(holder), "is gone")
         except LinkError:
             consent = Consent(False, component_of(holder), "does not answer")
@@ -134,15 +134,15 @@ class ConsentTalk:
 
     # ------------------------------------------------------------------ the side that holds
     async def seek(self, asker: str, asked: AskConsent, at_once: Consent | None) -> Consent:
-        """Ask the operator, who holds the robot, for a decision; silence is a no.
+        """Ask the operator of this console for a decision; without an answer in time it is no.
 
         Args:
             asker: Address of the console that asks.
             asked: The question.
-            at_once: The answer if the operator need not be asked.
+            at_once: The answer if no decision of the operator is needed.
 
         Raises:
-            NotAnOperator: The asker is no console.
+            NotAnOperator: The asker is not a console.
             Refusal: See ``ConsentDesk.open_question``.
         """
         require_console(self._console.name, asker)
@@ -154,6 +154,6 @@ class ConsentTalk:
         self._console.start_task(self._yield_to(settled), "consent")
 
     async def _yield_to(self, settled: list[Settled]) -> None:
-        """Give the robot back, then answer: the asker finds the robot free."""
+        """Release the robot, then answer, so that the asker finds the robot free."""
         await self._give_back(f"{settled[0].sought.user} may have it")
         self._console.answers.settle(settled)

@@ -1,4 +1,4 @@
-"""The controls of one console: its operator's commands, sent to the robot it holds, and their outcomes."""
+"""The controls of one console: sends its operator's commands to the held robot, and shows their outcomes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Controls:
         self._arc: ArcClient | None = None
         self._is_on = False
         self.abilities: ArcAbilities | None = None
-        """What the operator can do with the ARC; None: not known."""
+        """Abilities of the ARC; None: not known."""
 
     # ------------------------------------------------------------------ the robot
     def connect(self, arc: ArcClient) -> None:
@@ -53,29 +53,29 @@ class Controls:
         self._arc, self._is_on = arc, True
 
     def know(self, abilities: ArcAbilities | None) -> None:
-        """Show what the operator can do with the ARC; None: not known."""
+        """Show the abilities of the ARC; None: not known."""
         self.abilities = abilities
         self._console.show(AbilitiesKnown(self._console.clock.now_s(), abilities))
 
     def switch_off(self) -> None:
-        """Ignore keys until ``connect``, also keys held down; single commands still go."""
+        """Ignore keys until ``connect``, including held keys; single commands are still sent."""
         self.require_let_go()
         self._is_on = False
 
     def disconnect(self) -> None:
-        """Send no commands from now on: the console claims nothing any more."""
+        """Send no commands from now on, because the console has no claim any more."""
         self.switch_off()
         self._arc = None
 
     def require_let_go(self) -> None:
-        """Stop the wheels; a control that is held moves nothing until it was let go and pressed anew."""
+        """Stop the wheels; a held control moves nothing until it was released and pressed again."""
         self._dead_man.require_let_go()
         self._pressed.set()
         self._console.show(MomentBegan(self._console.clock.now_s()))
 
     # ------------------------------------------------------------------ the operator's controls
     def hold(self, drive: Motion, lasts_s: float | None = None) -> bool:
-        """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
+        """Record that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
         Return whether that counts: not before a control that is held was let go.
 
@@ -88,7 +88,7 @@ class Controls:
         return counts
 
     def press_once(self, word: str) -> bool:
-        """Take in that the control for one command is pressed; return whether that counts, see ``DeadMan``."""
+        """Record a press of the control for one command; return whether it counts, see ``DeadMan``."""
         if self.abilities is not None and not self.abilities.moves(word):
             return True
         counts = self._dead_man.press_once(asyncio.get_running_loop().time())
@@ -116,12 +116,12 @@ class Controls:
                 continue
 
     def _next_s(self) -> float | None:
-        """Return when the next command or notice is due if no key is pressed; None: not before a press."""
+        """Return the time of the next due command or notice if no key is pressed; None: not before a press."""
         times = [self._dead_man.next_s, self._dead_man.let_go_s if self._is_held_back else None]
         return min((at_s for at_s in times if at_s is not None), default=None)
 
     def _show_held_back(self, loop_s: float) -> None:
-        """Show the operator when a control that is held has to be let go, and when it was."""
+        """Show the operator that a held control must be released, and that it was released."""
         is_held_back = self._dead_man.is_held_back(loop_s)
         if is_held_back is not self._is_held_back:
             self._is_held_back = is_held_back
@@ -144,7 +144,7 @@ class Controls:
             show(failed(now_s(), refusal))
             return False
         except LinkError as error:
-            self.require_let_go()  # an operator who is cut off for a moment does not see the robot's next moves
+            self.require_let_go()  # an operator with a cut link does not see the robot's next motions
             show(LinkTrouble(now_s(), str(error), word_of(command)))
             return False
         took_s = time.perf_counter() - wanted_s
@@ -153,7 +153,7 @@ class Controls:
         return True
 
     def _sending(self, arc: ArcClient, command: Command) -> Awaitable[Applied] | None:
-        """Return the sending of a command; None: the ARC has nothing to halt."""
+        """Return the coroutine that sends a command; None: the ARC has no command to halt."""
         match command:
             case MoveWish(forward_m_s, turn_rad_s):
                 return arc.move(forward_m_s, turn_rad_s)

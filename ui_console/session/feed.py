@@ -1,8 +1,8 @@
-"""The feed of a console: subscribes to the mission on the bus and passes it to the pure model as events.
+"""The feed of a console: subscribes to the mission's messages and passes them to the pure model as events.
 
-One feed serves any number of views in a process. It claims nothing, asks little (the list of components, once; the
-round-trip time every ``LINK_EVERY_S``, the radios' counts every ``PULSE_S``), and carries out an operator's verbs that
-need no grant.
+One feed serves any number of views in a process. It claims no robot and asks few questions: the list of components
+once, the round-trip time every ``LINK_EVERY_S``, the radios' counts every ``PULSE_S``. It also carries out an
+operator's actions that need no grant.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ from ui_console.model.tree_board import is_behavior
 
 log = logging.getLogger(__name__)
 
-REPLY_TIME_S = 1.0  # chosen: a person waits this long for a picture
-LINK_FRESH_S = 0.8  # chosen: a view older than a second is marked, and drawing that takes a moment; machine seconds
+REPLY_TIME_S = 1.0  # chosen: a person accepts this delay of a view
+LINK_FRESH_S = 0.8  # chosen: a view older than a second must be marked, and drawing takes a moment; machine seconds
 LINK_EVERY_S = 0.3  # chosen: one answer may be lost before the view counts as old; machine seconds
-PULSE_S = 2.0  # chosen: a link that got slow is seen soon, and a question costs almost nothing; machine seconds
+PULSE_S = 2.0  # chosen: detects a slow link soon, and a question costs almost nothing; machine seconds
 
 LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link; machine seconds
 
@@ -70,8 +70,8 @@ class ConsoleFeed:
     """Turns the messages of a mission into events.
 
     Args:
-        bus: Of its component.
-        clock: The mission's time.
+        bus: Bus of its component.
+        clock: The mission's clock.
         show: Called in the event loop with each event, in order.
     """
 
@@ -82,7 +82,7 @@ class ConsoleFeed:
         self._robots: set[str] = set()
         self._listing, self._types_due = asyncio.Event(), asyncio.Event()
         self.listed = asyncio.Event()
-        """Set once every component answered the first questions, or did not in time."""
+        """Set when every component has answered the first questions or timed out."""
         self._is_up = True
 
     # ------------------------------------------------------------------ listening
@@ -110,18 +110,18 @@ class ConsoleFeed:
 
     # ------------------------------------------------------------------ verbs of an operator
     async def stop_robots(self, robots: Iterable[str], reason: str = "", user: str = "") -> list[str]:
-        """Stop these robots, all at once, regardless of their holders; return the robots that did not confirm it."""
+        """Stop these robots, all at once, regardless of their holders; return the robots without confirmation."""
         wanted = sorted(set(robots))
         answers = await asyncio.gather(*(self._stop(robot, reason, user) for robot in wanted))
         return [robot for robot, is_stopped in zip(wanted, answers, strict=True) if not is_stopped]
 
     @property
     def robots(self) -> frozenset[str]:
-        """Every robot known so far."""
+        """All robots known so far."""
         return frozenset(self._robots)
 
     async def find_robots(self) -> frozenset[str]:
-        """Return every robot of the mission, also robots not known so far."""
+        """Return all robots of the mission, including robots not known so far."""
         pool = await self._list_of(Subsystem.RESOURCE_POOL)
         return self.robots | {component_of(one.address) for one in pool if one.is_robot}
 
@@ -134,18 +134,18 @@ class ConsoleFeed:
         return None
 
     async def consoles(self) -> list[str]:
-        """Return the addresses of all consoles of the mission; none if the nameserver did not answer."""
+        """Return the addresses of all consoles of the mission; empty if the nameserver did not answer."""
         return [one.address for one in await self._list_of(Subsystem.UI_CONSOLE)]
 
     async def lift(self, stop: StopState, user: str = "") -> bool:
-        """Let a robot move again; return whether it may."""
+        """Lift the stop of a robot; return whether the robot may move."""
         with self._showing_failure():
             self._hear(await lift_stop(self._bus, stop, user))
             return True
         return False
 
     async def why(self, name: str) -> list[str]:
-        """Return for people why this robot, ARC, behavior, console or component is as it is."""
+        """Return the explanation of the state of this robot, ARC, behavior, console or component, for people."""
         try:
             return (await reasons_for(self._bus, name, self._clock)).lines(self._clock.now_s())
         except Refusal as refusal:
@@ -186,7 +186,7 @@ class ConsoleFeed:
 
     # ------------------------------------------------------------------ within
     def _showing_failure(self) -> _Answered:
-        """Show a refusal or a missing answer, which ends the block."""
+        """Show a refusal or a missing answer that ends the block."""
         return _Answered(lambda error: self._show(failed(self._clock.now_s(), error)))
 
     async def _stop(self, robot: str, reason: str, user: str) -> bool:
@@ -254,7 +254,7 @@ class ConsoleFeed:
             await self._ask_types()
 
     async def _ask_types(self) -> None:
-        """Show what the kinds of robots report, with units and ranges."""
+        """Show the reports of the kinds of robots, with units and ranges."""
         with _quietly(COMPONENT_DATABASE, "did not answer with its types"):
             self._hear(await self._bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S))
 
@@ -303,7 +303,7 @@ class ConsoleFeed:
 
     def _heard(self, envelope: Envelope[Said]) -> None:
         match envelope.body:
-            case Leases():  # they count from the time they were sent
+            case Leases():  # ages count from the time of sending
                 self._show(Heard(envelope.stamp_s, envelope.body))
             case OperatorActed():
                 self._hear(envelope.body, envelope.source)
@@ -324,7 +324,7 @@ class ConsoleFeed:
         self._show(Heard(self._clock.now_s(), said, source))
 
     def _meet(self, component: ComponentState) -> None:
-        """Subscribe to creators, which publish the load of their hosts and the processes that fell."""
+        """Subscribe to creators, because they publish the load of their hosts and crashed processes."""
         address = component.address
         if component.type == CREATOR and address not in self._hosts:
             self._hosts[address] = [
@@ -357,7 +357,7 @@ class _Answered:
     def __exit__(
         self, _kind: type[BaseException] | None, error: BaseException | None, _at: TracebackType | None
     ) -> bool:
-        """Swallow the error that ``failed`` was called with, and no other."""
+        """Suppress the error with which ``failed`` was called, and no other."""
         if isinstance(error, Refusal | LinkError):
             self._failed(error)
             return True
@@ -365,5 +365,5 @@ class _Answered:
 
 
 def _quietly(name: str, what: str) -> _Answered:
-    """Log a refusal or a missing answer, which ends the block, and go on without the answer."""
+    """Log a refusal or a missing answer that ends the block, and continue without the answer."""
     return _Answered(lambda error: log.info("%s %s: %s", name, what, error))

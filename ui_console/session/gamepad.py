@@ -1,10 +1,10 @@
-"""Driving by a gamepad: a stick that counts only while the dead-man button is held.
+"""Driving by a gamepad: the stick counts only while the dead-man button is held.
 
 ``Stick`` is pure: events of the device go in, positions of the stick come out. ``play_gamepad`` is the loop around it.
 The device is read through evdev, which is an extra (``pip install 'scout-backbone[gamepad]'``, Linux only).
 
-A gamepad reports when a button is let go; a gamepad that is unplugged or out of range reports nothing, so the drive
-command is repeated every ``SAY_EVERY_S`` and ends by itself.
+A gamepad reports the release of a button. But a gamepad that is unplugged or out of range reports nothing; therefore
+the drive command is repeated every ``SAY_EVERY_S`` and expires by itself.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ui_console.model.driving import STICK_LASTS_S
 
 try:
     import evdev
-except ImportError:  # an extra that few machines have
+except ImportError:  # an extra; few machines have it
     evdev = None
 
 log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ EV_KEY, EV_ABS = 1, 3  # Linux, input-event-codes.h
 ABS_X, ABS_Y, ABS_HAT0X, ABS_HAT0Y = 0, 1, 16, 17
 BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_TL, BTN_TR, BTN_SELECT, BTN_START = 304, 305, 307, 310, 311, 314, 315
 DEAD_MAN = frozenset({BTN_TL, BTN_TR})
-STILL_ZONE = 0.12  # chosen: sticks that are let go rest within a tenth of their middle
+STILL_ZONE = 0.12  # chosen: released sticks rest within a tenth of their middle
 SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``; machine seconds
 
 
@@ -99,7 +99,7 @@ class Stick:
         self._held: set[int] = set()
 
     def feel(self, event: GamepadEvent) -> PadWish | None:
-        """Take in one event; return the action of a button, or of the cross, that was just pressed."""
+        """Process an event; return the action of a button, or of the cross, that was just pressed."""
         if event.type == EV_ABS and (event.code, event.value) in CROSS:
             return CROSS[event.code, event.value]
         if event.type == EV_ABS and event.code in self._at and event.code in self._ranges:
@@ -116,7 +116,7 @@ class Stick:
         return None
 
     def wanted(self) -> tuple[float, float] | None:
-        """Return forward and right now, each −1 to 1; None: the dead-man button is not held."""
+        """Return the present forward and right, each −1 to 1; None: the dead-man button is not held."""
         return (-self._at[ABS_Y], self._at[ABS_X]) if self._held else None
 
 
@@ -124,7 +124,7 @@ def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
     """Return the first gamepad of this machine and the ranges of its stick.
 
     Raises:
-        NoGamepad: There is none, or none that can be read.
+        NoGamepad: There is no gamepad, or none can be read.
     """
     if evdev is None:
         raise NoGamepad("evdev is not installed")
@@ -146,14 +146,14 @@ async def play_gamepad(
     stop: Callable[[], None],
     wish: Callable[[PadWish], None],
 ) -> None:
-    """Drive by the device until it is gone or this is cancelled; the wheels stop then.
+    """Drive by the device until the device is gone or the task is cancelled; then stop the wheels.
 
     Args:
-        device: Already open.
-        stick: Fresh.
+        device: The open device.
+        stick: A new stick.
         hold: Called repeatedly while the dead-man button is held: forward, right, and the time a call counts.
-        stop: Called when the button is let go.
-        wish: Called for each button pressed.
+        stop: Called when the button is released.
+        wish: Called for each pressed button.
     """
     changed = asyncio.Event()
 

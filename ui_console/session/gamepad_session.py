@@ -1,4 +1,4 @@
-"""A console without a screen: a gamepad drives one robot, and what changes is printed as lines of text.
+"""A console without a screen: a gamepad drives one robot, and changes are printed as lines of text.
 
 For an operator who wears the console (000, Fig. 3), or for a small machine beside a video monitor.
 """
@@ -23,9 +23,9 @@ from ui_console.session.teleoperation import Teleoperation
 from ui_console.session.verbs import Session
 
 LIFT_REMEDY = "When the robot may move, lift the stop at a console with a screen."
-SPEED = 1.0  # chosen: a share of the robot's most; the stick itself gives a share of that
-LOOK_EVERY_S = 0.25  # chosen: a change is printed while it is news
-FIND_EVERY_S = 1.0  # chosen: a gamepad that was switched on again is found soon
+SPEED = 1.0  # chosen: a share of the robot's largest speed; the stick gives a share of that
+LOOK_EVERY_S = 0.25  # chosen: a change is printed soon
+FIND_EVERY_S = 1.0  # chosen: finds a gamepad soon after it was switched on again
 FoundGamepad = tuple[Gamepad, Mapping[int, tuple[int, int]]]
 
 
@@ -33,9 +33,9 @@ class GamepadSession(Session):
     """Passes a component's events to the model, and the gamepad's buttons to the component.
 
     Args:
-        model: Of this console.
+        model: Model of this console.
         write: Called with each line for the operator.
-        find: Finds the gamepad again after it was gone.
+        find: Finds the gamepad again after it disappeared.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class GamepadSession(Session):
         self._write, self._find = write, find
 
     def show(self, event: ConsoleEvent) -> None:
-        """Take an event into the model; its lines are printed at the next look."""
+        """Apply an event to the model; its lines are printed at the next update."""
         self.model.apply(event)
 
     async def run(self, console: Teleoperation, gamepad: FoundGamepad) -> None:
@@ -76,7 +76,7 @@ class GamepadSession(Session):
             group.create_task(self._print(clock), name="lines")
 
     async def _print(self, clock: Clock) -> None:
-        """Print what changes."""
+        """Print changes."""
         printed: list[str] = []
         while True:
             lines = list(state_lines(self.model.view(clock.now_s())))
@@ -86,7 +86,7 @@ class GamepadSession(Session):
             await clock.sleep_s(LOOK_EVERY_S)
 
     async def _play(self, gamepad: FoundGamepad, clock: Clock) -> None:
-        """Drive by the gamepad; while it is gone, the robot is given back."""
+        """Drive by the gamepad; if it disappears, release the robot."""
         while True:
             device, ranges = gamepad
             await play_gamepad(
@@ -159,7 +159,7 @@ async def drive_by_gamepad(where: Where, wished: dict[str, object], user: str) -
         user: The driver, for the record.
 
     Raises:
-        NoGamepad: There is none.
+        NoGamepad: There is no gamepad.
         Refusal: The claim was refused, and no other claim followed.
     """
     gamepad = find_gamepad()

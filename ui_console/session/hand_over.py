@@ -1,8 +1,8 @@
-"""One person at two screens: a robot follows its operator to the screen of the newest claim.
+"""Hand-over between two screens of one person: the robot goes to the screen of the newest claim.
 
-Two claims of one person would otherwise take the robot from each other turn by turn. A console that waits for a robot
-that the same person holds at another console settles it with that console; it asks other persons for their consent, see
-``consent``. Consoles state the name of their person; a script keeps its robot.
+Otherwise two claims of one person would get the robot in turns. If a console waits for a robot that the same person
+holds at another console, the two consoles settle that; other persons are asked for their consent, see ``consent``.
+Consoles state the name of their person. A script keeps its robot.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ui_console.session.observer import AnyObserver
 
 
 class AskHandOver(Message, frozen=True):
-    """A console asks the console that holds a robot to give it up to the same person.
+    """Asks the console that holds a robot to release it for the same person at another console.
 
     Attributes:
         robot: The robot.
         user: The person at the asking console.
-        since_s: When that person claimed it there.
+        since_s: Time of that person's claim there.
     """
 
     robot: Mention
@@ -39,8 +39,8 @@ class ClaimOutcome(StrEnum):
     """Outcome of two claims."""
 
     GIVEN = "given"  # the robot is free for the asker
-    NEWER = "newer"  # the same person claimed it here later: the asker's claim is over
-    NOT_YOURS = "not_yours"  # another person, no one, or a script holds it
+    NEWER = "newer"  # the same person claimed it here later, so the asker's claim ends
+    NOT_YOURS = "not_yours"  # another person, no person, or a script holds it
 
 
 class HandedOver(Message, frozen=True):
@@ -56,7 +56,7 @@ def decide(asked: AskHandOver, user: str, robot: str, since_s: float, *, by_scri
         asked: The other console's question.
         user: The person at this console; empty: none.
         robot: The robot held here; empty: none.
-        since_s: When it was claimed here.
+        since_s: Time of the claim here.
         by_script: A script drives it.
 
     Example:
@@ -73,8 +73,8 @@ class HandOver:
     """Messages between the screens of one person.
 
     Args:
-        console: One of them.
-        give_back: Gives its robot back, or its claim up, for the reason it is called with.
+        console: One of the screens.
+        give_back: Releases its robot or its claim, for the given reason.
     """
 
     def __init__(self, console: AnyObserver, give_back: Callable[[str], Awaitable[None]]) -> None:
@@ -82,11 +82,11 @@ class HandOver:
         self._reason = f"{console.user} goes on at another screen"
 
     async def settle(self, robot: str, since_s: float) -> None:
-        """Ask this person's other screen to give up the robot; give up this claim if the other one is newer.
+        """Ask this person's other screen to release the robot; if its claim is newer, give up this claim.
 
         Args:
             robot: The robot this console waits for.
-            since_s: When it was claimed.
+            since_s: Time of the claim.
 
         Raises:
             LinkError: The RC manager did not answer.
@@ -103,7 +103,7 @@ class HandOver:
                 return
 
     async def answer(self, asked: AskHandOver, robot: str, since_s: float, *, by_script: bool) -> HandedOver:
-        """Give the robot back if this console's person goes on at another one; see ``decide``."""
+        """Release the robot if this console's person continues at another console; see ``decide``."""
         outcome = decide(asked, self._console.person(), robot, since_s, by_script=by_script)
         if outcome is ClaimOutcome.GIVEN:
             await self._give_back(self._reason)

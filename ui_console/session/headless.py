@@ -1,4 +1,4 @@
-"""Consoles without a screen: a script that drives, a monitor as JSON lines, one look."""
+"""Consoles without a screen: a script that drives, a monitor with JSON lines, a single view."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ async def drive_by_script(where: Where, wished: dict[str, object], user: str, sc
         wished: Parameters of ``Teleoperation``.
         user: The driver, for the record.
         script: File of JSON lines; ``-``: standard input.
-        within_s: Mission seconds the grant may take; 0: any time.
+        within_s: Longest wait for the grant, mission seconds; 0: no limit.
     """
     steps: list[Step] | None = None
     try:

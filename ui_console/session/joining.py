@@ -1,4 +1,4 @@
-"""How a console's process joins a mission: its name there, its clock, its bus, and the signals that end it."""
+"""A console's process joins a mission: its name, its clock, its bus, and the signals that end it."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ async def join(where: Where, parameters: dict[str, object] | None = None) -> Joi
 
 
 def end_on_signals(console: AnyObserver) -> Callable[[], bool]:
-    """Make SIGINT and SIGTERM end the console in good order; the result returns whether SIGINT came."""
+    """Make SIGINT and SIGTERM end the console in good order; the returned function tells whether SIGINT arrived."""
     return _end_on(console.end, signal.SIGINT, signal.SIGTERM)
 
 
@@ -115,9 +115,9 @@ def _end_on(end: Callable[[str], None], *numbers: signal.Signals) -> Callable[[]
 
 
 def write_line(line: bytes) -> None:
-    """Write one line to standard output at once; its reader may wait for it.
+    """Write one line to standard output without delay, because a reader may wait for it.
 
-    A reader that has gone away ends this process in good order, as SIGTERM does.
+    If the reader has gone away, this process ends in good order, as after SIGTERM.
     """
     try:
         sys.stdout.buffer.write(line + b"\n")
@@ -128,7 +128,7 @@ def write_line(line: bytes) -> None:
 
 
 def _name_elsewhere(host: str) -> str:
-    """Return a console's name that no console of another machine has: each machine numbers its processes anew.
+    """Return a console's name that is unique over machines, because each machine has its own process numbers.
 
     Example:
         >>> _name_elsewhere("Lab PC.local").rpartition("-")[0]

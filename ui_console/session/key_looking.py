@@ -1,7 +1,7 @@
-"""Looks at keys: how often each says something, and what one of them says; only while a person looks.
+"""Watches keys: the message rates of all keys, and the messages of one; only while a person watches.
 
-Live messages are overheard: no component waits for a console, or makes copies while none looks. Recorded ones are read
-from the file, so they have their past, too.
+Live messages are overheard: no component waits for a console, or makes copies while no console watches. Recorded
+messages are read from the file, so their past is available, too.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ui_console.model.key_view import KeyView
 from ui_console.model.series import SPAN_S
 
 LIST_EACH_S = 1.0  # chosen: as ``scout-backbone top``; seconds of the machine
-MOST_BEFORE = 500  # chosen: read within a second; what was said before is of another schema then
+MOST_BEFORE = 500  # chosen: read within a second; if none matches, older messages have another schema
 MOST_WAITING_BYTES = 4 * 1024 * 1024  # chosen: the pictures of a second of four robots
 
 Classes = Mapping[str, type[Message]]
@@ -33,12 +33,12 @@ ShowRows = Callable[[list[KeyRow]], None]
 
 # ---------------------------------------------------------------------- live
 class HeardKeys:
-    """Counts what is overheard, by the begins of messages alone, so it needs no message classes.
+    """Counts overheard messages by their headers, so it needs no message classes.
 
     Args:
         bus: The bus.
-        clock: The mission's.
-        known: Rows that are listed at once; when it is closed, all that it has then.
+        clock: The mission's clock.
+        known: Rows that are listed at once; after ``close``, all rows so far.
     """
 
     def __init__(self, bus: Bus, clock: Clock, known: list[tuple[str, str, str]]) -> None:
@@ -50,7 +50,7 @@ class HeardKeys:
 
     @property
     def dropped(self) -> int:
-        """Number of messages that came too fast to be counted."""
+        """Number of messages that arrived too fast to be counted."""
         return sum(one.dropped for one in self._overheard)
 
     def rows(self) -> list[KeyRow]:
@@ -58,7 +58,7 @@ class HeardKeys:
         return self._table.rows(self._clock.now_s(), self._clock.rate)
 
     def close(self) -> None:
-        """Overhear nothing more."""
+        """Stop overhearing."""
         for each in self._overheard:
             each.close()
         self._known[:] = [row.id for row in self.rows()]
@@ -71,7 +71,7 @@ class HeardKeys:
 
 
 async def keep_listing(bus: Bus, clock: Clock, show: ShowRows) -> None:
-    """Call ``show`` each second with all keys at which something was said by now, until cancelled."""
+    """Call ``show`` each second with all keys that have had messages so far, until cancelled."""
     keys = HeardKeys(bus, clock, [])
     try:
         await _keep_showing(clock, lambda: show(keys.rows()))
@@ -80,7 +80,7 @@ async def keep_listing(bus: Bus, clock: Clock, show: ShowRows) -> None:
 
 
 async def keep_hearing(bus: Bus, clock: Clock, classes: Classes, row: KeyRow, view: KeyView) -> None:
-    """Show the messages of one row of the list in ``view`` as they come, until cancelled."""
+    """Show the arriving messages of one row of the list in ``view``, until cancelled."""
 
     def heard(key: str, message: Translated, at_s: float) -> None:
         if (message.source, message.schema) == (row.source, row.schema):
@@ -113,7 +113,7 @@ async def keep_listing_recorded(recording: Recording, playback: Playback, show: 
 
 
 async def keep_reading(recording: Recording, playback: Playback, row: KeyRow, view: KeyView) -> None:
-    """Show the messages of one row in ``view``: the last one before, those of the last minute, and those that follow.
+    """Show the messages of one row in ``view``: the last earlier one, those of the last minute, and later ones.
 
     Raises:
         NoRecording: The recording is damaged from here on.
@@ -128,7 +128,7 @@ async def said_at(
 ) -> AsyncIterator[tuple[Recorded, int]]:
     """Yield the messages of one row, with their lengths, each not before its time.
 
-    The first is the last one before ``past_s`` seconds ago.
+    The first message is the last one before ``past_s`` seconds ago.
 
     Raises:
         NoRecording: The recording is damaged from here on.

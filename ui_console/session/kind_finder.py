@@ -1,4 +1,4 @@
-"""Kind finder: asks the mission for its kinds of ARC, and what an operator can do with one of them."""
+"""Kind finder: asks the mission for its kinds of ARC and their abilities."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 
 Reply = TypeVar("Reply", bound=Message)
 ASK_AGAIN = "Take the robot again in a moment; 'scout-backbone status' names what is absent."
-EACH_S, WITHIN_S = 1.0, 5.0  # chosen: a restarted core service is back within a second or two; mission seconds
+EACH_S, WITHIN_S = 1.0, 5.0  # chosen: a restarted core service is back within one or two seconds; mission seconds
 
 log = logging.getLogger(__name__)
 
 
 class KindFinder:
-    """Asks once for each take, and keeps the newest answer for a take of the same kind.
+    """Asks once for each claim, and keeps the newest answer for a claim of the same kind.
 
     Args:
         console: The console.
-        know: Called with what an operator can do with the kind that is taken; None: not known yet.
+        know: Called with the abilities of the claimed kind; None: not known yet.
     """
 
     def __init__(self, console: AnyObserver, know: Callable[[ArcAbilities | None], None]) -> None:
@@ -54,7 +54,7 @@ class KindFinder:
         found: Callable[[TeleoperationParameters, str], None],
         refused: Callable[[Refusal], None],
     ) -> None:
-        """Ask for the kind of ARC for a wish, then call one of these; see ``arc_kind``."""
+        """Ask for the kind of ARC for a wish, then call one of these functions; see ``arc_kind``."""
 
         async def find() -> None:
             try:
@@ -68,7 +68,7 @@ class KindFinder:
         self._finding = self._console.start_task(find(), "kind of ARC")
 
     def cancel(self) -> None:
-        """Seek no kind any more."""
+        """Stop the search for a kind."""
         if self._finding is not None:
             self._finding.cancel()
             self._finding = None
@@ -83,7 +83,7 @@ class KindFinder:
         return kind
 
     def take(self, kind: str) -> None:
-        """Show what an operator can do with this kind, and ask anew unless it was just found; wait for nothing."""
+        """Show the abilities of this kind, and ask again unless it was just found; do not wait."""
         before, abilities = self._known
         is_new, self._is_new, self._taken = self._is_new and before == kind, False, kind
         self._know(abilities if before == kind else None)

@@ -24,18 +24,18 @@ from ui_console.model.lifting import (
 )
 from ui_console.session.feed import ConsoleFeed
 
-ANSWER_TIME_S = CONSENT_WITHIN_S + 1.0  # chosen: the console asked answers by itself before
+ANSWER_TIME_S = CONSENT_WITHIN_S + 1.0  # chosen: longer than the time-out at the asked console
 LOOK_AGAIN = "Look who stopped the robot and why, then lift that stop if it may move."
 
 
 class Speaks(Protocol):
-    """The console through which a stop is lifted.
+    """The interface of the console through which a stop is lifted.
 
     Attributes:
-        bus: To other consoles.
-        clock: The mission's.
+        bus: Bus to other consoles.
+        clock: The mission's clock.
         feed: Knows robots and consoles.
-        address: Its own.
+        address: Address of this console.
     """
 
     bus: Bus
@@ -63,7 +63,7 @@ class LiftTalk:
         self._console, self._user, self._show = console, user, show
 
     async def lift(self, robot: str, number: int) -> bool:
-        """Let the robot move again if every other author of its stop agrees; return whether it may move.
+        """Lift the stop if every other author agrees; return whether the robot may move.
 
         Args:
             robot: The robot.
@@ -109,7 +109,7 @@ class LiftTalk:
             return await self._console.bus.ask(console, question, Consent, within_s=ANSWER_TIME_S)
         except NoResponder:
             return Consent(False, question.author, "is not here", is_here=False)
-        except LinkError:  # the author may sit at this console
+        except LinkError:  # the author may use this console
             return Consent(False, question.author, "does not answer", is_here=console == question.console)
         except Refusal as refusal:
             return Consent(False, question.author, refusal.detail, is_here=console == question.console)

@@ -1,4 +1,4 @@
-"""Looks at debug views: finds the behaviors that have some, and renews the lease on the one that is looked at."""
+"""Watches debug views: finds the behaviors that have views, and renews the lease on the watched view."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ REPLY_TIME_S = 1.0  # chosen: a person waits this long; machine seconds
 
 
 class NoViews(Refusal):
-    """The component is no behavior, so it has no debug views."""
+    """The component is not a behavior, so it has no debug views."""
 
     code = "views.no_behavior"
-    remedy = "Look into a behavior; 'scout-backbone components' lists them all."
+    remedy = "Name a behavior; 'scout-backbone components' lists all behaviors."
 
 
 async def find_behavior(bus: Bus, name: str) -> str:
     """Return the address of the behavior of this name.
 
     Raises:
-        Refusal: There is no such component, or it is no behavior; the detail names the nearest.
+        Refusal: There is no such component, or it is not a behavior; the detail names similar names.
         LinkError: The nameserver did not answer.
     """
     found = (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component
@@ -61,7 +61,7 @@ async def views_of(bus: Bus, behavior: str) -> Views:
         behavior: Its address.
 
     Raises:
-        NoViews: It answers no such question.
+        NoViews: The component does not support debug views.
         LinkError: It did not answer.
     """
     try:
@@ -71,7 +71,7 @@ async def views_of(bus: Bus, behavior: str) -> Views:
 
 
 async def all_views(bus: Bus) -> dict[str, Views]:
-    """Return address and views of each behavior that has some and answered, sorted by address.
+    """Return address and views of each behavior that answered and has views, sorted by address.
 
     Raises:
         LinkError: The nameserver did not answer.
@@ -100,7 +100,7 @@ async def keep_looking(
     *,
     trouble: Callable[[Refusal | LinkError], None] = lambda _error: None,
 ) -> None:
-    """Look at a view until cancelled; the behavior may end and come back meanwhile.
+    """Watch a view until cancelled; the behavior may end and restart meanwhile.
 
     Args:
         bus: The bus.
@@ -108,7 +108,7 @@ async def keep_looking(
         behavior: Its address.
         view: Name of the view.
         show: Called in the event loop with each picture or value.
-        trouble: Called when the behavior does not answer or has not shown the view again, each time it is asked.
+        trouble: Called at each renewal for which the behavior does not answer or has not shown the view again.
 
     Raises:
         Refusal: The first answer is a refusal.

@@ -1,7 +1,8 @@
-"""The feed of a map: where robots are, the plan of the floor, and what cameras they have.
+"""The feed of a map: the robots' places, the plan of the floor, and the robots' cameras.
 
-Localizers publish a place when it changes; one that is silent for long is asked. In a mission without a localizer a
-simulated world, which knows every place, is asked a few times a second. It asks nothing while no page shows the map.
+Localizers publish a place when it changes. The feed asks a localizer that has been silent for long. Without a
+localizer, it asks the simulated world, which knows all places, a few times a second. While no page shows the map, it
+asks nothing.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ class MapFeed:
     """Turns messages about places into events.
 
     Args:
-        bus: Of its component.
-        clock: The mission's time.
+        bus: Bus of its component.
+        clock: The mission's clock.
         show: Called in the event loop with each event, in order.
     """
 
@@ -60,7 +61,7 @@ class MapFeed:
             self._is_watched.clear()
 
     def heard(self, said: Said) -> None:
-        """Take in which components there are."""
+        """Record the components of the mission."""
         match said:
             case ComponentState(address=at):
                 self._there[at] = said
@@ -70,7 +71,7 @@ class MapFeed:
                 self._there.pop(at, None)
 
     async def run(self) -> None:
-        """Ask for what is not published, while a page shows the map; until cancelled."""
+        """While a page shows the map, ask for data that is not published; until cancelled."""
         while True:
             await self._is_watched.wait()
             await self._look()
@@ -109,7 +110,7 @@ class MapFeed:
             self._take(pose, of.address)
 
     async def _ask_once(self, of: ComponentState, question: Message, kind: type[FloorPlan] | type[Types]) -> None:
-        """Ask each process of a component until it answered, or refused."""
+        """Ask each process of a component until it has answered or refused."""
         key = of.address, of.pid, kind.__name__
         if key in self._asked:
             return

@@ -1,4 +1,4 @@
-"""A console that only watches: it receives the mission's messages, and claims nothing."""
+"""A console that only watches: it receives the mission's messages, and claims no robot."""
 
 from __future__ import annotations
 
@@ -29,21 +29,23 @@ P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
 
 
 def no_person_here(_user: str) -> ConsentAnswers | None:
-    """Return None: a console that only a program reads has no person to ask."""
+    """Return None, because a console that only a program reads has no person to ask."""
     return None
 
 
 class Observer(Component[P_co], Generic[P_co]):
-    """Passes a screen the mission's events, and offers it the verbs that need no grant.
+    """Passes the mission's events to a screen, and offers the actions that need no grant.
 
     Args:
         show: Called in the event loop with each event, in order.
         watches: False for a console that shows its own events only.
-        signs_in: Publish that its operator came and left; False if another component does.
-        user: The person at it, for the record; empty: the console's name.
+        signs_in: True: publish the operator's arrival and departure; False if another component does.
+        user: The person at the console, for the record; empty: the console's name.
         answers: The questions to its operator; None: new ones.
-        answers_of: Returns the questions to this person, None for a person who left; None: one person sits here.
-        has_map: Also show where bodies are, and the plan of the floor, while ``map.watch`` says that a page shows it.
+        answers_of: Returns the questions to this person, or None for a person who left; None: only one person uses the
+            console.
+        has_map: True: also show bodies' places and the plan of the floor, while ``map.watch`` is set because a page
+            shows the map.
     """
 
     accepts: ClassVar[Accepts | None] = AskLift
@@ -64,7 +66,7 @@ class Observer(Component[P_co], Generic[P_co]):
     ) -> None:
         super().__init__(launch, bus, clock)
         self.show: Callable[[ConsoleEvent], None] = lambda event: show(printable_all(event))
-        """Show an event; from here on its quotations from the bus are printable text."""
+        """Show an event; quotations from the bus in it are printable text."""
         self._watches, self._signs_in = watches, signs_in
         self.user = user or launch.name
         self.feed = ConsoleFeed(bus, clock, self._heard)
@@ -91,13 +93,13 @@ class Observer(Component[P_co], Generic[P_co]):
 
     # ------------------------------------------------------------------ verbs that need no grant
     async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:
-        """Stop a robot, regardless of its holder; return whether the stop is certain."""
+        """Stop a robot, regardless of its holder; return whether the stop is confirmed."""
         self.require_let_go()
         self.acted(OperatorAction.STOP_ROBOT, robot, reason, user)
         return not await self.feed.stop_robots([robot], reason, user or self.user)
 
     async def stop_all(self, reason: str = "", user: str = "") -> list[str]:
-        """Stop every robot of the mission, regardless of its holder; return the robots whose stop is not certain.
+        """Stop all robots of the mission, regardless of their holders; return the robots whose stop is not confirmed.
 
         Known robots are stopped at once, before the nameserver is asked for further ones.
         """
@@ -111,18 +113,18 @@ class Observer(Component[P_co], Generic[P_co]):
     async def lift_stop(
         self, robot: str, number: int, user: str = "", show: Callable[[ConsoleEvent], None] | None = None
     ) -> bool:
-        """Let a stopped robot move again if the authors of its stop agree; return whether it may move.
+        """Lift a robot's stop if the stop's authors agree; return whether the robot may move.
 
         Args:
             robot: The robot.
             number: Number of the stop on the screen: a newer stop is not lifted.
-            user: The person who wants it; empty: the person at this console.
+            user: The person who lifts it; empty: the person at this console.
             show: Called with the authors' answers; None: this console's screens show them.
         """
         return await LiftTalk(self, user or self.user, show or self.show).lift(robot, number)
 
     def decide(self, is_given: bool, reason: str = "") -> None:
-        """Answer the first question to this operator: for the robot held here, or to lift a stop."""
+        """Answer the first question to this operator: for the held robot, or to lift a stop."""
         self.answers.decide(is_given, reason)
 
     async def set_parameter(self, name: str, parameter: str, value: object, user: str = "") -> bool:
@@ -133,17 +135,17 @@ class Observer(Component[P_co], Generic[P_co]):
         return is_set
 
     def acknowledged(self, count: int, key: str = "", user: str = "") -> None:
-        """Publish that the operator acknowledged so many alarms: those of one key, or all."""
+        """Publish that the operator acknowledged this number of alarms, of one key or all."""
         if count:
             self.acted(OperatorAction.ACKNOWLEDGE, "alarms", key or f"all {count}", user)
 
     async def why(self, name: str) -> list[str]:
-        """Return for people why this robot, ARC, behavior, console or component is as it is."""
+        """Return the explanation of the state of this robot, ARC, behavior, console or component, for people."""
         return await self.feed.why(name)
 
     # ------------------------------------------------------------------ the component's hooks
     def person(self) -> str:
-        """Return the person at this console; empty for a console that serves others, and has its own name."""
+        """Return the person at this console; empty for a console that serves other people and has its own name."""
         return self.user if self.user != self.name else ""
 
     async def connect(self) -> None:
@@ -171,12 +173,12 @@ class Observer(Component[P_co], Generic[P_co]):
             self.acted(OperatorAction.DETACH, self.name)
 
     async def serve(self) -> None:
-        """Publish that the operator is there, then watch."""
+        """Publish that the operator is present, then watch."""
         self.sign_in("to watch")
         await self.watch()
 
     def sign_in(self, intent: str) -> None:
-        """Publish that the operator is there, and the purpose."""
+        """Publish that the operator is present, and the purpose."""
         if self._signs_in:
             self.acted(OperatorAction.ATTACH, self.name, intent)
 
@@ -191,7 +193,7 @@ class Observer(Component[P_co], Generic[P_co]):
         """React to a new schedule. When: after it was shown."""
 
     def require_let_go(self) -> None:
-        """Ignore held controls until they were let go. When: before a stop, and when the hub does not answer."""
+        """Ignore held controls until they were released. When: before a stop, and when the hub does not answer."""
 
     def _heard(self, event: FeedEvent) -> None:
         self.show(event)
@@ -205,4 +207,4 @@ class Observer(Component[P_co], Generic[P_co]):
 
 
 AnyObserver = Observer[msgspec.Struct]
-"""An observer whose kind of parameters does not matter."""
+"""An observer with any kind of parameters."""

@@ -1,7 +1,7 @@
-"""Order keeper: carries out what the order book decides, with behaviors that the placer starts and ends.
+"""Order keeper: carries out the order book's decisions, with behaviors that the placer starts and ends.
 
-A behavior reports to its console several times a second and ends by itself if the console does not answer, so no order
-outlives its console. An order is given once: the console does not start its behavior again if that is gone.
+A behavior reports to its console several times a second, and ends by itself if the console does not answer. So no order
+outlives its console. If the behavior of an order is gone, the console does not start it again.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: core services and behaviors answer in milliseconds
 FACTS_WITHIN_S = 5.0  # chosen: a restarted core service is back within a second or two; machine seconds
-END_WITHIN_S = 30.0  # chosen: as for ARCs, a host may be busy
-AGAIN_AFTER_S = 0.2  # chosen: a restarted placer is back within one or two of these; machine seconds
-DRAIN_WITHIN_S = 1.0  # chosen: behaviors that were not ended by then end themselves as soon as the console is gone
+END_WITHIN_S = 30.0  # chosen: as for ARCs, because a host may be busy
+AGAIN_AFTER_S = 0.2  # chosen: a restarted placer is back after one or two of these intervals; machine seconds
+DRAIN_WITHIN_S = 1.0  # chosen: behaviors that still run then end by themselves as soon as the console is gone
 
 
 class UnknownOrder(Refusal):
@@ -59,10 +59,10 @@ class OrderKeeper:
 
     Args:
         console: The console.
-        robot: Returns the robot that the stick is at; empty: none.
-        hand_over: Gives this robot from the stick to its order, which waits for it; does nothing if the stick has not
-            asked for it.
-        take: Asks for this robot by the stick.
+        robot: Returns the robot at the stick; empty: none.
+        hand_over: Hands this robot from the stick over to its waiting order; does nothing if the stick has not claimed
+            it.
+        take: Claims this robot for the stick.
     """
 
     def __init__(
@@ -81,15 +81,15 @@ class OrderKeeper:
     # ------------------------------------------------------------------ the operator
     @property
     def orders(self) -> Mapping[str, GivenOrder]:
-        """Robot → its order; a final one still keeps the robot for the operator."""
+        """Robot → its order; a finished order still keeps the robot for the operator."""
         return self._book.orders
 
     def goes_on(self, robot: str) -> bool:
-        """Return whether an order of this robot goes on."""
+        """Return whether this robot has an unfinished order."""
         return self._book.goes_on(robot)
 
     def give(self, orders: Sequence[Order]) -> list[int]:
-        """Give these orders, all at once; each is shown with its outcome; return their numbers."""
+        """Give these orders at the same time, and show the outcome of each; return their numbers."""
         return [self._give(order if order.robot else replace(order, robot=self._robot())) for order in orders]
 
     def _give(self, order: Order) -> int:
@@ -98,17 +98,17 @@ class OrderKeeper:
         return self._book.last
 
     def touched(self, robot: str) -> bool:
-        """End the order of this robot, because its operator wants it by the stick; return whether it had one."""
+        """End the order of this robot, because its operator wants it at the stick; return whether it had an order."""
         todo = self._book.touched(robot)
         self._carry_out(todo)
         return bool(todo)
 
     def taken(self, robot: str) -> None:
-        """Note that the stick has the robot."""
+        """Record that the stick has the robot."""
         self._carry_out(self._book.taken(robot))
 
     async def wait_begun(self, robot: str) -> None:
-        """Return when no order of this robot is starting: its behavior waits for the robot, or it came to nothing."""
+        """Wait until no order of this robot is starting: its behavior waits for the robot, or the order has failed."""
         while (given := self._book.orders.get(robot)) is not None and given.state is OrderState.STARTING:
             await self._changed.wait()
 
@@ -121,7 +121,7 @@ class OrderKeeper:
         return bool(todo)
 
     def away(self, why: str) -> None:
-        """Note that the operator is away: each robot goes back to the mission when its order is over."""
+        """Record that the operator is away: each robot returns to the mission when its order is over."""
         self._carry_out(self._book.away(why))
 
     # ------------------------------------------------------------------ the behaviors
@@ -129,7 +129,7 @@ class OrderKeeper:
         """Note the report of a behavior.
 
         Raises:
-            UnknownOrder: It carries out no order of this console; it ends then.
+            UnknownOrder: The behavior carries out no order of this console; it then ends.
         """
         number = self._number_of(report.child)
         if number is None or component_of(source) != report.child:
@@ -145,7 +145,7 @@ class OrderKeeper:
         return ReportNoted()
 
     async def drain(self) -> None:
-        """End all orders, because the console ends; those that are not ended in time end themselves."""
+        """End all orders, because the console ends; behaviors that do not end in time end by themselves."""
         for robot in list(self._book.orders):
             for step in self._book.given_back(robot, "the console ends"):
                 if isinstance(step, ShowOrder):
@@ -202,7 +202,7 @@ class OrderKeeper:
 
     # ------------------------------------------------------------------ the life of a behavior
     async def _carry(self, number: int) -> None:
-        """Start the behavior of an order, and wait until it is gone; meanwhile it reports."""
+        """Start the behavior of an order, and wait until it is gone; it reports meanwhile."""
         console = self._console
         try:
             start = await self._start_of(number)
@@ -226,9 +226,9 @@ class OrderKeeper:
         self._carry_out(self._book.lost(number, why, in_front=self._is_in_front(number)))
 
     async def _start_of(self, number: int) -> Start:
-        """Return what starts the behavior; show what its positions come from."""
+        """Return the launch of the behavior; show the source of its positions."""
         given = self._book.get(number)
-        assert given is not None  # noqa: S101  it is removed only after its task was cancelled
+        assert given is not None  # noqa: S101  the order is removed only after its task was cancelled
         console, order = self._console, given.order
         types, hardware, there = await asyncio.gather(
             self._ask(COMPONENT_DATABASE, ListTypes(), Types),
@@ -251,7 +251,7 @@ class OrderKeeper:
         )
 
     async def _wait_queued(self, number: int) -> None:
-        """Return when the behavior waits for its robot at the RC manager, or has it."""
+        """Wait until the behavior's request for its robot is at the RC manager, or granted."""
         behavior, is_queued = self._address(number), asyncio.Event()
 
         def look(schedule: Schedule) -> None:
@@ -291,7 +291,7 @@ class OrderKeeper:
         self._removals.pop(number, None)
 
     async def _end(self, number: int) -> None:
-        """Return when the placer has ended the behavior, or does not have it."""
+        """Return when the placer has ended the behavior, or does not know it."""
         console, name = self._console, behavior_of(self._console.name, number)
         while True:
             try:
@@ -312,7 +312,7 @@ class OrderKeeper:
 
 
 def _outcome(payload: Mapping[str, object]) -> str:
-    """Return for people why a behavior failed, or where it arrived, as its payload tells; empty: it does not."""
+    """Return the reason of failure or the place of arrival from a behavior's payload, for people; empty: not stated."""
     match payload:
         case {"detail": str(detail)}:
             return detail

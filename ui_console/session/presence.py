@@ -1,4 +1,4 @@
-"""Presence of a console's operator: a touch shows it, a long silence shows the absence."""
+"""Presence of a console's operator: an action shows presence, a long inactivity shows absence."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class OperatorPresence:
-    """Shows when the operator turns away and comes back.
+    """Shows when the operator leaves and returns.
 
     Args:
         console: The operator's console.
@@ -26,16 +26,16 @@ class OperatorPresence:
         self._is_there = True
 
     def touch(self) -> None:
-        """Note that the operator is there."""
+        """Record that the operator is there."""
         self._show(True)
         self._touched.set()
 
     def leave(self) -> None:
-        """Note that the operator turned away."""
+        """Record that the operator turned away."""
         self._show(False)
 
     async def run(self, away_after_s: float, away: Callable[[], Awaitable[None]]) -> None:
-        """Call ``away`` after each so many machine seconds without a touch; until cancelled."""
+        """Call ``away`` after this number of machine seconds without an action, repeatedly, until cancelled."""
         while True:
             self._touched.clear()
             if not await set_within(self._touched, away_after_s):

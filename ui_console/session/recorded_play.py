@@ -1,7 +1,7 @@
-"""Playing a recording to a console in this process: its time stands still, passes, or is somewhere else.
+"""Playback of a recording to a console in this process: pause, play, and jump to another time.
 
-A player says on a local bus what was said, and a console hears it. To go back, or far ahead, both begin anew at that
-time; the screen stays. Nothing can be commanded.
+A player publishes the recorded messages on a local bus, and a console receives them. For a jump back or far ahead,
+player and console are created again at the new time; the screen stays. Commands are not possible.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from backbone.recording.player import Player
 from backbone.recording.reader import Recording, open_file
 from backbone.waiting import end_tasks, first_to_end
 
-NEAR_S = 2.0  # chosen: a step ahead is played, so that nothing between is left out; mission seconds
-LOOK_EACH_S = 0.1  # chosen: the end is noticed before a person wonders; machine seconds
-AGAIN_EACH_S = 1.0  # chosen: what is opened while time stands still has its pictures soon; machine seconds
+NEAR_S = 2.0  # chosen: a shorter step ahead is played, so that no message is left out; mission seconds
+LOOK_EACH_S = 0.1  # chosen: detects the end soon enough for a person; machine seconds
+AGAIN_EACH_S = 1.0  # chosen: a view opened during a pause gets its pictures soon; machine seconds
 STEPS_TO = tuple(f"*/{one}" for one in (Conversation.FRAMES, Conversation.LOG, Conversation.SCHEDULE))
 NOT_NOW = "This is a recording: nothing in it can be commanded. It can be played, and asked why."
 
 
 class Shows(Protocol):
-    """What hears a recording from one time on."""
+    """A console that receives a recording from one time on."""
 
     async def run(self) -> None:
-        """Hear it until cancelled."""
+        """Receive the recording until cancelled."""
 
 
 Console = TypeVar("Console", bound=Shows)
@@ -45,7 +45,7 @@ NewConsole = Callable[[Launch, LocalNetwork, Playback], Console]
 
 
 def opener(path: Path) -> Callable[[], IO[bytes]]:
-    """Return what opens this file; it raises ``FileUnusable`` if that cannot be done."""
+    """Return a function that opens this file, and raises ``FileUnusable`` if that fails."""
 
     def opened() -> IO[bytes]:
         try:
@@ -57,13 +57,13 @@ def opener(path: Path) -> Callable[[], IO[bytes]]:
 
 
 class Performance(Generic[Console]):
-    """A recording that is played from one instant on, and the console that hears it."""
+    """A recording that is played from one time on, and the console that receives it."""
 
     def __init__(self, player: Player, console: Console, close: Callable[[], asyncio.Future[None]]) -> None:
         self.player, self.console, self._close = player, console, close
 
     async def begin(self) -> None:
-        """Take in what was said before; the screen stays usable meanwhile.
+        """Apply the messages before this time; the screen stays usable meanwhile.
 
         Raises:
             NoRecording: The recording is damaged.
@@ -91,13 +91,13 @@ class RecordedPlay(Generic[Console]):
 
     Args:
         opened: Opens the recording's file once more.
-        machine: Its seconds are those of the machine.
-        name: Of the console.
-        new_console: Makes what hears the recording from a time on; its bus is joined to that network.
+        machine: Clock of machine seconds.
+        name: Name of the console.
+        new_console: Creates the console that receives the recording from a time on; its bus joins the given network.
 
     Raises:
-        NoRecording: The file is none, or its recorder was killed.
-        OtherForm: It is of another release.
+        NoRecording: The file is not a recording, or its recorder was killed.
+        OtherForm: The recording was made by another release.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class RecordedPlay(Generic[Console]):
     ) -> None:
         self._opened, self._machine, self._name, self._new_console = opened, machine, name, new_console
         self.moved: Callable[[Console], Awaitable[None]] | None = None
-        """Awaited with what shows the time of now, when a jump has made another one."""
+        """Awaited with the new console after a jump."""
         self.classes = message_classes()
         """Known message classes by schema."""
         self._recording = Recording(opened())
@@ -113,31 +113,31 @@ class RecordedPlay(Generic[Console]):
         self.mission = legal((found.about.get("mission") or "recording")[:MAX_NAME_LENGTH])
         self.playback = Playback(machine, found.begin_s, found.end_s)
         self.markers = markers_in(self._recording)
-        """In the order of time."""
+        """The markers in the order of time."""
         self._checkpoints = Checkpoints(self.classes)
         self._is_elsewhere, self._arrived, self._ended = asyncio.Event(), asyncio.Event(), asyncio.Event()
         self._performance = self._new_performance()
 
     @property
     def console(self) -> Console:
-        """What shows the time of now; another one after a jump."""
+        """The console at the present time; replaced after a jump."""
         return self._performance.console
 
     def reopened(self) -> Recording:
-        """Return the recording, opened once more for another reader."""
+        """Open the recording again for another reader."""
         return Recording(self._opened())
 
     async def wait_arrived(self) -> None:
-        """Return when the time that a person went to is shown: answers are of that time."""
+        """Wait until the requested time is shown, so that answers are of that time."""
         await self._arrived.wait()
 
     async def wait_elsewhere(self) -> None:
-        """Return when a person has gone to a time that begins anew."""
+        """Wait until a person has jumped to another time."""
         await self._is_elsewhere.wait()
 
     # ------------------------------------------------------------------ verbs of a person
     def play(self, speed: float) -> None:
-        """Let time pass, from the begin again if it has come to the end."""
+        """Play; at the end, begin again."""
         if self.playback.now_s() >= self.playback.end_s:
             self.go_to(self.playback.begin_s)
         self.playback.play(speed)
@@ -151,7 +151,7 @@ class RecordedPlay(Generic[Console]):
             self._is_elsewhere.set()
 
     def step(self) -> None:
-        """Go on to the next picture, decision or event, and stand still there."""
+        """Go to the next picture, decision or event, and pause there."""
         since_s = math.nextafter(self.playback.now_s(), math.inf)
         following = next(self._recording.messages(STEPS_TO, since_s), None)
         self.playback.pause()

@@ -1,4 +1,4 @@
-"""Driving without a screen: a script in, JSON lines out."""
+"""Driving without a screen: a script goes in, JSON lines come out."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class ScriptDriver:
 
     Args:
         write: Called with each line of JSON, without its end; must write it at once.
-        steps: The whole script; None: steps come by ``feed``.
-        within_s: Mission seconds the grant may take; 0: any time.
+        steps: The whole script; None: steps arrive by ``feed``.
+        within_s: Longest wait for the grant, mission seconds; 0: no limit.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class ScriptDriver:
         self._awaited = 0
 
     def show(self, event: events.ConsoleEvent) -> None:
-        """Write the event if it is one for scripts; unanswered commands are one line until an answer comes."""
+        """Write the event if it is one for scripts; unanswered commands make one line until an answer arrives."""
         if isinstance(event, _FOR_SCREENS_ONLY) or self._is_repeated(event):
             return
         said = events.said(event)
@@ -63,7 +63,7 @@ class ScriptDriver:
         self._write(events.event_json(event))
 
     def _follow_order(self, event: events.ConsoleEvent) -> None:
-        """Note how the order goes that the script waits for: it goes on once the robot is in hand again."""
+        """Follow the order for which the script waits: the script continues when the stick has the robot again."""
         if isinstance(event, events.OrderChanged):
             self._failed = self._failed or event.given.state is OrderState.FAILED
             is_awaited = event.given.number == self._awaited
@@ -81,12 +81,12 @@ class ScriptDriver:
         return self._player.must_let_go
 
     def _moves(self, word: str) -> bool:
-        """Return whether a command moves the robot; True as long as that is not known."""
+        """Return whether a command moves the robot; True while that is not known."""
         abilities = self._console.arc_abilities if self._console is not None else None
         return abilities is None or abilities.moves(word)
 
     def _is_repeated(self, event: events.ConsoleEvent) -> bool:
-        """Note a missing answer, and the next answer; return True for a missing answer after another one."""
+        """Track missing answers; return True for a missing answer that follows another one."""
         if isinstance(event, events.LinkTrouble) and event.command:
             was_unanswered, self._is_unanswered = self._is_unanswered, True
             return was_unanswered
@@ -95,7 +95,7 @@ class ScriptDriver:
         return False
 
     def feed(self, line: str | None) -> None:
-        """Take the next line of the script; None: its end. A wrong line ends the script there."""
+        """Read the next line of the script; None: its end. A wrong line ends the script."""
         if self._wrong is None:
             try:
                 step = None if line is None else self._reader.read(line)
@@ -167,7 +167,7 @@ class ScriptDriver:
             await self._wait_news(console, granted_s)
 
     def _begin_stops(self) -> None:
-        """Carry out the emergency stops that count at once, if the console is there yet."""
+        """Carry out the immediate emergency stops, if the console is ready."""
         if self._console is None or not self._console.is_ready:
             return
         stops, self._stops = self._stops, []
@@ -183,7 +183,7 @@ class ScriptDriver:
         self._failed = self._failed or not is_sure
 
     async def _wait_news(self, console: Teleoperation, granted_s: float) -> None:
-        """Return once the next step is due or another one arrived."""
+        """Wait until the next step is due or another one has arrived."""
         next_s = self._player.next_s
         wait_s = None
         if next_s is not None:
@@ -198,7 +198,7 @@ class ScriptDriver:
 def feed_from(descriptor: int, feed: Callable[[str | None], None]) -> None:
     """Call ``feed`` in this event loop with each line read from a file descriptor, then with None.
 
-    The thread that reads dies with the process: a pipe that stays open delays nothing.
+    The reading thread ends with the process, so an open pipe delays nothing.
     """
     loop = asyncio.get_running_loop()
 

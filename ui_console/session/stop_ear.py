@@ -23,8 +23,8 @@ class StopEar:
     """Subscribes to one robot at a time.
 
     Args:
-        console: The console that holds it.
-        heard: Called with each state, with the one in force at the beginning too.
+        console: The console that holds the robot.
+        heard: Called with each state, beginning with the present one.
     """
 
     def __init__(self, console: AnyObserver, heard: Callable[[StopState], None]) -> None:
@@ -33,7 +33,7 @@ class StopEar:
         self._robot, self._known = "", asyncio.Event()
 
     async def listen(self, robot: str) -> None:
-        """Subscribe to this robot alone; return when its state is known, or after a short time-out.
+        """Subscribe to this robot only; return when its state is known, or after a short time-out.
 
         When: as soon as the robot of the claim is known, so that the grant does not wait for the answer.
         """
@@ -54,7 +54,7 @@ class StopEar:
         try:
             async with asyncio.timeout(LEARN_WITHIN_S):
                 self._heard(await ask_stop(self._console.bus, robot))
-        except (Refusal, LinkError, TimeoutError) as error:  # a robot of another make may know no such stop
+        except (Refusal, LinkError, TimeoutError) as error:  # other robots may not support stops
             log.info("%s did not answer with its stop: %s", robot, error)
         finally:
             known.set()

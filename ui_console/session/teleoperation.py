@@ -1,9 +1,9 @@
-"""Teleoperation: a person's hold on one robot.
+"""Teleoperation: a person holds and drives one robot.
 
-The console claims an ARC by its ``arc_claim``, and gives it back on request, at its end, or by its death, which the ARC
-sees. Faces (terminal, script) receive events through ``show`` and pictures through ``see``, and call the verbs.
-Commands go through ``controls``, the operators' questions about the robot through ``consent_talk``, orders to robots
-through ``order_keeper``.
+The console claims an ARC by its ``arc_claim``, and releases it on request or at its end; if the console dies, the ARC
+detects that. User interfaces (terminal, script) receive events through ``show`` and pictures through ``see``, and call
+the methods below "verbs". ``controls`` sends commands, ``consent_talk`` handles operators' questions about the robot,
+``order_keeper`` handles orders.
 """
 
 from __future__ import annotations
@@ -44,19 +44,19 @@ log = logging.getLogger(__name__)
 
 
 class Teleoperation(OrderVerbs):
-    """One console.
+    """A console that drives a robot.
 
     Args:
         show: Called with each event, in order.
         see: Called with the newest picture; pictures of earlier grants never arrive.
-        work: Run once the console is ready, instead of a wait for a request to end; its end ends the console.
-        takes: Claim at once.
-        orders: Orders to give at once, with the stick at the robot of the parameters.
-        watches: Also show events of other components.
-        keeps_arc: Keep the ARC when the robot is given back, so that the next take needs no start of an ARC.
-        signs_in: Publish that its operator came and left; False if another component does.
+        work: Run when the console is ready, instead of a wait for a request to end; its end ends the console.
+        takes: True: claim at once.
+        orders: Orders to give at once, with the stick at the robot in the parameters.
+        watches: True: also show events of other components.
+        keeps_arc: True: keep the ARC when the robot is released, so that the next claim needs no start of an ARC.
+        signs_in: True: publish the operator's arrival and departure; False if another component does.
         user: The driver, for the record; empty: the console's name.
-        answers: The questions to its operator, if several consoles are one person's; None: new ones.
+        answers: The questions to its operator, if one person has several consoles; None: new ones.
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
@@ -112,7 +112,7 @@ class Teleoperation(OrderVerbs):
 
     @property
     def arc_abilities(self) -> ArcAbilities | None:
-        """What the operator can do with the ARC; None: not known."""
+        """Abilities of the ARC; None: not known."""
         return self._controls.abilities
 
     @property
@@ -126,16 +126,16 @@ class Teleoperation(OrderVerbs):
             self._claim.take()
 
     async def switch(self, robot: str, kind: str = "") -> None:
-        """Claim another robot in place of the present one, which is stopped and given back first.
+        """Stop and release the present robot, then claim another one.
 
-        An order of the present robot goes on, and so does one of the other robot: then the stick only turns to it. The
-        present robot stays with the stick until the behavior of its order can have it.
-        After several calls in a row the console claims the last robot.
+        Orders of both robots continue; if the other robot has an order, the stick only turns to it. The present robot
+        stays with the stick until the behavior of its order can take it. After several calls in a row the console
+        claims the last robot.
 
         Args:
             robot: Its name.
-            kind: Component type of the ARC; another one than now also gives the robot back and claims it anew. Empty:
-                that of now for the same robot, else that of the console's parameters.
+            kind: Component type of the ARC; if it differs from the present one, the robot is released and claimed
+                again. Empty: the present type for the same robot, else the type in the console's parameters.
         """
         wished = self._next = (robot, kind)
         async with self._switching:
@@ -152,23 +152,23 @@ class Teleoperation(OrderVerbs):
                 self.take()
 
     def touch(self) -> None:
-        """Note that the operator is there; driving shows that by itself."""
+        """Record that the operator is present; driving records that by itself."""
         self._presence.touch()
 
     def leave(self) -> None:
-        """Stop the wheels and ignore held controls: the operator turned away, or the window is no longer in front."""
+        """Stop the wheels and ignore held controls, because the operator turned away or the window lost the focus."""
         self._presence.leave()
         self.require_let_go()
 
     def require_let_go(self) -> None:
-        """Stop the wheels; a control that is held moves nothing until it was let go and pressed anew.
+        """Stop the wheels; a held control moves nothing until it was released and pressed again.
 
         When: a dialog opens or closes. Stops, lifts, grants, and the loss of robot or link require it anyway.
         """
         self._controls.require_let_go()
 
     async def wait_granted(self) -> None:
-        """Return when the claim was granted.
+        """Wait until the claim is granted.
 
         Raises:
             Refusal: The claim was refused.
@@ -176,7 +176,7 @@ class Teleoperation(OrderVerbs):
         await self._claim.wait_granted()
 
     def hold(self, drive: Motion, lasts_s: float | None = None) -> None:
-        """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
+        """Record that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
         Args:
             drive: The command of the key.
@@ -191,7 +191,7 @@ class Teleoperation(OrderVerbs):
         self._controls.stop()
 
     def give(self, wish: GiveWish) -> None:
-        """Take in that the control for one command is pressed: give it, unless the control has to be let go first."""
+        """Handle a press of the control for one command: send it, unless the control must be released first."""
         self.touch()
         if self._controls.press_once(wish.word):
             self.interrupt()
@@ -207,12 +207,12 @@ class Teleoperation(OrderVerbs):
         self.start_task(self.give_back(), "release")
 
     async def give_back(self, reason: str = "released", *, for_good: bool = False, wanted: bool = True) -> None:
-        """Give the robot back, also from an order, which ends; afterwards the console watches until the next ``take``.
+        """Release the robot and end its order, if any; afterwards the console watches until the next ``take``.
 
         Args:
             reason: For people.
-            for_good: End the ARC also if the console keeps it otherwise.
-            wanted: False if the operator did not ask for it.
+            for_good: End the ARC even if the console usually keeps it.
+            wanted: False if the operator did not request the release.
         """
         robot, had_stick = self._robot, self._claim.is_asking
         had_order = await self._orders.give_back(robot, reason)
@@ -229,7 +229,7 @@ class Teleoperation(OrderVerbs):
             await self._claim.give_back(f"ordered: {order}")
 
     def _take_back(self, robot: str) -> None:
-        """Claim the robot by the stick, which goes before its order."""
+        """Claim the robot for the stick, which has priority over the order."""
         if robot != self._robot:
             return
         if self.is_held and self._claim.holding == robot:
@@ -244,20 +244,20 @@ class Teleoperation(OrderVerbs):
 
     # ------------------------------------------------------------------ consent
     def begin_ask_consent(self, why: str = "") -> None:
-        """Ask the consoles that hold the robot, and show their answers; do nothing while such a question is open."""
+        """Ask the consoles that hold the robot, and show their answers; if such a question is open, do nothing."""
         robot, is_waiting = self.parameters.robot, self._claim.is_asking and not self.is_held
         claim = Claim(self.parameters.arc(self.bus), robot, robot or ANY_ROBOT, self._claim.asked_s)
         self._consent.begin_ask(claim if is_waiting else None, why)
 
     def _consent_at_once(self) -> Consent | None:
-        """Return the answer to a question for the robot if it needs no decision; None: the operator decides."""
+        """Return the answer to a question for the robot if no decision is needed; None: the operator decides."""
         if not self.is_held:
             return Consent(not self._claim.is_asking, self.user, "holds nothing")
         return Consent(False, self.user, "a script drives") if self._work is not None else None
 
     # ------------------------------------------------------------------ the component's hooks
     async def serve(self) -> None:
-        """Claim, then listen; the keys have a task of their own."""
+        """Claim, then receive events; a separate task sends the commands of held keys."""
         self.sign_in(f"to drive {self.parameters.robot or ANY_ROBOT}, with priority {self.parameters.priority}")
         if self._takes:
             self.take()
@@ -272,7 +272,7 @@ class Teleoperation(OrderVerbs):
         await self.watch()
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer the ARC's notices, and other consoles that ask for the robot or to lift a stop."""
+        """Answer the ARC's notices and the questions of other consoles for the robot or a lift of a stop."""
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once())
         if isinstance(asked.body, AskHandOver):
@@ -288,7 +288,7 @@ class Teleoperation(OrderVerbs):
         return await self._claim.handle(asked.body)
 
     async def drain(self) -> None:
-        """Give the robots back if they were not."""
+        """Release all robots."""
         await asyncio.gather(self._orders.drain(), self._claim.give_back("the console ends", for_good=True))
         await super().drain()
 
@@ -306,7 +306,7 @@ class Teleoperation(OrderVerbs):
 
     # ------------------------------------------------------------------ away, and single commands
     async def _go_away(self) -> None:
-        """Let the robot go on with useful work while its operator is away."""
+        """Release the robot for useful work while its operator is away."""
         self.leave()
         self._orders.away(f"{self.user} is away")
         await self._claim.give_back(f"{self.user} is away", wanted=False)

@@ -1,4 +1,4 @@
-"""Actions of a console's keys: they change its model, and call the verbs of its component."""
+"""Actions of a console's keys: they change its model, and call methods of its component."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 
 
 class Session:
-    """A screen's only access to its console; before the component is ready, keys do nothing.
+    """The only interface between a screen and its console; before the component is ready, keys do nothing.
 
     Args:
         model: Content of the screen.
@@ -59,12 +59,12 @@ class Session:
         return self._console.clock.now_s() if self._console is not None else 0.0
 
     def steer(self, forward: float, right: float, speed: float, lasts_s: float | None = None) -> None:
-        """Take in that a stick, pad or drive key is held; do nothing if the ARC has no body that moves."""
+        """Record that a stick, pad or drive key is held; do nothing if the ARC has no body that moves."""
         if (reach := self.model.reach) is not None:
             self.hold(move_by_stick(forward, right, speed, reach), lasts_s)
 
     def hold(self, move: MoveWish, lasts_s: float | None = None) -> None:
-        """Take in that a drive key is down."""
+        """Record that a drive key is down."""
         self._with_robot(lambda console: console.hold(move, lasts_s))
 
     def stop(self) -> None:
@@ -72,7 +72,7 @@ class Session:
         self._with_robot(Teleoperation.stop)
 
     def give(self, wish: GiveWish) -> None:
-        """Give one command."""
+        """Send one command."""
         self._with_robot(lambda console: console.give(wish))
 
     def jump(self) -> None:
@@ -94,15 +94,15 @@ class Session:
         return self._console.orders if isinstance(self._console, Teleoperation) else {}
 
     def robots_held(self) -> list[str]:
-        """Return the robots that the operator has, by the stick or by an order, sorted."""
+        """Return the robots that the operator has by stick or order, sorted."""
         return sorted({*self.orders, *([self.model.mine] if self.model.mine else [])})
 
     def order(self, order: Order) -> None:
-        """Tell a robot to do something by itself."""
+        """Give a robot an order."""
         self._with_robot(lambda console: console.order(order))
 
     def order_group(self, orders: Sequence[Order]) -> None:
-        """Tell robots to do something by themselves, all at once."""
+        """Give robots orders at the same time."""
         self._with_robot(lambda console: console.order_group(orders))
 
     def halt(self) -> None:
@@ -120,11 +120,11 @@ class Session:
             self._console.decide(is_given)
 
     def require_let_go(self) -> None:
-        """Ignore held controls until they were let go and pressed anew."""
+        """Ignore held controls until they were released and pressed again."""
         self._with_robot(Teleoperation.require_let_go)
 
     def dismiss_lost(self) -> None:
-        """Note that the operator knows of a lost robot."""
+        """Record that the operator knows of a lost robot."""
         self.model.dismiss_lost()
 
     async def switch(self, robot: str) -> None:
@@ -133,7 +133,7 @@ class Session:
             await self._console.switch(robot)
 
     async def next_robot(self) -> None:
-        """Turn to the robot after this one in the list, from the last to the first; this one's order goes on."""
+        """Turn to the next robot in the list, from the last one to the first; the present robot's order continues."""
         robots, here = self.model.team.robots.names(), self.model.robot
         if robots:
             await self.switch(robots[(robots.index(here) + 1) % len(robots)] if here in robots else robots[0])
@@ -143,15 +143,15 @@ class Session:
         self._with_robot(lambda console: console.start_task(self.next_robot(), "next robot"))
 
     def touch(self) -> None:
-        """Note that the operator is there."""
+        """Record that the operator is there."""
         self._with_robot(Teleoperation.touch)
 
     def leave(self) -> None:
-        """Note that the operator turned away."""
+        """Record that the operator turned away."""
         self._with_robot(Teleoperation.leave)
 
     def closed(self) -> None:
-        """End the component, which gives the robot back: the screen has ended."""
+        """End the component, which releases the robot, because the screen has ended."""
         if self._console is not None:
             self._console.end("the screen was closed")
 
@@ -162,11 +162,11 @@ class Session:
             self._console.acknowledged(seen, key)
 
     async def stop_robot(self, robot: str) -> bool:
-        """Stop a robot; return whether the stop is certain."""
+        """Stop a robot; return whether the stop is confirmed."""
         return await self._ready_console().stop_robot(robot)
 
     async def stop_all(self) -> list[str]:
-        """Stop all robots; return the robots whose stop is not certain."""
+        """Stop all robots; return the robots whose stop is not confirmed."""
         return await self._ready_console().stop_all()
 
     async def lift_stop(self, robot: str, number: int) -> bool:
@@ -210,18 +210,18 @@ class Session:
         show: Callable[[ViewPicture | ViewValue], None],
         trouble: Callable[[Refusal | LinkError], None],
     ) -> None:
-        """Look at a debug view until cancelled; see ``looking.keep_looking``."""
+        """Watch a debug view until cancelled; see ``looking.keep_looking``."""
         console = self._ready_console()
         await keep_looking(console.bus, console.clock, behavior, view, show, trouble=trouble)
 
     # ------------------------------------------------------------------ what is said
     async def keep_listing(self, show: Callable[[list[KeyRow]], None]) -> None:
-        """Call ``show`` each second with the keys at which something is said, until cancelled."""
+        """Call ``show`` each second with the keys that have messages, until cancelled."""
         console = self._ready_console()
         await keep_listing(console.bus, console.clock, show)
 
     async def keep_hearing(self, row: KeyRow, begin: Callable[[KeyView], None]) -> None:
-        """Call ``begin`` with a view of a key, then show in it what is said there, until cancelled."""
+        """Call ``begin`` with a view of a key, then show the key's messages in it, until cancelled."""
         console = self._ready_console()
         classes = await self._known_classes()
         view = KeyView(row.schema, await asyncio.to_thread(installed_views))

@@ -1,4 +1,4 @@
-"""While a console waits for a robot: the reason, and a hold of the same person at another screen."""
+"""Tasks while a console waits for a robot: find the reason, and settle a hold of the same person at another screen."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ log = logging.getLogger(__name__)
 
 
 class Waiting:
-    """Asks anew after each change of the schedule.
+    """Asks again after each change of the schedule.
 
     Args:
         console: The console that waits.
         hand_over: Messages with this person's other screens.
-        waits_for: Returns the robot that the console waits for, and since when; None: it waits no more.
+        waits_for: Returns the robot for which the console waits, and the begin of the wait; None: it no longer waits.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class Waiting:
         self._asking: asyncio.Task[None] | None = None
 
     def ask(self, arc: str) -> None:
-        """Ask why this ARC waits, if it does, unless an answer is still under way."""
+        """Ask why this ARC waits, if it does, unless an earlier question is still open."""
         if self._asking is None and self._waits_for() is not None:
             self._asking = self._console.start_task(self._ask(arc), "why")
 

@@ -38,12 +38,12 @@ class ConsoleApp(ConsoleDisplay):
     """One console's screen, and its keys."""
 
     def _open(self, dialog: Dialog[A], answered: Callable[[A], object] | None = None, *, stale: str = "") -> None:
-        """Open a dialog; a key held at its opening or closing drives no more until it was let go.
+        """Open a dialog; a key held at its opening or closing does not drive until it was released.
 
         Args:
             dialog: The dialog.
             answered: Called with its answer.
-            stale: If given, shown instead of that if the robot was stopped, freed, granted or lost meanwhile.
+            stale: Message to show instead of the answer if the robot was stopped, freed, granted or lost meanwhile.
         """
 
         def closed(answer: A | None) -> None:
@@ -62,20 +62,20 @@ class ConsoleApp(ConsoleDisplay):
 
     @work
     async def _begin(self, act: Callable[[], Awaitable[object]]) -> None:
-        """Run this in a task, so that keys go on to work."""
+        """Run this in a task, so that keys continue to work."""
         await act()
 
     # ------------------------------------------------------------------ keys that drive
     def on_key(self, _event: Key) -> None:
-        """Note that the operator is there."""
+        """Record that the operator is there."""
         self._session.touch()
 
     def on_mouse_down(self, _event: MouseDown) -> None:
-        """Note that the operator is there."""
+        """Record that the operator is there."""
         self._session.touch()
 
     def on_input_changed(self, _event: Input.Changed) -> None:
-        """Note that the operator is there: a field keeps the keys to itself."""
+        """Record that the operator is there, because a field does not pass its keys on."""
         self._session.touch()
 
     def action_drive(self, direction: Direction) -> None:
@@ -91,7 +91,7 @@ class ConsoleApp(ConsoleDisplay):
         self._session.stop()
 
     def action_stop(self) -> None:
-        """Stop the wheels now, also those of a robot that carries out an order: the order ends."""
+        """Stop the wheels now; if the robot carries out an order, the order ends."""
         self._session.halt()
 
     def action_jump(self) -> None:
@@ -102,7 +102,7 @@ class ConsoleApp(ConsoleDisplay):
         self._session.jump()
 
     def action_command(self) -> None:
-        """Choose one of the robot's other commands, and give it."""
+        """Choose one of the robot's other commands, and send it."""
         if self._session.model.held is None:
             self.notify("you hold no robot: take one first", severity="warning")
         elif self._abilities is None or not self._abilities.commands:
@@ -114,7 +114,7 @@ class ConsoleApp(ConsoleDisplay):
             self._open(dialog, self._session.give, stale=stale)
 
     def action_order(self) -> None:
-        """Choose what this robot, or all that the operator holds, are to do by themselves."""
+        """Choose an order for this robot, or for all robots that the operator holds."""
         robot, others = self._session.model.robot, self._session.robots_held()
         if not robot:
             self.notify("which robot? take one first", severity="warning")
@@ -132,7 +132,7 @@ class ConsoleApp(ConsoleDisplay):
         self.redraw()
 
     def action_release(self) -> None:
-        """Give the robot back and go on watching."""
+        """Release the robot and continue to watch."""
         self._session.release()
 
     def action_take(self) -> None:
@@ -140,14 +140,14 @@ class ConsoleApp(ConsoleDisplay):
         self._session.take()
 
     def action_take_or_release(self) -> None:
-        """Ask for the robot, or give it back: the pendant's key for both."""
+        """Claim or release the robot; the pendant has one key for both."""
         if self._session.model.asked is None:
             self._session.take()
         else:
             self._session.release()
 
     def action_ask_consent(self) -> None:
-        """Ask the operator who holds the robot this one waits for."""
+        """Ask the operator who holds the robot for which this operator waits."""
         self._session.ask_consent()
 
     def action_ask_consent_because(self) -> None:
@@ -159,13 +159,13 @@ class ConsoleApp(ConsoleDisplay):
         self._session.decide(is_given)
 
     def on_app_blur(self, _event: AppBlur) -> None:
-        """Stop the wheels when the window is left: it gets no key events after that."""
+        """Stop the wheels when the window loses the focus, because it gets no key events after that."""
         if self.drives:
             self.screen_stack[0].query_one(DrivePad).let_go()
             self._session.leave()
 
     def on_app_focus(self, _event: AppFocus) -> None:
-        """Note that the operator is there again."""
+        """Record that the operator is there again."""
         if self.drives:
             self._session.touch()
 
@@ -187,7 +187,7 @@ class ConsoleApp(ConsoleDisplay):
         self._begin(self._stop_all)
 
     def action_lift(self) -> None:
-        """Show the stop with its authors and reason, and lift it if another key confirms that."""
+        """Show the stop with its authors and reason, and lift it if a different key confirms."""
         robots = {robot.robot: robot for robot in self._view.robots} if self._view is not None else {}
         stopped = [name for name, robot in robots.items() if robot.stop is not None]
         meant = stop_meant(stopped, **self._robots_at_hand())
@@ -222,7 +222,7 @@ class ConsoleApp(ConsoleDisplay):
             self._begin(partial(self._session.switch, robots[number - 1].robot))
 
     def action_next_robot(self) -> None:
-        """Go to the next robot; the order of this one goes on."""
+        """Go to the next robot; the order of the present robot continues."""
         self._begin(self._session.next_robot)
 
     def action_pick(self) -> None:
@@ -248,7 +248,7 @@ class ConsoleApp(ConsoleDisplay):
         self._panel().move(steps)
 
     def action_why(self) -> None:
-        """Show why the row under the cursor is as it is; of an alarm, also its place."""
+        """Show the explanation of the row under the cursor; for an alarm, also its place."""
         row = self._panel().row
         if row is not None and row.subject:
             where = next((alarm.where for alarm in self._alarms() if alarm.key == row.key), "")
@@ -335,7 +335,7 @@ class ConsoleApp(ConsoleDisplay):
         self.redraw()
 
     def action_look(self) -> None:
-        """Choose a debug view of a behavior, and look at it live."""
+        """Choose a debug view of a behavior, and watch it live."""
         self._look()
 
     @work(group="look", exclusive=True)
@@ -356,7 +356,7 @@ class ConsoleApp(ConsoleDisplay):
         return ViewDialog(f"{component_of(behavior)}: {view}", keep_looking, has_pixels=has_pixels)
 
     def action_heard(self) -> None:
-        """List what is said, and show the messages of the key that is chosen."""
+        """List the keys on the bus, and show the messages of the chosen key."""
         self._open(KeyPicker(self._session.keep_listing), lambda row: self._open(self._key_dialog(row)))
 
     def _key_dialog(self, row: KeyRow) -> KeyDialog:

@@ -1,7 +1,7 @@
 """Dialogs over the screen: pick a robot, read a reason, change a parameter, give a command, lift a stop.
 
-Drive keys do nothing meanwhile, so the wheels stop by themselves. The keys of the emergency stop work here too, also
-while a line is typed.
+Drive keys do nothing while a dialog is open, so the wheels stop by themselves. The keys of the emergency stop work in
+dialogs, too, even while a line is typed.
 """
 
 from __future__ import annotations
@@ -41,47 +41,47 @@ KeyDialog #plot-room { height: 6; align-horizontal: right; }
 KeyDialog Sparkline { height: 100%; }
 Dialog .remark { color: $text-muted; }
 """
-READ_S = 0.5  # chosen: people need longer to read a line
+READ_S = 0.5  # chosen: less than a person needs to read a line
 FIELD_REMARK = "x and X stop robots here too; ctrl+x types an x"
 
 
 def can_stop(app: App[object]) -> bool:
-    """Return whether this screen stops robots; in a recording there is nothing to stop."""
+    """Return whether this screen can stop robots; False for a recording."""
     return bool(app.check_action("stop_all", ()))
 
 
 def field_remark(app: App[object]) -> str:
-    """Return what a person must know before typing; empty: each key is text."""
+    """Return the remark before typing; empty: each key is text."""
     return FIELD_REMARK if can_stop(app) else ""
 
 
 class Dialog(ModalScreen[T]):
-    """Base of all; escape closes it and changes nothing."""
+    """Base class of all dialogs; escape closes a dialog without effect."""
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "close", "close")]
 
     @property
     def subject(self) -> str:
-        """The name under the dialog's cursor; empty: it has no cursor."""
+        """The name under the dialog's cursor; empty: no cursor."""
         return ""
 
     def answer(self, result: T | None) -> None:
-        """Close with this answer; of several answers from a burst of keys the first counts."""
+        """Close with this answer; if a burst of keys gives several answers, the first counts."""
         if self.is_active:
             self.dismiss(result)
 
     def action_close(self) -> None:
-        """Close it."""
+        """Close the dialog."""
         self.answer(None)
 
 
 class Field(Input):
-    """One line to type in; the keys of the emergency stop are never typed where they stop robots."""
+    """A line to type in; on a screen that can stop robots, the keys of the emergency stop are never typed."""
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+x", "type_x", "type an x", show=False)]
 
     def check_consume_key(self, key: str, character: str | None) -> bool:
-        """Return whether the key is text; the keys of the emergency stop are not, where they stop robots."""
+        """Return whether the key is text; on a screen that can stop robots, the keys of the emergency stop are not."""
         is_stop = key in STOP_KEYS and can_stop(self.app)
         return not is_stop and super().check_consume_key(key, character)
 
@@ -91,11 +91,11 @@ class Field(Input):
 
 
 class RobotPicker(Dialog[str]):
-    """Pick the robot to drive next; answers its name.
+    """Pick the robot to drive next; the answer is its name.
 
     Args:
-        robots: To choose from.
-        robot: The console's own: the cursor begins at it, so that a stop in a hurry is for this robot.
+        robots: Robots to choose from.
+        robot: The console's own robot: the cursor begins there, so that a hasty stop is for this robot.
     """
 
     def __init__(self, robots: list[Row], robot: str) -> None:
@@ -104,7 +104,7 @@ class RobotPicker(Dialog[str]):
 
     @property
     def subject(self) -> str:
-        """The robot under the cursor; empty before the list is there."""
+        """The robot under the cursor; empty before the list is shown."""
         chosen = [options.highlighted for options in self.query(OptionList)]
         return "".join(self._robots[number].subject for number in chosen if number is not None)
 
@@ -122,7 +122,7 @@ class RobotPicker(Dialog[str]):
 
 
 class Reading(Dialog[None]):
-    """Something to read, with the cursor keys if it is long."""
+    """A text to read, with the cursor keys if it is long."""
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter,space,q", "close", "close")]
 
@@ -139,11 +139,11 @@ class Reading(Dialog[None]):
 
 
 class LineQuestion(Dialog[str]):
-    """Ask for one line; answers with the typed line.
+    """Ask for one line; the answer is the typed line.
 
     Args:
         title: The question.
-        value: The line at first.
+        value: The initial line.
         remark: Help on the line's format.
     """
 
@@ -184,12 +184,12 @@ class DialogChoice(Generic[T]):
 
 
 class ChoiceDialog(Dialog[T]):
-    """Choose a line, then fill in its fields, if it has any; answers with the result of the choice.
+    """Choose a line, then fill in its fields, if any; the answer is the result of the choice.
 
     Args:
-        robot: The robot it is about.
+        robot: The robot concerned.
         question: Title of the list.
-        choices: To choose from.
+        choices: Lines to choose from.
     """
 
     def __init__(self, robot: str, question: str, choices: Sequence[DialogChoice[T]]) -> None:
@@ -227,7 +227,7 @@ class ChoiceDialog(Dialog[T]):
         self.query(Field).first().focus()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Go to the next field; after the last one answer, or say which value is wrong."""
+        """Go to the next field; after the last one, answer or show which value is wrong."""
         fields = list(self.query(Field))
         following = fields[fields.index(event.input) + 1 :] if isinstance(event.input, Field) else []
         if following:
@@ -256,10 +256,10 @@ def _command_choice(command: RoleCommand) -> DialogChoice[GiveWish]:
 
 
 class LiftQuestion(Dialog[int]):
-    """Ask whether to lift a stop, by another key than the one that opened this; answers with the stop's number.
+    """Ask whether to lift a stop; the confirming key differs from the opening key. The answer is the stop's number.
 
     Args:
-        robot: Which robot.
+        robot: The stopped robot.
         stop: The stop to lift, as it is now.
     """
 
@@ -281,18 +281,18 @@ class LiftQuestion(Dialog[int]):
             yield Static(self._text(), id="stop")
 
     def look(self, stop: StopView | None) -> None:
-        """Show the stop as it is now; close if there is none any more."""
+        """Show the present state of the stop; if there is none any more, close."""
         if stop is None:
             self.answer(None)
             return
         if stop.number != self._stop.number:
             self._changed_s = asyncio.get_running_loop().time()
         self._stop = stop
-        for shown in self.query("#stop").results(Static):  # none before it is laid out, which shows the newest
+        for shown in self.query("#stop").results(Static):  # no widget before the layout, which shows the newest state
             shown.update(self._text())
 
     def action_lift(self) -> None:
-        """Answer, unless the dialog shows this stop for less than ``READ_S``, too short to read it."""
+        """Answer, unless the dialog has shown this stop for less than ``READ_S``, too short to read it."""
         if asyncio.get_running_loop().time() - self._changed_s >= READ_S:
             self.answer(self._stop.number)
 

@@ -1,6 +1,6 @@
-"""Screen of the terminal console: live picture, holders with reasons, the keys that matter now.
+"""Screen of the terminal console: live picture, holders with reasons, and the relevant keys.
 
-Widgets are thin: ``ConsoleModel`` has their content, ``keys`` the keys.
+Widgets contain no logic: ``ConsoleModel`` has their content, ``keys`` has the keys.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from ui_console.terminal.log_search import FOUND_SHOWN, LogResult
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
 
-REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission
+REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough for driving, and leave the CPU to the mission
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
 LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which an old view must be marked
 NO_PICTURES = "no pictures: this kind of ARC has no camera or no framegrabber"
-NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are both too small
+NARROW_COLUMNS = 70  # chosen: below, picture and tables side by side are both too small
 
 
 class ConsoleDisplay(EndingApp):
@@ -43,16 +43,16 @@ class ConsoleDisplay(EndingApp):
 
     Args:
         session: Carries out the keys' actions.
-        profile: How it looks.
+        profile: Its appearance.
         has_pixels: True if the terminal shows real pixels.
         is_bare: True to begin with the picture alone, for a head-mounted display.
-        has_gamepad: True if the session also drives by one.
+        has_gamepad: True if the session also drives by a gamepad.
     """
 
     TITLE = "scout-console"
     ENABLE_COMMAND_PALETTE = False
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (NARROW_COLUMNS, "-small"), (100, "-wide")]  # chosen: see the CSS
-    VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # chosen: a pad of more lines would take the picture's
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # chosen: a pad with more lines would take lines of the picture
     CSS = (
         DIALOG_CSS
         + """
@@ -143,11 +143,11 @@ class ConsoleDisplay(EndingApp):
         self.set_interval(LINK_LOOK_S, self.redraw_if_cut)
 
     def on_resize(self, _event: Resize) -> None:
-        """Show as much as fits now."""
+        """Adapt the layout to the new size."""
         self.call_after_refresh(self.redraw)
 
     def on_unmount(self, _event: Unmount) -> None:
-        """Notify the session first of all that the screen ended."""
+        """Notify the session first that the screen ended."""
         self._session.closed()
 
     def redraw(self) -> None:
@@ -172,13 +172,13 @@ class ConsoleDisplay(EndingApp):
         self.redraw_video()
 
     def redraw_if_cut(self) -> None:
-        """Show at once that the link is down, or up again, so that no old view looks fresh."""
+        """Show at once that the link is down or up again, so that no old view appears fresh."""
         shown = self._view is not None and self._view.own.link_down_s >= 0
         if (self._session.model.team.links.down_s(self._session.now_s()) >= 0) is not shown:
             self.redraw()
 
     def redraw_video(self) -> None:
-        """Show the newest picture, or the reason why there is none to drive by."""
+        """Show the newest picture, or the reason why there is no usable one."""
         main = self._main()
         if self._view is None or self.profile is not Profile.TERMINAL or main is None:
             return
@@ -192,7 +192,7 @@ class ConsoleDisplay(EndingApp):
         main.query_one(Video).look(remark)
 
     def _main(self) -> Screen[object] | None:
-        """Return the screen behind all dialogs; None while it is just being taken down."""
+        """Return the screen behind all dialogs; None while it is being closed."""
         screens = self.screen_stack if self.is_running else []
         return screens[0] if screens and screens[0].query("#status") else None
 

@@ -1,4 +1,4 @@
-"""End of a terminal's screen: a crash keeps its exit code, and keys typed ahead of the end do nothing."""
+"""End of a terminal's screen: a crash keeps its exit code, and keys typed before the end are dropped."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from textual.events import Event, InputEvent
 
 
 class EndingApp(App[None]):
-    """Base of the consoles' screen."""
+    """Base class of the consoles' screens."""
 
     _is_ending = False
 
     def exit(self, result: None = None, return_code: int = 0, message: Any = None) -> None:
-        """End; after a crash its exit code stays."""
+        """End; after a crash, keep the crash's exit code."""
         self._is_ending = True
         super().exit(result, return_code or self.return_code or 0, message)
 
     async def on_event(self, event: Event) -> None:
-        """Take in an event; once the screen ends, drop keys and mouse events: there is no screen for them."""
+        """Process an event; while the screen ends, drop keys and mouse events."""
         if not (self._is_ending and isinstance(event, InputEvent)):
             await super().on_event(event)

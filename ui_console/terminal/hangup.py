@@ -1,7 +1,7 @@
-"""Notice that the terminal has gone away: its window was closed, its connection cut.
+"""Detects that the terminal has gone away, because its window was closed or its connection cut.
 
-The controlling terminal of a process ends it with a signal. A terminal that is only its standard input does not, and
-reading from it then returns at once, for ever.
+If the controlling terminal of a process goes away, a signal ends the process. If the terminal is only its standard
+input, there is no signal, and each read returns at once.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ class HangupWatch:
     """Calls back, in the event loop, when the other end of a terminal is closed.
 
     Args:
-        descriptor: Of the terminal; the watch reads none of its input.
+        descriptor: File descriptor of the terminal; the watch does not read its input.
         gone: Called once.
     """
 
@@ -24,14 +24,14 @@ class HangupWatch:
         self._loop = asyncio.get_running_loop()
         self._poll: select.epoll | None = select.epoll()
         try:
-            self._poll.register(descriptor, 0)  # reports hang-up and error in any case, and no input
-        except PermissionError:  # a file: it never hangs up
+            self._poll.register(descriptor, 0)  # reports only hang-up and error, no input
+        except PermissionError:  # a file never hangs up
             self.close()
             return
         self._loop.add_reader(self._poll.fileno(), self._hung_up)
 
     def close(self) -> None:
-        """Stop watching. Closing twice is allowed."""
+        """Stop watching. Idempotent."""
         if self._poll is not None:
             self._loop.remove_reader(self._poll.fileno())
             self._poll.close()

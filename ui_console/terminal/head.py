@@ -1,7 +1,7 @@
 """The first lines: hold of the robot, health of the mission, and notices and questions to the operator.
 
-Rules of this file: a view and a width in, rich texts out. A fact that does not fit beside heavier ones is shortened or
-left out; no fact is cut in the middle. A question has a line of its own, which wraps.
+Rules of this file: a view and a width go in, rich texts come out. If a fact does not fit beside facts of more weight,
+it is shortened or left out; no fact is cut in the middle. A question has its own line, which wraps.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BETWEEN = " · "
 ALARMING, ASKING = "bold white on red", "bold yellow"
 WITHOUT_LINK = "x and X reach no robot now: stop at another console, or at the robot itself. What is shown is old."
 TAKE_KEYS = {Profile.TERMINAL: "t", Profile.PENDANT: "enter"}
-LATE_PICTURE_S = 0.25  # chosen: a few pictures at the usual rate; beyond it a person begins to notice
+LATE_PICTURE_S = 0.25  # chosen: a few pictures at the usual rate; a person notices longer delays
 ORDER_STYLES = {OrderState.FAILED: "bold red", OrderState.WAITING: "yellow", OrderState.DONE: "bold green"}
 HEALTH_STYLES = {"ok": "green", "degraded": "bold yellow", "failed": "bold red"}
 
@@ -111,7 +111,7 @@ def _says(view: ConsoleView, profile: Profile) -> Iterator[Text]:
         yield Text(f"{own.consent.line} [g: yes, n: no; {own.consent.left_s:.0f} s{others}]", ASKING)
     if own.asked:
         yield Text(own.asked, ASKING)
-    if own.is_asked:  # the first line of a console that only watches has that already
+    if own.is_asked:  # on a console that only watches, the first line already has it
         yield from (Text(screen, "bold") for screen in own.other_screens)
     yield from (Text(order.line, ORDER_STYLES.get(order.state, "")) for order in own.orders if order.line != own.status)
     if own.must_let_go:
@@ -121,7 +121,7 @@ def _says(view: ConsoleView, profile: Profile) -> Iterator[Text]:
 
 
 def _speed(view: ConsoleView, speed: float) -> Iterator[_Fact]:
-    """Yield the speed of the drive keys, in meters per second too if that is known; nothing for what cannot move."""
+    """Yield the speed of the drive keys, also in meters per second if known; nothing for a body that cannot move."""
     reach = view.abilities.reach if view.abilities is not None else None
     if view.abilities is None or reach is not None:
         most = f" ({speed * reach.forward_m_s:.2f} m/s)" if reach is not None else ""
@@ -150,7 +150,7 @@ def _texts(text: str, short: str, style: str = "") -> tuple[Text, Text]:
 
 
 def _fitted(facts: Sequence[_Fact], columns: int) -> tuple[Text, bool]:
-    """Return the facts that fit, in their order, and whether the first is among them whole."""
+    """Return the facts that fit, in order, and whether the first one is among them in its long form."""
     by_weight = sorted(range(len(facts)), key=lambda number: -facts[number].weight)
     shown: dict[int, Text] = {}
     for number in by_weight:

@@ -1,4 +1,4 @@
-"""Dialogs for what is said: choose a key from the list of all, with their rates, and see its messages live."""
+"""Dialogs for messages on the bus: choose a key from the list with message rates, and watch its messages live."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ KeepHearing = Callable[[KeyRow, Callable[[KeyView], None]], Coroutine[object, No
 
 
 class KeyPicker(Dialog[KeyRow]):
-    """Choose one of the keys at which something is said; answers its row. Words that are typed narrow the list.
+    """Choose one of the keys with messages; the answer is its row. Typed words filter the list.
 
     Args:
-        keep_listing: Calls what it gets with the rows each second, until cancelled.
+        keep_listing: Calls its argument with the rows each second, until cancelled.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -67,7 +67,7 @@ class KeyPicker(Dialog[KeyRow]):
         self._list()
 
     def on_data_table_row_selected(self, event: DataTable.RowSelected) -> None:
-        """Answer: a row was clicked on."""
+        """Answer, because a row was clicked."""
         self.answer(self._rows.get(event.row_key.value or ""))
 
     def on_input_submitted(self, _event: Field.Submitted) -> None:
@@ -77,7 +77,7 @@ class KeyPicker(Dialog[KeyRow]):
             self.answer(self._rows.get(here.value or ""))
 
     def on_input_changed(self, _event: Field.Changed) -> None:
-        """List what has the words."""
+        """List the keys that contain the words."""
         self._show(self._heard)
 
     def action_cursor(self, key: str) -> None:
@@ -123,7 +123,7 @@ class KeyPicker(Dialog[KeyRow]):
         self.query_one("#trouble", Static).update(remark)
 
     def _here(self) -> RowKey | None:
-        """Return the key of the row under the cursor; None: there is no row."""
+        """Return the key of the row under the cursor; None: no row."""
         table = self._table
         return table.coordinate_to_cell_key(table.cursor_coordinate).row_key if table.row_count else None
 
@@ -138,11 +138,11 @@ class KeyPicker(Dialog[KeyRow]):
 
 
 class KeyDialog(Dialog[None]):
-    """The messages of one key: its fields, the number under the cursor over time, its picture.
+    """The messages of one key: fields, a plot of the number under the cursor, and a picture.
 
     Args:
         row: The key.
-        keep_hearing: Calls what it gets with the view at each begin, until cancelled.
+        keep_hearing: Calls its argument with the view at each begin, until cancelled.
         now_s: Returns the mission time.
         has_pixels: True if the terminal shows real pixels, and no other picture is on the screen.
     """
@@ -266,6 +266,6 @@ def _pixels_of(picture: PixelPicture) -> NDArray[np.uint8]:
 
 
 def _return_to(table: DataTable[Text], row: RowKey | None) -> None:
-    """Put the cursor back to the row where it was, wherever that has gone."""
+    """Move the cursor to the row on which it was, even if the row has moved."""
     if row is not None and row in table.rows:
         table.move_cursor(row=table.get_row_index(row))

@@ -1,6 +1,6 @@
-"""Keys of the terminal console: their actions, the consoles that have them, and the keys in the last line.
+"""Keys of the terminal console: their actions, the profiles that have them, and the keys in the last line.
 
-Rules of this file: no screen; a view and a width in, texts out.
+Rules of this file: no screen; a view and a width go in, texts come out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ui_console.model.views import ConsoleView
 
 MOST_PICKED_BY_KEY = 9
 STOP_KEYS = frozenset({"x", "X"})
-"""Keys of the emergency stop: no dialog and no field takes them for anything else."""
+"""Keys of the emergency stop: no dialog and no field uses them for another purpose."""
 ARRIVES_AS = frozenset({"alt+x", "alt+shift+x", "shift+x", "alt+q"})
 """The same keys a tenth of a second after escape, and from terminals that report modifiers."""
 
@@ -109,7 +109,7 @@ def keys_help(profile: Profile, name_of: Callable[[Binding], str]) -> list[str]:
 
     Args:
         profile: The profile.
-        name_of: Names a key for people.
+        name_of: Returns the name of a key for people.
     """
     return help_lines([one for one in Binding.make_bindings(KEYS) if has(profile, action_of(one))], name_of)
 
@@ -129,19 +129,19 @@ def action_of(binding: Binding) -> str:
 
 
 def robot_meant(*, held: str, placed: str, wanted: str, shown: str) -> str:
-    """Return the robot that a stop is for, the operator's own first; empty: the keys do not show it.
+    """Return the robot that a stop concerns, the operator's own first; empty: ambiguous.
 
     Args:
-        held: The robot in hand.
+        held: The held robot.
         placed: The robot in the row to which the operator moved the cursor.
-        wanted: The robot this console asks for.
+        wanted: The robot that this console requests.
         shown: The robot under a cursor that the operator did not move.
     """
     return held or placed or wanted or shown
 
 
 def stop_meant(stopped: Sequence[str], *, held: str, placed: str, wanted: str, shown: str) -> str:
-    """Return the stopped robot that a lift is for, the row's first; empty: none of these is stopped."""
+    """Return the stopped robot that a lift concerns, the row's first; empty: none of these is stopped."""
     meant = next((robot for robot in (placed, held, wanted, shown) if robot in stopped), "")
     return meant or (stopped[0] if len(stopped) == 1 else "")
 
@@ -155,7 +155,7 @@ class Hint:
         key: Its name, for people.
         words: Its action now, for people.
         action: Action of a click on it; empty: none.
-        weight: If room is short, hints of more weight stay.
+        weight: If there is not enough room, hints of more weight stay.
         style: Of the key.
     """
 
@@ -170,12 +170,12 @@ STOP_STYLE = "bold white on red"
 
 
 def hints(view: ConsoleView, profile: Profile, meant: str) -> list[Hint]:
-    """Return the keys that matter now, in the order on the screen.
+    """Return the relevant keys, in the order on the screen.
 
     Args:
         view: Content of the console.
         profile: Its look.
-        meant: The robot that a stop is for.
+        meant: The robot that a stop concerns.
     """
     found = [Hint("x", f"STOP {meant or 'ROBOT'}", "stop_robot", 9, STOP_STYLE)]
     found.append(Hint("X", "STOP ALL", "stop_all", 9, STOP_STYLE))
@@ -224,7 +224,7 @@ def _hands(view: ConsoleView, profile: Profile) -> Iterator[Hint]:
 
 
 def key_lines(found: Sequence[Hint], columns: int, rows: int) -> Text:
-    """Return as many of these keys as fit, the heaviest; none is cut."""
+    """Return the keys of the largest weight that fit; no key is cut."""
     shown = list(found)
     while shown and len(lines := _packed(shown, columns)) > rows:
         shown.remove(min(reversed(shown), key=lambda hint: hint.weight))
@@ -244,5 +244,5 @@ def _packed(shown: Sequence[Hint], columns: int) -> list[Text]:
 
 
 def _span(names: Sequence[str]) -> str:
-    """Return the names of keys, a long row of them by its first and last."""
+    """Return the names of keys; of a long row, only the first and last name."""
     return f"{names[0]} … {names[-1]}" if len(names) > 4 else ", ".join(names)

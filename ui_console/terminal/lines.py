@@ -1,6 +1,6 @@
-"""Views as styled lines of text: a terminal's content besides the picture.
+"""Views as styled lines of text, for a terminal's content except the picture.
 
-Pure: a view and a width in, rich texts out. A row with a ``why`` names its subject.
+Pure: a view and a width go in, rich texts come out. A row that ``why`` can explain has a subject.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ NODE_MARKS = {
     views.NodeState.LOST: ("!", "bold red"),
 }
 ALARM_STYLES = {views.Severity.ALARM: "bold red", views.Severity.WARNING: "yellow", views.Severity.NOTICE: "cyan"}
-BUSY_CPU = 0.8  # chosen: from here on a host's load is shown in yellow
+BUSY_CPU = 0.8  # chosen: load from which a host is shown in yellow
 NAME_COLUMNS = 10
 REPORTED_S = 60.0  # chosen: a robot without a holder reports nothing, and its battery loses little in a minute
-BEYOND_S = 1.0  # chosen: a slice that ends now is not beyond it yet
-HANG = 2  # chosen: the second line of a row is set off from the next row
-LEAST_COLUMNS = 12  # chosen: below, no line is worth folding
-HELD_ELSEWHERE = "hold to lift"  # a gesture of pages; a terminal has a second key for it
-_PAPER = Console(file=io.StringIO())  # Rich needs a console to fold text, and writes nothing to it
+BEYOND_S = 1.0  # chosen: tolerance before a slice counts as exceeded
+HANG = 2  # chosen: indentation of a row's second line
+LEAST_COLUMNS = 12  # chosen: below, lines are not wrapped
+HELD_ELSEWHERE = "hold to lift"  # pages use a gesture for this; a terminal uses a second key
+_PAPER = Console(file=io.StringIO())  # Rich needs a console to wrap text; nothing is written to it
 SLICE_MARKS = {Certainty.PAST: "▄", Certainty.NOW: "█", Certainty.NEXT: "░"}
 SLICE_COLORS = ("cyan", "green", "magenta", "yellow", "blue", "bright_cyan", "bright_green", "bright_magenta")
 
@@ -48,8 +48,8 @@ class Row:
     """One row of a table.
 
     Attributes:
-        key: Stays the same while the row is about the same subject.
-        subject: Name to ask ``why`` about; empty: there is nothing to ask.
+        key: The same as long as the row has the same subject.
+        subject: Name for ``why``; empty: no explanation.
         text: One line, or more.
     """
 
@@ -60,7 +60,7 @@ class Row:
 
 # ---------------------------------------------------------------------- rows on lines
 def laid_out(rows: Sequence[Row], here: str | None, columns: int, room: int) -> list[list[Text]]:
-    """Return the lines of each row: long ones go on below if there is room for all, else only the cursor's row does.
+    """Return the lines of each row; long rows wrap if there is room for all, else only the cursor's row wraps.
 
     Args:
         rows: From top to bottom.
@@ -88,7 +88,7 @@ def _folded(text: Text, columns: int) -> list[Text]:
 
 def _cut(text: Text, columns: int) -> list[Text]:
     lines = list(text.split("\n", allow_blank=True))
-    if columns >= LEAST_COLUMNS:  # before the screen is laid out there are none
+    if columns >= LEAST_COLUMNS:  # there are no columns before the first layout
         for line in lines:
             line.truncate(columns, overflow="ellipsis")
     return lines
@@ -134,7 +134,7 @@ def robot_rows(robots: list[views.RobotView], now_s: float) -> list[Row]:
 
 
 def lift_lines(stop: views.StopView) -> list[str]:
-    """Return the lines about a stop that is about to be lifted: its author, age, reason, and how it is lifted."""
+    """Return the lines about a stop that may be lifted: author, age, reason, and the way to lift it."""
     also = f"; since then also by {', '.join(stop.also)}" if stop.also else ""
     reason = [f"because: {stop.reason}"] if stop.reason else []
     takes = [] if stop.lift_line == HELD_ELSEWHERE else [stop.lift_line]
@@ -185,7 +185,7 @@ def _robot(robot: views.RobotView, now_s: float, wide: int) -> Text:
 
 
 def _robot_facts(robot: views.RobotView, now_s: float) -> Iterator[str]:
-    """Yield further facts of a robot, the most important first: if room is short, the end is cut."""
+    """Yield further facts of a robot, the most important first, because the end is cut if there is not enough room."""
     if robot.stop is not None:
         yield robot.stop.reason or f"since {robot.stop.age_s:.0f} s"
     if robot.holder and robot.until_s >= 0:
@@ -280,7 +280,7 @@ def _component(component: ComponentState) -> Text:
 def _bar(slices: list[SliceView], timeline: TimelineView, columns: int, colors: dict[str, str]) -> Text:
     scale = columns / (timeline.to_s - timeline.from_s)
     cells: list[tuple[str, str]] = [(" ", "")] * columns
-    for one in slices:  # past ones first, so that the present one is drawn over the rest of them
+    for one in slices:  # past turns first, so that the present one is drawn over them
         first = int((max(one.from_s, timeline.from_s) - timeline.from_s) * scale)
         last = max(first + 1, int((min(one.to_s, timeline.to_s) - timeline.from_s) * scale))
         for column in range(max(0, first), min(columns, last)):

@@ -1,6 +1,7 @@
 """An operator's search in the log, and its result.
 
-Pure: a line in, a question out. Words that belong together need no quotes: all words that are no field are one text.
+Pure: a line goes in, a question comes out. Words that belong together need no quotes, because all words that are not
+    fields form one text.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from backbone.mission_log.question import LogQuestion
 from backbone.spoken import counted
 
 SEARCH_HELP = f"words, and robot:NAME person:NAME level:{'|'.join(LogLevel)} since:5m until:14:05; nothing: all"
-FOUND_SHOWN = 300  # chosen: more than a person pages through; a narrower search shows the rest
+FOUND_SHOWN = 300  # chosen: more than a person reads; a narrower search shows the rest
 _FIELDS = {*LogQuestion.__struct_fields__} - {"text"}
 
 
@@ -22,7 +23,7 @@ class LogResult:
     """Result of a search.
 
     Attributes:
-        line: As typed.
+        line: The typed line.
         asked: The question.
         log: The launcher's answer.
     """

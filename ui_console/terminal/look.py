@@ -28,7 +28,7 @@ from ui_console.terminal.pixels import can_show_pixels, png
 
 
 class NothingShown(Refusal):
-    """The behavior showed no picture of the view in the time given."""
+    """The behavior showed no picture of the view in the given time."""
 
     code = "views.nothing_shown"
     remedy = "It shows one when it is at work; 'scout-backbone why BEHAVIOR' says what it waits for."
@@ -50,12 +50,12 @@ class NoTerminal(Refusal):
 
 @dataclass(frozen=True)
 class LookOptions:
-    """How a view is shown.
+    """Options for showing a view.
 
     Attributes:
         as_json: JSON lines instead of a screen.
         save: File for one picture; None: none.
-        for_s: Seconds of the machine after which it ends; 0: at Ctrl-C.
+        for_s: Machine seconds after which the command ends; 0: it ends at Ctrl-C.
     """
 
     as_json: bool = False
@@ -73,7 +73,7 @@ async def look_into(where: Where, name: str, view: str, options: LookOptions) ->
         options: How it is shown.
 
     Raises:
-        Refusal: There is no such behavior or view, or the view is no picture that can be saved.
+        Refusal: There is no such behavior or view, or the view is not a picture.
         LinkError: The behavior did not answer.
     """
     async with connected(where) as (bus, clock):
@@ -99,7 +99,7 @@ async def look_into(where: Where, name: str, view: str, options: LookOptions) ->
 
 
 def listed_lines(name: str, entries: list[ViewEntry]) -> list[str]:
-    """Return the views for people, a line each: name, and newest value or that it is a picture.
+    """Return the views for people, one line each: name, and newest value or ``(picture)``.
 
     Example:
         >>> listed_lines("w", [ViewEntry("threshold", ViewKind.VALUE, 28.0), ViewEntry("changed", ViewKind.PICTURE)])
@@ -121,7 +121,7 @@ def listed_json(name: str, entries: list[ViewEntry]) -> dict[str, object]:
 
 
 def shown_json(shown: ViewPicture | ViewValue) -> dict[str, object]:
-    """Return what was shown for programs; of a picture, all but its pixels."""
+    """Return a shown value or picture for programs; of a picture, everything except the pixels."""
     about: dict[str, object] = {"view": shown.view, "at_s": round(shown.at_s, 3)}
     if isinstance(shown, ViewValue):
         return about | {"value": shown.value}
@@ -130,10 +130,10 @@ def shown_json(shown: ViewPicture | ViewValue) -> dict[str, object]:
 
 @dataclass
 class _Looked:
-    """One view while it is looked at.
+    """A view while it is watched.
 
     Attributes:
-        ended: Set when the command shall end.
+        ended: Set when the command must end.
     """
 
     bus: Bus
@@ -148,7 +148,7 @@ class _Looked:
         for_s: float,
         trouble: Callable[[Refusal | LinkError], None] = lambda error: say(str(error)),
     ) -> ExitCode:
-        """Look until ``ended``, a signal, or the end of the time; return the exit code."""
+        """Watch until ``ended``, a signal, or the end of the time; return the exit code."""
         interrupted = end_server_on_signals(lambda _signal: self.ended.set())
         work = keep_looking(self.bus, self.clock, self.behavior, self.entry.view, show_it, trouble=trouble)
         looking = asyncio.create_task(work, name="look")
@@ -165,7 +165,7 @@ class _Looked:
 
 
 def _printer(*, as_json: bool) -> Callable[[ViewPicture | ViewValue], None]:
-    """Return what prints each value: as JSON all of them, for people those that differ from the one before."""
+    """Return a function that prints values: all values as JSON, but for people only changed values."""
     before: list[object] = []
 
     def print_it(shown: ViewPicture | ViewValue) -> None:

@@ -22,7 +22,7 @@ class LookApp(EndingApp):
 
     Args:
         newest: Returns the newest picture, as ``video.shrink`` takes it, or None.
-        line: Returns the line for now.
+        line: Returns the present line.
         has_pixels: True if the terminal shows real pixels.
     """
 
@@ -48,6 +48,6 @@ class LookApp(EndingApp):
         self.set_interval(REDRAW_EVERY_S, self.redraw)
 
     def redraw(self) -> None:
-        """Show what is newest."""
+        """Show the newest picture and line."""
         self.query_one("#line", Static).update(self._line(), layout=False)
         self.query_one(Video).look()

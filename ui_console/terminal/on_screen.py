@@ -17,14 +17,14 @@ from ui_console.terminal.session import TerminalSession
 
 @dataclass(frozen=True)
 class Looks:
-    """Look of a console with a screen, and its person.
+    """Appearance of a console with a screen, and its person.
 
     Attributes:
         profile: The screen.
         user: The person at it.
-        sees: True: pictures come to this machine.
-        is_bare: True: it begins with the picture alone.
-        has_gamepad: True: the gamepad of this machine drives, too.
+        sees: True: this machine receives pictures.
+        is_bare: True: the screen begins with the picture alone.
+        has_gamepad: True: this machine's gamepad also drives.
     """
 
     profile: Profile
@@ -40,7 +40,7 @@ async def drive_by_hand(where: Where, wished: dict[str, object], looks: Looks) -
     Args:
         where: The mission.
         wished: Parameters of ``Teleoperation``.
-        looks: Look of the screen.
+        looks: Appearance of the screen.
 
     Raises:
         Refusal: The claim was refused, and no other claim followed.

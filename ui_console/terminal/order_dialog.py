@@ -1,4 +1,4 @@
-"""The dialog of orders: what one robot, or all that the operator holds, are to do by themselves."""
+"""The dialog for orders to one robot, or to all robots that the operator holds."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ WORDS = {
 
 
 def order_dialog(robot: str, held: Sequence[str]) -> ChoiceDialog[Sequence[Order]]:
-    """Return the dialog that answers with the order of each robot.
+    """Return the dialog; its answer is the order of each robot.
 
     Args:
         robot: The robot at the stick.
-        held: The robots that the operator has; with two or more of them each order can be given to all.
+        held: The operator's robots; if there are two or more, each order can be given to all.
     """
     every = tuple(sorted({robot, *held}))
     groups = {"": (robot,)} | ({f"all {len(every)}: ": every} if len(every) > 1 else {})
@@ -44,10 +44,10 @@ def _choice(kind: OrderKind, robot: str, robots: tuple[str, ...], who: str) -> D
 
 
 def order_of(kind: OrderKind, robot: str, values: Sequence[str]) -> Order:
-    """Return the order with these values, as they were typed.
+    """Return the order with these typed values.
 
     Raises:
-        WrongValue: One is missing or no number.
+        WrongValue: A value is missing or is not a number.
 
     Example:
         >>> order_of(OrderKind.GO_TO, "scout1", ["2", " 1.5"])

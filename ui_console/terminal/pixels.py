@@ -1,8 +1,8 @@
-"""Real pixels in terminals that can: the kitty graphics protocol with Unicode placeholders (kitty, Ghostty).
+"""Real pixels in capable terminals: the kitty graphics protocol with Unicode placeholders (kitty, Ghostty).
 
-The picture is sent once as PNG under an image number; the cells it covers hold placeholder characters whose color
-names that image. A new picture replaces the old one under the same number, so no cell changes and nothing flickers.
-Terminals without this protocol get half blocks, as do terminals inside a multiplexer, which would drop the picture.
+The picture is sent once as PNG under an image number; its cells contain placeholder characters whose color encodes that
+number. A new picture replaces the old one under the same number, so no cell changes and nothing flickers. Terminals
+without this protocol get half blocks. So do terminals inside a multiplexer, because it would drop the picture.
 
 Source: kitty, "Terminal graphics protocol", sections "The transmission medium" and "Unicode placeholders".
 """
@@ -20,9 +20,9 @@ from rich.color import Color
 from rich.segment import ControlType, Segment
 from rich.style import Style
 
-IMAGE = 42  # chosen: any number of 24 bits can be named by a color
+IMAGE = 42  # chosen: a color can encode any number of 24 bits
 PLACEHOLDER = "\U0010eeee"
-CHUNK_BYTES = 4096  # the protocol's most
+CHUNK_BYTES = 4096  # the protocol's maximum
 GREY, TRUE_COLOR = 0, 2  # PNG, "Color type"
 PNG_LEVEL = 1  # chosen: analog noise does not compress anyway
 ROW_MARKS = (

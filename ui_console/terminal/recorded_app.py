@@ -1,4 +1,4 @@
-"""Screen of the terminal console on a recording: the same tables, a line of its time, and keys that play it."""
+"""Screen of the terminal console on a recording: the same tables, a time line, and keys for playback."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ MARKS = {
     MarkerKind.GRANT: ("▲", "green"),
     MarkerKind.REVOKED: ("▽", "yellow"),
 }
-TIME_EACH_S = 0.25  # chosen: where it stands moves a column at a time
+TIME_EACH_S = 0.25  # chosen: the position moves one column at a time
 HERE = "bold black on white"
 PLAY_ON_S = 1.0  # chosen: pressed again while it plays, the key goes to the marker before; seconds of the machine
 
 
 class RecordingPlayer(Protocol):
-    """What plays a recording; see ``RecordedPlay``."""
+    """The interface of a player; see ``RecordedPlay``."""
 
     playback: Playback
     mission: str
 
     def play(self, speed: float) -> None:
-        """Let time pass."""
+        """Play."""
 
     def step(self) -> None:
         """Go on to the next picture, decision or event."""
@@ -56,14 +56,14 @@ class RecordingPlayer(Protocol):
 
 
 class TimeBar(Static):
-    """The line of time: markers, where it stands, and the last marker until then; a click goes there.
+    """The time line: markers, the present position, and the last marker before it; a click jumps to a time.
 
     Args:
         line: The time of the recording.
     """
 
     class Chosen(Message):
-        """A time was clicked on."""
+        """A time was clicked."""
 
         def __init__(self, at_s: float) -> None:
             super().__init__()
@@ -92,11 +92,11 @@ class TimeBar(Static):
 
 
 class MarkerPicker(Dialog[float]):
-    """Choose a marker; answers its time.
+    """Choose a marker; the answer is its time.
 
     Args:
         line: The time of the recording.
-        at_s: Where it stands: the cursor begins at the last marker until then.
+        at_s: The present time; the cursor begins at the last marker before it.
     """
 
     def __init__(self, line: TimeLine, at_s: float) -> None:
@@ -121,8 +121,8 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
 
     Args:
         session: Shows the recording as a mission.
-        play: Plays it.
-        line: Its time.
+        play: Plays the recording.
+        line: Its time line.
         has_pixels: True if the terminal shows real pixels.
     """
 
@@ -135,12 +135,12 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
         self._speed = 1.0
 
     def on_mount(self) -> None:
-        """Put the line of time below the first lines."""
+        """Put the time line below the first lines."""
         self.screen.mount(TimeBar(self._line), after="#say")
         self.set_interval(TIME_EACH_S, self._show_time)
 
     def redraw(self) -> None:
-        """Show the content of the time of now."""
+        """Show the content at the present time."""
         super().redraw()
         self._show_time()
 
@@ -169,12 +169,12 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
 
     # ------------------------------------------------------------------ keys that play
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Have all keys of this screen, apart from those that it shares with no recording; none stops a robot."""
+        """Enable the keys of this screen that make sense for a recording; no key stops a robot."""
         is_own = action in {"end", "begin", "not_now"}
         return is_own or (action not in STOPS and super().check_action(action, parameters))
 
     def action_play(self) -> None:
-        """Play, or stand still."""
+        """Play or pause."""
         if self._play.playback.is_playing:
             self._play.playback.pause()
         else:
@@ -182,7 +182,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
         self.redraw()
 
     def action_step(self) -> None:
-        """Go on to the next picture, decision or event, and stand still there."""
+        """Go to the next picture, decision or event, and pause there."""
         self._play.step()
         self.redraw()
 
@@ -194,7 +194,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
         self.redraw()
 
     def action_seek(self, seconds: float) -> None:
-        """Go on, or back, by so many seconds."""
+        """Go forward or back by this number of seconds."""
         self._go_to(self._at_s + seconds)
 
     def action_begin(self) -> None:
@@ -206,7 +206,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
         self._go_to(self._line.end_s)
 
     def action_marker(self, steps: int) -> None:
-        """Go to the next marker, or to the one before."""
+        """Go to the next or previous marker."""
         playback = self._play.playback
         margin_s = PLAY_ON_S * playback.rate if playback.is_playing else 0.0
         found = self._line.after(self._at_s) if steps > 0 else self._line.before(self._at_s - margin_s)
@@ -216,14 +216,14 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
             self._go_to(found.at_s)
 
     def action_markers(self) -> None:
-        """Choose a marker, and go there."""
+        """Choose a marker, and go to its time."""
         if self._line.markers:
             self._open(MarkerPicker(self._line, self._at_s), self._go_to)
         else:
             self.notify("nothing is marked: no grant, no alarm, no action of a person", severity="warning")
 
     def action_go_to(self) -> None:
-        """Go to a time that is typed."""
+        """Go to a typed time."""
         remark = f"mission time in seconds, {self._line.begin_s:.1f} to {self._line.end_s:.1f}"
         self._open(LineQuestion("go to which time?", f"{self._at_s:.1f}", remark), self._read_time)
 
@@ -232,7 +232,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
         self._go_to(message.at_s)
 
     def action_not_now(self) -> None:
-        """Say why nothing is commanded."""
+        """Show why commands are not possible."""
         self.notify(NOT_NOW, severity="warning")
 
     def action_keys(self) -> None:
@@ -248,7 +248,7 @@ class RecordedApp(ConsoleApp, inherit_bindings=False):
 
     def _go_to(self, at_s: float) -> None:
         self._play.go_to(at_s)
-        self._found = None  # a search is of the time at which it was made
+        self._found = None  # the result of a search belongs to the time of the search
         self.redraw()
 
 

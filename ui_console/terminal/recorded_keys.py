@@ -1,4 +1,4 @@
-"""Keys of the terminal console on a recording: those that play it, those that look, and those that would command.
+"""Keys of the terminal console on a recording: for playback, for viewing, and keys that would command.
 
 Rules of this file: no screen.
 """
@@ -11,7 +11,7 @@ from textual.binding import Binding
 
 from ui_console.terminal.keys import KEYS, Hint, action_of
 
-SEEK_S, SEEK_FAR_S = 5.0, 60.0  # chosen: a step back to what was just missed, and one through an hour
+SEEK_S, SEEK_FAR_S = 5.0, 60.0  # chosen: a small step back, and a large one for recordings of an hour
 
 PLAYS = [
     Binding("space", "play", "play, or stand still", priority=True),
@@ -48,11 +48,11 @@ LOOKS = frozenset(
 """Actions of a console that command nothing."""
 LEAVES = {"quit": "leave", "interrupt": "leave from any dialog; exit code 130"}
 SILENT = frozenset({"bare", "take_or_release"})
-"""Actions that a console that only watches does not have anyway."""
+"""Actions that a watching console does not have anyway."""
 
 
 def looking_keys() -> list[Binding]:
-    """Return the keys of the console that look, without those that play; there is no robot to give back."""
+    """Return the keys for viewing, without those for playback; there is no robot to release."""
     return [
         replace(one, description=LEAVES.get(action_of(one), one.description))
         for one in Binding.make_bindings(KEYS)
@@ -61,7 +61,7 @@ def looking_keys() -> list[Binding]:
 
 
 def refused_keys() -> list[Binding]:
-    """Return the keys of the console that would command a mission; here they say why not."""
+    """Return the keys that would command a mission; on a recording they show why that is not possible."""
     return [
         Binding(one.key, "not_now", "commands nothing here", priority=one.priority)
         for one in Binding.make_bindings(KEYS)
@@ -70,7 +70,7 @@ def refused_keys() -> list[Binding]:
 
 
 def recorded_hints(is_playing: bool) -> list[Hint]:
-    """Return the keys that the last line names."""
+    """Return the keys in the last line."""
     return [
         Hint("space", "stand still" if is_playing else "play", "play", 9),
         Hint(".", "step", "step", 6),

@@ -1,4 +1,4 @@
-"""A recording on the terminal console: its screen and what plays it, in one event loop."""
+"""A recording on the terminal console: its screen and its player, in one event loop."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from ui_console.terminal.session import Pilot, on_terminal
 
 @dataclass(frozen=True)
 class HearingConsole:
-    """A console that hears a recording from one time on.
+    """A console that receives a recording from one time on.
 
     Attributes:
         observer: Its component.
@@ -48,21 +48,21 @@ class HearingConsole:
     model: ConsoleModel
 
     async def run(self) -> None:
-        """Hear it until cancelled."""
+        """Receive the recording until cancelled."""
         await self.observer.run()
 
 
 class RecordedSession(Session):
-    """Shows a recording; its model is another one after each jump.
+    """Shows a recording; each jump replaces its model.
 
     Args:
         opened: Opens the recording's file once more.
-        machine: Its seconds are those of the machine.
-        user: The person at it.
+        machine: Clock of machine seconds.
+        user: The person at the console.
 
     Raises:
-        NoRecording: The file is none, or its recorder was killed.
-        OtherForm: It is of another release.
+        NoRecording: The file is not a recording, or its recorder was killed.
+        OtherForm: The recording was made by another release.
     """
 
     def __init__(self, opened: Callable[[], IO[bytes]], machine: Clock, user: str) -> None:
@@ -96,21 +96,21 @@ class RecordedSession(Session):
 
     # ------------------------------------------------------------------ what a screen may ask; see Session
     def closed(self) -> None:
-        """End the playing: the screen has ended."""
+        """End the playback, because the screen has ended."""
         self.play.end("the screen was closed")
 
     async def why(self, name: str) -> list[str]:
-        """Return the reasons for its state at the time that is shown."""
+        """Return the explanation of its state at the shown time."""
         await self.play.wait_arrived()
         return await super().why(name)
 
     async def search_log(self, question: LogQuestion) -> tuple[AskLog, Log]:
-        """Return the question, and the matching events up to the time that is shown."""
+        """Return the question, and the matching events up to the shown time."""
         await self.play.wait_arrived()
         return await super().search_log(question)
 
     async def ask_parameters(self, name: str) -> bool:
-        """Ask for a component's parameters at the time that is shown; return whether there is an answer."""
+        """Ask for a component's parameters at the shown time; return whether there is an answer."""
         await self.play.wait_arrived()
         return await super().ask_parameters(name)
 
@@ -119,7 +119,7 @@ class RecordedSession(Session):
         await self._at_each_time(lambda: keep_listing_recorded(self.play.reopened(), self.play.playback, show))
 
     async def keep_hearing(self, row: KeyRow, begin: Callable[[KeyView], None]) -> None:
-        """Call ``begin`` with a view of a key, a new one after each jump, until cancelled."""
+        """Call ``begin`` with a view of a key, and again after each jump, until cancelled."""
         views = await asyncio.to_thread(installed_views)
 
         async def hear() -> None:
@@ -130,7 +130,7 @@ class RecordedSession(Session):
         await self._at_each_time(hear)
 
     async def _at_each_time(self, look: Callable[[], Awaitable[None]]) -> None:
-        """Look until cancelled, anew at each time that a person went to."""
+        """Run until cancelled; restart at each jump."""
         while True:
             await self.play.wait_arrived()
             await first_to_end(look(), self.play.wait_elsewhere())
@@ -152,7 +152,7 @@ async def watch_recording(path: Path, user: str) -> int:
     """Show a recording until a key or a signal ends it; return the command's exit code.
 
     Args:
-        path: Of the recording; nothing needs to be up.
+        path: Path of the recording; no mission needs to be up.
         user: The person at the console.
 
     Raises:

@@ -37,10 +37,10 @@ class TerminalSession(Session):
         name: Name of the console.
         mission: Name of the mission.
         user: The person at it, for people and for the record.
-        profile: Look of the screen.
+        profile: Appearance of the screen.
         is_bare: True to begin with the picture alone.
-        sees: True if pictures are to come.
-        gamepad: Device to drive by, with the ranges of its stick.
+        sees: True if pictures are expected.
+        gamepad: Gamepad and the ranges of its stick.
     """
 
     def __init__(
@@ -58,11 +58,11 @@ class TerminalSession(Session):
         self._profile, self._is_bare, self._gamepad = profile, is_bare, gamepad
 
     def show(self, event: ConsoleEvent) -> None:
-        """Take an event into the model; the screen reads it at its next redraw."""
+        """Apply an event to the model; the screen shows it at its next redraw."""
         self.model.apply(event)
 
     def see(self, frame: Frame) -> None:
-        """Keep the newest picture; it is unpacked only if it gets drawn."""
+        """Keep the newest picture; it is unpacked only when it is drawn."""
         self._frame = frame
 
     async def run(
@@ -72,11 +72,11 @@ class TerminalSession(Session):
 
         Args:
             console: The component.
-            pilot: Presses the keys on a screen without a terminal, in place of a person.
+            pilot: Presses keys on a screen without a terminal, instead of a person.
             size: Columns and lines of the pilot's screen.
 
         Returns:
-            Outcome of the screen; a crash has been printed by now.
+            Outcome of the screen; a crash is already printed.
 
         Raises:
             BaseException: The bug or refusal that ended the component.
@@ -142,7 +142,7 @@ class TerminalSession(Session):
 
 
 async def on_terminal(screen: EndingApp, end: Callable[[str], None]) -> None:
-    """Run the screen; a terminal that goes away ends the console and with it the hold on the robot.
+    """Run the screen; if the terminal goes away, the console ends and releases the robot.
 
     Args:
         screen: The screen.

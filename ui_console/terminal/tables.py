@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class PanelName(StrEnum):
-    """The tables, in the order in which tab goes through them."""
+    """The tables, in the order of the tab key."""
 
     ROBOTS = "robots"
     TREE = "tree"
@@ -31,4 +31,4 @@ NOTHING = {
     PanelName.LOG: "nothing yet",
 }
 FIXED = (PanelName.ROBOTS, PanelName.ALARMS)
-"""Tables that are always on the screen; the others take turns between them."""
+"""Tables that are always on the screen; only one of the others is shown at a time."""

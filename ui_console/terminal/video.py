@@ -1,7 +1,7 @@
-"""Pictures in a terminal: two pixels a cell, 24 greys or 216 colors, equal neighbors drawn at once.
+"""Pictures in a terminal: two pixels per cell, 24 greys or 216 colors; equal neighbors are drawn together.
 
-Half blocks in the 24 greys of the 256-color palette hold 15 pictures a second in a terminal; more
-colors cost a new style for nearly every cell and fall to 4.
+Half blocks in the 24 greys of the 256-color palette reach 15 pictures a second in a terminal; with more colors nearly
+every cell needs a new style, and the rate falls to 4.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ GREYS = 24
 FIRST_GREY = 232  # of the terminal's 256 colors; the last grey is 255
 FIRST_COLOR, CUBE = 16, 6  # of the same: six steps of red, green and blue each
 UPPER_HALF = "▀"
-STYLES_KEPT = 4096  # chosen: all pairs of 24 greys are 576, and few colors stand beside each other
+STYLES_KEPT = 4096  # chosen: 24 greys have 576 pairs, and few pairs of colors occur
 
 
 def shrink(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.uint8]:
-    """Return the picture in steps for that many cells, each pixel the mean of its area.
+    """Return the picture in steps of grey or color for this number of cells; each pixel is the mean of its area.
 
     Args:
         picture: Grey levels 0 to 255 of shape (height, width), or red, green and blue of shape (height, width, 3), row
@@ -52,11 +52,11 @@ def shrink(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.ui
 
 
 def row_segments(steps: NDArray[np.uint8], row: int) -> list[Segment]:
-    """Return one row of cells, runs of equal cells in one segment each.
+    """Return one row of cells; each run of equal cells is one segment.
 
     Args:
-        steps: As from ``shrink``.
-        row: Of cells, 0 on top.
+        steps: Result of ``shrink``.
+        row: Row of cells, 0 on top.
     """
     return [Segment(UPPER_HALF * length, _style(upper, lower)) for length, upper, lower in _runs(steps, row)]
 
@@ -83,7 +83,7 @@ def _runs(steps: NDArray[np.uint8], row: int) -> Iterator[tuple[int, int, int]]:
 
 
 def _colors(steps: NDArray[np.uint8]) -> NDArray[np.int32]:
-    """Return the numbers of a row's colors in the terminal's palette; what has no hue is one of the 24 greys."""
+    """Return the palette numbers of a row's colors; colors without hue become one of the 24 greys."""
     whole = steps.astype(np.int32)
     if whole.ndim == 1:
         return whole + FIRST_GREY

@@ -1,4 +1,4 @@
-"""Dialogs for debug views: pick one of a behavior, and see it live."""
+"""Dialogs for debug views: pick a view of a behavior, and watch it live."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ KeepLooking = Callable[[Show, Trouble], Coroutine[object, None, None]]
 
 
 class ViewPicker(Dialog[tuple[str, str]]):
-    """Pick the view to look at; answers its behavior's address and its name.
+    """Pick a view; the answer is its behavior's address and its name.
 
     Args:
-        views: Of each behavior, by address.
+        views: Views of each behavior, by address.
     """
 
     def __init__(self, views: Mapping[str, Views]) -> None:
@@ -60,11 +60,11 @@ class ViewPicker(Dialog[tuple[str, str]]):
 
 
 class ViewDialog(Dialog[None]):
-    """One view, live; the behavior forgets it when the dialog has closed.
+    """A live view; after the dialog is closed, the behavior stops publishing it.
 
     Args:
         title: Its behavior and name.
-        keep_looking: Calls what it gets with each picture or value, and with each trouble, until cancelled.
+        keep_looking: Calls its arguments with each picture or value, and with each trouble, until cancelled.
         has_pixels: True if the terminal shows real pixels, and no other picture is on the screen.
     """
 
@@ -86,7 +86,7 @@ class ViewDialog(Dialog[None]):
         self._look()
 
     def on_resize(self) -> None:
-        """Fit the picture into its room."""
+        """Fit the picture into the available space."""
         self.call_after_refresh(self._redraw)
 
     @work

@@ -1,4 +1,4 @@
-"""Widgets of the terminal console; other files make their content."""
+"""Widgets of the terminal console; other files provide their content."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class Video(Widget):
         self._remark = ""
 
     def look(self, remark: str = "") -> None:
-        """Take the newest picture; redraw if anything changed.
+        """Show the newest picture; redraw if anything changed.
 
         Args:
-            remark: Why the operator must not drive by this picture; empty: the operator may.
+            remark: Why the operator must not drive by this picture; empty: driving is possible.
         """
         picture = self._newest()
         if self.size.width == 0 or self.size.height == 0:
@@ -67,7 +67,7 @@ class Video(Widget):
 
     def render_line(self, y: int) -> Strip:
         """Return one row of cells."""
-        width, blank = self.size.width, self.rich_style  # Textual's filter for NO_COLOR wants a style everywhere
+        width, blank = self.size.width, self.rich_style  # Textual's filter for NO_COLOR needs a style everywhere
         if self._remark and y == self.size.height // 2:
             return Strip([Segment(self._remark.center(width), blank + OLD)]).crop(0, width)
         if self._steps is None or self._shown is None or 2 * y >= len(self._steps):
@@ -101,21 +101,21 @@ class Panel(Static):
 
     @property
     def row(self) -> Row | None:
-        """The row under the cursor: the first until the cursor was moved, and when its row has gone."""
+        """The row under the cursor: the first row until the cursor was moved, and after its row has gone."""
         return self.placed or (self._rows[0] if self._rows else None)
 
     @property
     def placed(self) -> Row | None:
-        """The row to which the cursor was moved; None: it was not, or that row has gone."""
+        """The row to which the cursor was moved; None: it was not moved, or that row has gone."""
         return next((row for row in self._rows if row.key == self._key), None)
 
     def show_rows(self, rows: Sequence[Row], *, is_chosen: bool, nothing: str) -> None:
-        """Show these rows; the cursor stays on its row, if that is still there.
+        """Show these rows; the cursor stays on its row, if the row still exists.
 
         Args:
             rows: From top to bottom.
-            is_chosen: True: the keys for rows mean this panel.
-            nothing: Text if there are none.
+            is_chosen: True: the keys for rows apply to this panel.
+            nothing: Text if there are no rows.
         """
         self._rows, self._is_chosen, self._nothing = rows, is_chosen, nothing
         self._draw()
@@ -158,15 +158,15 @@ class Panel(Static):
 
 
 class KeyLine(Static):
-    """The keys that matter now, as many as fit; a click on one is as good as the key."""
+    """The relevant keys, as many as fit; a click on a key has the same effect as the key."""
 
     def show(self, found: Sequence[Hint], *, rows: int) -> None:
-        """Name these keys in so many lines."""
+        """Show these keys in this number of lines."""
         self.update(key_lines(found, self.size.width, rows))
 
 
 class DrivePad(Widget):
-    """A square to drag in with the mouse: farther up is faster, sideways turns; letting go stops the wheels.
+    """A square for dragging with the mouse: up is faster, sideways turns; releasing stops the wheels.
 
     The only control of a terminal that reports its release, apart from a gamepad.
     """
@@ -184,7 +184,7 @@ class DrivePad(Widget):
             self.forward, self.right = forward, right
 
     class Released(Message):
-        """The pad was let go."""
+        """The pad was released."""
 
     def __init__(self) -> None:
         super().__init__(id="pad")
@@ -210,16 +210,16 @@ class DrivePad(Widget):
         self._let_go()
 
     def on_mouse_release(self, _event: events.MouseRelease) -> None:
-        """Stop: another widget or window captured the mouse."""
+        """Stop, because another widget or window captured the mouse."""
         self._let_go()
 
     def let_go(self) -> None:
-        """Stop: the window was left, and the pad gets no release of the mouse there."""
+        """Stop, because the window lost the focus and the pad would get no release of the mouse."""
         self.release_mouse()
         self._let_go()
 
     def render_line(self, y: int) -> Strip:
-        """Return one row: a cross, and where it is held."""
+        """Return one row: a cross, and the position of the pointer."""
         width, height = self.size.width, self.size.height
         cells = ["│" if column == width // 2 else "─" if y == height // 2 else " " for column in range(width)]
         if self._at is not None:

@@ -1,4 +1,4 @@
-"""The plan of the floor as it travels to pages: packed once for all of them, and again when it has changed."""
+"""The plan of the floor for pages: encoded once for all pages, and again after each change."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class FloorSection:
         self._plan: FloorPlan | None = None
 
     async def follow(self, plan: FloorPlan | None) -> None:
-        """Let ``body`` be this plan; its picture is packed beside the event loop, so that no command waits for it."""
+        """Set ``body`` to this plan; its picture is encoded in a thread, so that no command waits for it."""
         if plan is not self._plan:
             image = await asyncio.to_thread(plan_jpeg, plan.image) if plan is not None else b""
             self._plan, self.body = plan, _packed(plan, image)

@@ -1,7 +1,7 @@
 """Result of a search in the mission's log, sent in parts.
 
-Rules of this file: no socket, no bus, no clock. A part is small, so that no answer delays the pictures and beats of the
-same page: ten thousand events are two megabytes, which a slow link carries in twenty seconds.
+Rules of this file: no socket, no bus, no clock. A part is small, so that no answer delays the pictures and heartbeats
+of the same page: ten thousand events are two megabytes, and a slow link needs twenty seconds for them.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from backbone.mission_log.log import Log
 from backbone.moments import Now
 
 PART_EVENTS = 100  # chosen: more than a screen shows
-PART_BYTES = 24_576  # chosen: no more than a picture and a half
+PART_BYTES = 24_576  # chosen: size of at most a picture and a half
 
 
 class FoundLog:
     """The answer to one search.
 
     Args:
-        number: Of the search; the page compares it with its newest.
+        number: Number of the search; the page ignores results of older searches.
         log: The launcher's answer.
         now: Time of the answer.
     """
@@ -33,7 +33,7 @@ class FoundLog:
         """Return some events, the newest first.
 
         Args:
-            first: Number of newer events that the page has.
+            first: Number of events that the page already has.
 
         Returns:
             ``events`` with these; ``total``, their number in the answer; ``left_out``, the number of older matches;

@@ -1,4 +1,4 @@
-"""Shared by all browsers: one subscription to the mission, one model of it, and one copy of each robot's pictures."""
+"""The hub for all browsers: one subscription to the mission, one model of it, and one copy of each robot's pictures."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ from ui_console.web.sights import Sights
 log = logging.getLogger(__name__)
 
 OWN_EVERY_S = 0.25  # chosen: people read no faster; events of their own robot are shown at once
-TEAM_EVERY = 4  # chosen: the tables of the whole mission cost more, so every fourth refresh has them
-TOLD_EVERY_S = 10.0  # chosen: a client with a thousand violations a second fills no recording
+TEAM_EVERY = 4  # chosen: the tables of the whole mission cost more, so only every fourth refresh has them
+TOLD_EVERY_S = 10.0  # chosen: so that a client with a thousand violations a second does not fill a recording
 MAX_USER_IN_NAME = 24  # chosen: leaves room for the unique part of a component's name, and its ARC's
 
 LIFT_REMEDY = "When the robot may move, hold “Hold to lift” on its picture."
@@ -57,12 +57,13 @@ class WebHub:
     """Serves any number of operators from one process.
 
     Args:
-        launch: Of the component that subscribes to the mission; operators' consoles are launched like it.
-        bus: Of that component.
-        clock: The mission's time.
+        launch: Launch of the component that subscribes to the mission; operators' consoles are launched in the same
+            way.
+        bus: Bus of that component.
+        clock: The mission's clock.
         join: Opens a bus for one more component of this process.
         kind: Component type of the ARCs that operators claim; empty: one for the robot, with pictures.
-        away_after_s: A console gives its robot back after so long without a touch of its operator; 0: never.
+        away_after_s: Time without an operator's action after which a console releases its robot; 0: never.
     """
 
     def __init__(
@@ -129,7 +130,7 @@ class WebHub:
         return operator
 
     async def leave(self, client: Operator, reason: str) -> None:
-        """Remove an operator: the wheels stop, the robot is given back."""
+        """Remove an operator; the wheels stop, and the robot is released."""
         self.clients.pop(client, None)
         self._watch_map()
         if not self.clients:
@@ -138,7 +139,7 @@ class WebHub:
         self._say(OperatorAction.DETACH, client.welcome.user, reason)
 
     async def obey(self, client: Operator, intent: Intent) -> None:
-        """Carry out an operator's intent; a slow one goes on in a task of its own."""
+        """Carry out an operator's intent; a slow intent runs in its own task."""
         client.obey(intent)
 
     def refused(self, client: Operator) -> None:
@@ -149,7 +150,7 @@ class WebHub:
         """Show the operators a client's violation.
 
         Args:
-            who: For people: an operator's name, or an address.
+            who: Operator's name or address, for people.
             violation: The violation.
         """
         now_s = self.clock.now_s()
@@ -163,7 +164,7 @@ class WebHub:
                 self.observer.publish_event("web", line, LogLevel.WARNING)
 
     async def refresh_all(self) -> None:
-        """Keep every operator's view fresh while there are operators; until cancelled."""
+        """Refresh every operator's view while there are operators; until cancelled."""
         for turn in itertools.count():
             await self._has_operators.wait()
             now_s = self.clock.now_s()
@@ -179,7 +180,7 @@ class WebHub:
 
     # ------------------------------------------------------------------ services for operators; see OperatorServices
     async def new_console(self, operator: Operator, robot: str, orders: Sequence[Order] = ()) -> Teleoperation:
-        """Return a console of this operator that claims the robot, or gives the orders, as soon as it runs."""
+        """Return a console for this operator; it claims the robot, or gives the orders, as soon as it runs."""
         number, welcome = next(self._consoles), operator.welcome
         wished = {
             "robot": robot,
@@ -209,7 +210,7 @@ class WebHub:
         )
 
     def watching_changed(self) -> None:
-        """Subscribe to pictures that an operator watches and that a grant delivers, and to no others."""
+        """Subscribe to exactly the pictures that an operator watches and that a grant delivers."""
         watched = {robot for operator in self.clients for robot in operator.outbox.watched}
         wanted = {robot: arc for robot, arc in self._arcs.items() if robot in watched}
         for robot, (arc, stream) in list(self._streams.items()):
@@ -220,12 +221,12 @@ class WebHub:
             self._streams[robot] = (wanted[robot], self._listen(robot, wanted[robot]))
 
     def sights_changed(self) -> None:
-        """Look at the debug views that an operator looks at, and at no others, as soon as the component runs."""
+        """Watch exactly the debug views that operators watch, as soon as the component runs."""
         if self.observer.state is LifeState.READY:
             self.sights.changed()
 
     def keys_changed(self) -> None:
-        """Look at the messages that an operator looks at, and at no others, as soon as the component runs."""
+        """Watch exactly the messages that operators watch, as soon as the component runs."""
         if self.observer.state is LifeState.READY:
             self.keys.changed()
 
@@ -235,7 +236,7 @@ class WebHub:
 
     # ------------------------------------------------------------------ within
     def _answers_of(self, user: str) -> ConsentAnswers | None:
-        """Return the questions at the page this person looks at, else at another open page of this person."""
+        """Return the questions at the page that this person watches, else at another open page of this person."""
         pages = [one for one in self.clients if one.welcome.user == user]
         return next((page.answers for page in sorted(pages, key=lambda page: not page.is_there)), None)
 

@@ -1,10 +1,11 @@
-"""What hears messages for pages: on the bus of a mission that is up, or in a recording.
+"""Sources of messages for pages: the bus of a running mission, or a recording.
 
 Rules of this file:
 
-* On a bus, the list overhears every conversation, and reads only the begins of messages. A view overhears one
-  conversation of one component.
-* A recording is read from its file: no bus has its past, its questions, and its keys that say nothing now.
+* On a bus, the list overhears every conversation, and decodes only the headers of messages. A view overhears one
+conversation of one component.
+* A recording is read from its file, because a bus has no past messages, no past questions, and no keys that are silent
+  now.
 """
 
 from __future__ import annotations
@@ -38,22 +39,22 @@ StartTask = Callable[[Coroutine[object, None, None], str], asyncio.Task[None]]
 
 # ---------------------------------------------------------------------- live
 class BusEar:
-    """Hears on a bus; see ``KeyEar``.
+    """Receives messages from a bus; see ``KeyEar``.
 
     Args:
-        bus: Of the server.
-        clock: The mission's.
+        bus: Bus of the server.
+        clock: The mission's clock.
     """
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self._bus, self._clock = bus, clock
-        self._known: list[tuple[str, str, str]] = []  # rows of the last list, so that the next one has them at once
+        self._known: list[tuple[str, str, str]] = []  # rows of the last list, which the next list shows at once
         self._schemas = frozenset[str]()
         self._translator: Translator  # since ``know``
         self._asked_s = -ASKED_EVERY_S
 
     async def know(self, schemas: Set[str]) -> None:
-        """Know the classes of these messages: at first those of the installed packages."""
+        """Load the classes of these messages, first from the installed packages."""
         if not self._schemas:
             self._know(await asyncio.to_thread(message_classes))
         now_s = asyncio.get_running_loop().time()
@@ -62,7 +63,7 @@ class BusEar:
             self._know(await mission_classes(self._bus, log.info))
 
     def count(self) -> HeardKeys:
-        """Count what is said from now on."""
+        """Count the messages from now on."""
         return HeardKeys(self._bus, self._clock, self._known)
 
     def hear(self, name: tuple[str, str, str], came: Callable[[Newest], None]) -> Callable[[], object]:
@@ -87,11 +88,11 @@ class BusEar:
 
 # ---------------------------------------------------------------------- recorded
 class RecordingEar:
-    """Reads a recording at the time that is shown; see ``KeyEar``.
+    """Reads a recording at the shown time; see ``KeyEar``.
 
     Args:
         reopened: Opens the recording once more.
-        playback: Its time.
+        playback: Time of the playback.
         start_task: Runs a coroutine until the server ends.
     """
 
@@ -99,16 +100,16 @@ class RecordingEar:
         self._reopened, self._playback, self._start_task = reopened, playback, start_task
 
     async def know(self, schemas: Set[str]) -> None:
-        """Do nothing: a recording has the names of fields."""
+        """Do nothing, because a recording contains the names of fields."""
 
     def count(self) -> RecordedKeys:
-        """Count what was said at the time that is shown."""
+        """Count the messages at the shown time."""
         return RecordedKeys(
             lambda show: self._read(lambda recording: keep_listing_recorded(recording, self._playback, show))
         )
 
     def hear(self, name: tuple[str, str, str], came: Callable[[Newest], None]) -> Callable[[], object]:
-        """Read the last message until the time that is shown, and those that follow as that passes."""
+        """Read the last message before the shown time, and further messages as time passes."""
 
         async def follow(recording: Recording) -> None:
             async for said in said_at(recording, self._playback, KeyRow(*name)):
@@ -130,7 +131,7 @@ class RecordedKeys:
     """Rows that are read; see ``Listing``.
 
     Args:
-        begin: Begins to call what it gets with the rows; returns what ends that.
+        begin: Begins to call its argument with the rows; returns a function that ends that.
     """
 
     dropped = 0
@@ -140,11 +141,11 @@ class RecordedKeys:
         self._end = begin(self._show)
 
     def rows(self) -> Sequence[KeyRow] | None:
-        """Return all keys of the recording; None: it is not open yet."""
+        """Return all keys of the recording; None: the recording is not open yet."""
         return self._rows
 
     def close(self) -> None:
-        """Read no more."""
+        """Stop reading."""
         self._end()
 
     def _show(self, rows: Sequence[KeyRow]) -> None:

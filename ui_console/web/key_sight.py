@@ -1,4 +1,4 @@
-"""What one page looks at on the bus: the list of keys, or one of them. Pure."""
+"""The part of the bus that one page watches: the list of keys, or one key. Pure."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from ui_console.web.protocol import ListKeys, ViewKey
 
 LIST_STREAM = "/keys"
 """Streams of a page's outbox beside those of robots, whose names have no slash."""
-"""Copies are shown at the keys of what they copy."""
+"""Copies are shown under the keys of the copied messages."""
 NO_MESSAGES = COPIED | {Conversation.ALIVE}
-"""Tokens of a mission that is up are no messages; a recording has one for each rise and fall."""
+"""In a running mission tokens are not messages; a recording has a message for each appearance and withdrawal."""
 
 
 class NoSuchKey(Refusal):
-    """No message can be sent at this key."""
+    """No message can have this key."""
 
     code = "web.key"
     remedy = "Choose a key of the list."
 
 
 class KeySight(NamedTuple):
-    """What a page looks at.
+    """The list or key that a page watches.
 
     Attributes:
         is_listed: The list of keys is open.
-        words: Only rows with these words.
-        order: Of the list.
-        number: Of the view, chosen by the page; what comes for an earlier view has another one.
-        key: Of the view, without ``scout/<mission>/``; empty: none is open.
-        source: Sender of the messages in view.
-        schema: Theirs.
+        words: Search words of the list.
+        order: Order of the list.
+        number: Number of the view, chosen by the page; data of an earlier view have another number.
+        key: Key of the view, without ``scout/<mission>/``; empty: no view is open.
+        source: Sender of the viewed messages.
+        schema: Schema of the viewed messages.
     """
 
     is_listed: bool = False
@@ -49,31 +49,31 @@ class KeySight(NamedTuple):
 
     @property
     def view(self) -> tuple[str, str, str] | None:
-        """Key, sender and schema in view; None: no view is open."""
+        """Key, sender and schema of the view; None: no view is open."""
         return (self.key, self.source, self.schema) if self.key else None
 
     @property
     def fields_stream(self) -> str:
-        """Name of the stream of its messages."""
+        """Name of the stream of the view's messages."""
         return f"/fields/{self.number}"
 
     @property
     def picture_stream(self) -> str:
-        """Name of the stream of its pictures."""
+        """Name of the stream of the view's pictures."""
         return f"/picture/{self.number}"
 
     @property
     def streams(self) -> frozenset[str]:
-        """All streams that the page is to get."""
+        """All streams for the page."""
         listed = {LIST_STREAM} if self.is_listed else set[str]()
         return frozenset(listed | ({self.fields_stream, self.picture_stream} if self.key else set()))
 
     def after(self, intent: ListKeys | ViewKey, hidden: Set[Conversation] = NO_MESSAGES) -> KeySight:
-        """Return what the page looks at then.
+        """Return the page's view after an intent.
 
         Args:
-            intent: The page's.
-            hidden: Conversations that it cannot view.
+            intent: The page's intent.
+            hidden: Conversations that pages cannot view.
 
         Raises:
             NoSuchKey: No message can be sent at that key.
@@ -88,10 +88,10 @@ class KeySight(NamedTuple):
 
 
 def conversation_of(key: str, hidden: Set[Conversation] = NO_MESSAGES) -> Conversation:
-    """Return the conversation of a key, which is none of the hidden ones.
+    """Return the conversation of a key, which must not be hidden.
 
     Raises:
-        NoSuchKey: It has none that can be heard.
+        NoSuchKey: The key has no conversation that pages can view.
     """
     known = {one.value: one for one in Conversation if one not in hidden}
     address, _, name = key.rpartition("/")
@@ -101,7 +101,7 @@ def conversation_of(key: str, hidden: Set[Conversation] = NO_MESSAGES) -> Conver
 
 
 def where_heard(key: str, source: str) -> tuple[Conversation, str]:
-    """Return which conversation to overhear for a key, and of whom, so that no other component makes copies.
+    """Return the component and conversation to overhear for a key, so that no other component makes copies.
 
     Args:
         key: Without ``scout/<mission>/``.
@@ -112,7 +112,7 @@ def where_heard(key: str, source: str) -> tuple[Conversation, str]:
     """
     address, conversation = key.rpartition("/")[0], conversation_of(key)
     if conversation is Conversation.ASK:
-        return Conversation.TOLD, address  # the one who answers copies questions too
+        return Conversation.TOLD, address  # the component that answers also copies questions
     if conversation in NEVER_DROPPED:
         return Conversation.TOLD, source or address
     return conversation, address

@@ -1,12 +1,13 @@
-"""Messages for pages that look at them: heard once for all pages, and not at all while none looks.
+"""Messages for watching pages: received once for all pages, and not at all while no page watches.
 
 Rules of this file:
 
-* A ``KeyEar`` hears: on a bus, or in a recording.
-* Of the messages of a view the newest is shown, at most ``SHOWN_EVERY_S`` apart, and further apart if that takes long.
-* What is heard changes at most once in ``SHOWN_EVERY_S``, however fast pages open and close views.
-* What is shown goes by the pictures' way to a page: after all control, the newest only, and only when the page has
-  drawn what came before.
+* A ``KeyEar`` receives the messages from a bus or a recording.
+* A view shows its newest message at intervals of at least ``SHOWN_EVERY_S``; the intervals are longer if showing takes
+  long.
+* Subscriptions change at most once in ``SHOWN_EVERY_S``, however fast pages open and close views.
+* Messages reach a page in the same way as pictures: after all control messages, only the newest one, and only when the
+page has drawn the previous one.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ from ui_console.model.message_views import installed_views
 from ui_console.web.key_sight import LIST_STREAM, KeySight
 from ui_console.web.pictures import jpeg, packet, pixels_in
 
-# All seconds are those of the machine.
-SHOWN_EVERY_S = 0.1  # chosen: a person follows no more
-LISTED_EVERY_S = 1.0  # chosen: rates are read, not followed
+# All times are machine seconds.
+SHOWN_EVERY_S = 0.1  # chosen: a person cannot follow more
+LISTED_EVERY_S = 1.0  # chosen: a person reads rates more slowly
 REST = 20.0  # chosen: a view takes at most a twentieth of the server's time, which operators' commands need
 
 Newest = Callable[[], tuple[Recorded, int]]
-"""Returns a message, and its length in bytes; called only if it is shown."""
+"""Returns a message and its length in bytes; called only if the message is shown."""
 
 
 class Listing(Protocol):
@@ -45,32 +46,32 @@ class Listing(Protocol):
         """Number of messages that came too fast to be counted."""
 
     def rows(self) -> Sequence[KeyRow] | None:
-        """Return all keys in their order; None: not known yet."""
+        """Return all keys in order; None: not known yet."""
 
     def close(self) -> None:
         """Count no more."""
 
 
 class KeyEar(Protocol):
-    """Hears what pages look at."""
+    """Receives the messages that pages watch."""
 
     async def know(self, schemas: Set[str]) -> None:
-        """Know the names of the fields of these messages, if that is possible. When: before they are heard."""
+        """Load the field names of these messages, if possible. When: before the messages are received."""
 
     def count(self) -> Listing:
         """Count the messages of all keys until closed."""
 
     def hear(self, name: tuple[str, str, str], came: Callable[[Newest], None]) -> Callable[[], object]:
-        """Call ``came`` with each message of this key, sender and schema; return what ends that."""
+        """Call ``came`` with each message of this key, sender and schema; return a function that ends that."""
 
 
 class KeyWatcher(Protocol):
-    """A page that looks at messages on the bus."""
+    """A page that watches messages on the bus."""
 
     key_sight: KeySight
 
     def saw_view(self, stream: str, number: int, at_s: float, packed: bytes) -> None:
-        """Show the newest of a stream."""
+        """Show the newest message of a stream."""
 
 
 class _Said(NamedTuple):
@@ -79,7 +80,7 @@ class _Said(NamedTuple):
 
 
 class Viewed:
-    """The messages of one key, sender and schema that pages look at.
+    """The messages of one key, sender and schema that pages watch.
 
     Args:
         name: Key, sender and schema.
@@ -88,7 +89,7 @@ class Viewed:
     def __init__(self, name: tuple[str, str, str]) -> None:
         self.name = name
         self.close: Callable[[], object] = lambda: None
-        """Hears nothing more."""
+        """Ends the subscription."""
         self.served: set[tuple[KeyWatcher, int]] = set()
         """Pages, with the number of their view, that have the last message."""
         self.last: _Said | None = None
@@ -101,7 +102,7 @@ class Viewed:
         self._newest = newest
 
     def look(self) -> None:
-        """Show the newest message that came, unless that is too early."""
+        """Show the newest message, unless that is too early."""
         now_s = asyncio.get_running_loop().time()
         if self._newest is None or now_s < self._next_s:
             return
@@ -137,13 +138,13 @@ class Viewed:
 
 
 class KeyWatch:
-    """Looks at messages for its clients.
+    """Watches messages for its clients.
 
     Args:
-        ear: Hears for it.
+        ear: Receives the messages.
         clock: The mission's.
-        clients: Returns the pages that are there.
-        start_task: Runs a coroutine until the server ends; its bug is the server's.
+        clients: Returns the connected pages.
+        start_task: Runs a coroutine until the server ends; a bug in it ends the server.
     """
 
     def __init__(
@@ -172,7 +173,7 @@ class KeyWatch:
         return frozenset(self._viewed)
 
     def changed(self) -> None:
-        """Begin to look if that is wanted: a page came, went, or looks at something else."""
+        """Update the watching, because a page came, left, or watches another key."""
         if (self._task is None or self._task.done()) and any(self._wanting()):
             self._task = self._start_task(self._look(), "look at keys")
 
@@ -181,7 +182,7 @@ class KeyWatch:
         return [one for one in self._clients() if one.key_sight.streams]
 
     async def _look(self) -> None:
-        """Look until no page does."""
+        """Watch until no page does."""
         try:
             while self._wanting():
                 await self._ear.know({one.key_sight.schema for one in self._wanting()} - {""})
@@ -193,7 +194,7 @@ class KeyWatch:
             self._settle([])
 
     def _settle(self, wanting: list[KeyWatcher]) -> None:
-        """Hear what these look at, and nothing else."""
+        """Subscribe to exactly the messages of these views."""
         is_listed = any(one.key_sight.is_listed for one in wanting)
         if is_listed and self._listing is None:
             self._listing = self._ear.count()
@@ -216,7 +217,7 @@ class KeyWatch:
                 self._show_message(one, self._viewed[view])
 
     def _show_lists(self, wanting: list[KeyWatcher]) -> None:
-        """Send the list to all when it is time, and at once to pages that want another one."""
+        """Send the list to all pages when it is due, and at once to pages that request another list."""
         now_s = asyncio.get_running_loop().time()
         is_due = now_s >= self._listed_s + LISTED_EVERY_S
         news = [one for one in wanting if is_due or self._lists.get(one) != one.key_sight]

@@ -1,10 +1,11 @@
-"""Authentication and decoding of clients: bytes and a time in, a typed intent or a typed violation out.
+"""Authentication and decoding of clients: bytes and a time go in, a typed intent or a typed violation comes out.
 
 Rules of this file: no socket, no bus, no clock; times are seconds of the machine, which never run backwards.
 
-* A client without the right token can send its token only, and must do so within ``LOGIN_WITHIN_S``.
+* A client that is not authenticated can only send its token, and must do so within ``LOGIN_WITHIN_S``.
 * After a fatal violation every further message of the client is ignored.
-* A client that exceeds ``RATE_HZ`` by more than ``BURST`` messages floods; no client's messages delay another's.
+* A client that exceeds ``RATE_HZ`` by more than ``BURST`` messages violates the protocol; no client's messages delay
+  another's.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from typing import Annotated, Generic, TypeVar
 import msgspec
 
 MAX_MESSAGE_BYTES = 4096  # chosen: ten times a parameter's value
-LOGIN_WITHIN_S = 5.0  # chosen: a page sends the token as soon as it is connected
-RATE_HZ = 200.0  # chosen: 20 drives a second, and 30 drawn pictures a second of each of four robots, leave a third
+LOGIN_WITHIN_S = 5.0  # chosen: a page sends its token as soon as it is connected
+RATE_HZ = 200.0  # chosen: 20 drives a second and 30 drawn pictures a second of each of four robots use two thirds
 BURST = 200.0  # chosen: the messages of a page after a pause of a second
-FAULTS_FORGIVEN = 5  # chosen: an old page in a browser's cache has to reload, and keeps its connection meanwhile
+FAULTS_FORGIVEN = 5  # chosen: an old page in a browser's cache must reload, and keeps its connection meanwhile
 TOKEN_BYTES = 24  # chosen: 192 bits cannot be guessed
 
 MAX_USER = 63  # as long as a component's name
@@ -35,10 +36,10 @@ class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     """The first message: token and identity.
 
     Attributes:
-        token: As the server printed it at its start.
-        user: Name of the person, for the record; a token made for one operator has that operator's name instead.
-        priority: The wish; the token's own priority is the most.
-        page: Identifies a page that comes back; an earlier connection of the same page ends.
+        token: Token that the server printed at its start.
+        user: Name of the person, for the record; the name of an operator's own token takes precedence.
+        priority: Requested priority; the token's priority is the maximum.
+        page: Identifies a page that reconnects; an earlier connection of the same page is closed.
     """
 
     token: Annotated[str, msgspec.Meta(max_length=256)]
@@ -48,7 +49,7 @@ class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 
 class BeatRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="beat"):
-    """Ask for this number back: it shows the page the age of its content, and that the server receives it."""
+    """Ask for this number back: the answer shows the page that the server receives it, and the content's age."""
 
     number: Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 
@@ -56,12 +57,12 @@ class BeatRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 class ViolationKind(StrEnum):
     """Kinds of violations."""
 
-    TOKEN = "token"  # noqa: S105  the word for it, not one
+    TOKEN = "token"  # noqa: S105  the word, not a token
     LATE = "late"  # no token in time
     OVERSIZED = "oversized"
     MALFORMED = "malformed"
     FLOOD = "flood"
-    SLOW = "slow"  # does not read its messages
+    SLOW = "slow"  # the client does not read its messages
     CROWD = "crowd"  # too many clients
     ORIGIN = "origin"  # a page of another site
 
@@ -72,9 +73,9 @@ class ProtocolViolation:
 
     Attributes:
         kind: Its kind.
-        line: The event, for people; without the client's own words.
+        line: The event, for people; without text from the client.
         remedy: An action against it.
-        is_fatal: True: the connection has to end.
+        is_fatal: True: the connection must end.
     """
 
     kind: ViolationKind
@@ -85,7 +86,7 @@ class ProtocolViolation:
 
 @dataclass(frozen=True, slots=True)
 class Welcome:
-    """The token was right.
+    """The token was correct.
 
     Attributes:
         user: Name of the person.
@@ -118,7 +119,7 @@ class Authenticator:
         self._rights = {token.encode(): granted for token, granted in rights.items()}
 
     def rights_of(self, token: str) -> TokenRights | None:
-        """Return the rights of the token, None for a wrong one; both take the same time for a token of that length."""
+        """Return the rights of the token, None for a wrong one; the time depends only on the token's length."""
         found = None
         for known, granted in self._rights.items():
             if hmac.compare_digest(known, token.encode("utf-8", "surrogatepass")):
@@ -132,7 +133,7 @@ def new_token() -> str:
 
 
 def new_rights(operators: Iterable[tuple[str, int]], priority: int) -> dict[str, TokenRights]:
-    """Return new tokens: one for each operator with a priority of their own, else one for all."""
+    """Return new tokens: one for each operator with an own priority, or one for all."""
     named = [TokenRights(user, own) for user, own in operators]
     return {new_token(): granted for granted in named or [TokenRights("", priority)]}
 
@@ -158,7 +159,7 @@ def read_operator(text: str) -> tuple[str, int]:
 
 
 class ClientSession(Generic[IntentT]):
-    """One connection, from the first byte on.
+    """A connection, from the first byte on.
 
     Args:
         authenticator: Knows the tokens.
@@ -177,20 +178,20 @@ class ClientSession(Generic[IntentT]):
         self._room, self._room_at_s = BURST, now_s
         self._faults = 0
         self.welcome: Welcome | None = None
-        """None until the token was right."""
+        """None until the token was accepted."""
         self.is_out = False
         """True after a fatal violation."""
 
     @property
     def must_log_in_by_s(self) -> float | None:
-        """Deadline of the token; None: it has come."""
+        """Deadline of the token; None: the token has arrived."""
         return None if self.welcome is not None else self._came_s + LOGIN_WITHIN_S
 
     def heard(self, data: str | bytes, now_s: float) -> Welcome | BeatRequest | IntentT | ProtocolViolation | None:
         """Return the decoded message; None after a fatal violation.
 
         Args:
-            data: One message as it came.
+            data: The received message.
             now_s: Time of its arrival.
         """
         if self.is_out:
@@ -222,7 +223,7 @@ class ClientSession(Generic[IntentT]):
         return self._out(ViolationKind.LATE, f"showed no token within {LOGIN_WITHIN_S:.0f} s", "Load the page again.")
 
     def slow(self, behind_s: float) -> ProtocolViolation:
-        """Return the violation of a client that reads nothing."""
+        """Return the violation of a client that does not read."""
         line = f"has read nothing for {behind_s:.0f} s"
         return self._out(ViolationKind.SLOW, line, "Come closer to the access point, or show fewer pictures.")
 

@@ -1,4 +1,4 @@
-"""One person at a browser: intents are carried out, views and answers wait in the outbox."""
+"""A person at a browser: carries out intents, and puts views and answers into the outbox."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from ui_console.web.sights import PageSight
 
 log = logging.getLogger(__name__)
 
-MOST_ASKED = 8  # chosen: a person asks one thing at a time, and the mission's services are spared more
+MOST_ASKED = 8  # chosen: a person asks one question at a time, and more would burden the mission's services
 LATENCY_STEP = (
-    0.2  # chosen: weight of the newest picture in the latency shown: it follows within a second and is readable
+    0.2  # chosen: weight of the newest picture in the shown latency: it follows within a second and is readable
 )
 
 Asked = protocol.WhyRequest | protocol.ParametersRequest | protocol.SetRequest | protocol.SearchLog
@@ -64,28 +64,28 @@ class OperatorServices(Protocol):
     hidden: frozenset[Conversation]
 
     async def new_console(self, operator: Operator, robot: str, orders: Sequence[Order] = ()) -> Teleoperation:
-        """Return a console of this operator that claims the robot, or gives the orders, as soon as it runs."""
+        """Return a console for this operator; it claims the robot, or gives the orders, as soon as it runs."""
 
     def watching_changed(self) -> None:
-        """Note that an operator wants other pictures."""
+        """Record that an operator wants other pictures."""
 
     def attention_changed(self) -> None:
-        """Note that an operator came or went."""
+        """Record that an operator came or went."""
 
     def sights_changed(self) -> None:
-        """Note that an operator looks at other debug views."""
+        """Record that an operator watches other debug views."""
 
     def keys_changed(self) -> None:
-        """Note that an operator looks at other messages on the bus."""
+        """Record that an operator watches other messages on the bus."""
 
 
 class Operator:
-    """A person at a browser, from the right token to the end of the connection.
+    """A person at a browser, from authentication to the end of the connection.
 
     Args:
-        services: The server's.
+        services: Services of the server.
         welcome: Identity and priority.
-        former: The same person at the same page, before the page shows another time of a recording; None: a new page.
+        former: The same person at the same page before a jump in a recording; None: a new page.
     """
 
     def __init__(self, services: OperatorServices, welcome: Welcome, former: Operator | None = None) -> None:
@@ -110,7 +110,7 @@ class Operator:
 
     # ------------------------------------------------------------------ messages of the browser
     def obey(self, intent: protocol.Intent) -> None:
-        """Carry out the browser's intent; a slow one goes on in a task of its own."""
+        """Carry out the browser's intent; a slow intent runs in its own task."""
         match intent:
             case protocol.Steer(moment, forward, right, speed) if self.model.reach is not None:
                 move = move_by_stick(forward, right, speed, self.model.reach)
@@ -164,7 +164,7 @@ class Operator:
         self._console.act(Teleoperation.stop)
 
     async def leave(self, reason: str) -> None:
-        """Stop the wheels and give the robot back; the operator is gone afterwards."""
+        """Stop the wheels and release the robot; afterwards the operator is gone."""
         work = list(self._work.values())
         for task in work:
             task.cancel()
@@ -178,7 +178,7 @@ class Operator:
 
     # ------------------------------------------------------------------ messages to the browser
     def show(self, event: ConsoleEvent) -> None:
-        """Take in an event of this operator's robot."""
+        """Process an event of this operator's robot."""
         if isinstance(event, Attention):
             self.is_there = event.is_there
             self._services.attention_changed()
@@ -188,7 +188,7 @@ class Operator:
             self.refresh(self._services.clock.now_s())
 
     def saw(self, robot: str, number: int, captured_s: float, packet: bytes) -> None:
-        """Take in a picture of a robot that this operator may watch."""
+        """Process a picture of a robot that this operator may watch."""
         if robot in self.outbox.watched:
             self.model.apply(PictureSeen(self._services.clock.now_s(), captured_s, robot))
             self.outbox.put_picture(robot, number, captured_s, packet)
@@ -200,7 +200,7 @@ class Operator:
         self.news.set()
 
     def saw_view(self, stream: str, number: int, at_s: float, packed: bytes) -> None:
-        """Send a picture of a debug view, or the newest of the messages that this page looks at."""
+        """Send a picture of a debug view, or the newest of the messages that this page watches."""
         self.outbox.put_picture(stream, number, at_s, packed)
         self.news.set()
 
@@ -223,12 +223,12 @@ class Operator:
 
     # ------------------------------------------------------------------ within
     def _by_press(self, moment: int, act: Callable[[Teleoperation], None]) -> None:
-        """Move the robot unless the press is from an earlier moment, also if the page's message was late."""
+        """Move the robot, unless the press is from an earlier moment; this also covers a late message."""
         if moment == self.model.moment:
             self._console.act(act)
 
     def _give(self, moment: int, wish: GiveWish) -> None:
-        """Give a command, unless the robot was stopped, freed, granted or lost since the page showed it."""
+        """Send a command, unless the robot was stopped, freed, granted or lost since the page showed it."""
         if moment == self.model.moment:
             self._console.act(lambda console: console.give(wish))
         else:
@@ -244,7 +244,7 @@ class Operator:
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)
         self.news.set()
-        if captured_s is not None and "/" not in robot:  # no debug view, and no message of a key
+        if captured_s is not None and "/" not in robot:  # neither a debug view nor a message of a key
             self._ordering.drawn(robot, captured_s)
             took_s = max(0.0, self._services.clock.now_s() - captured_s)
             before_s = self._latency_s.get(robot, took_s)
@@ -342,7 +342,7 @@ class Operator:
             self._answer({"log": self._found.part(first)})
 
     async def _stop(self, robot: str) -> None:
-        """Emergency stop; the wheels this operator turns stop with it."""
+        """Emergency stop; the wheels that this operator drives also stop."""
         self._console.act(Teleoperation.require_let_go)
         is_known = robot in self._services.team.robots.names()
         is_stopped = is_known and await self._services.observer.stop_robot(robot, "", self.welcome.user)
@@ -363,7 +363,7 @@ class Operator:
 
     async def _new_console(self, robot: str, orders: Sequence[Order]) -> Teleoperation:
         console = await self._services.new_console(self, robot, orders)
-        self.model.name = console.name  # others of this person are other screens
+        self.model.name = console.name  # other consoles of this person are other screens
         return console
 
     def _show_failed(self, error: Refusal | LinkError) -> None:

@@ -1,4 +1,4 @@
-"""Ordering: from what a person taps on a page to orders for robots."""
+"""Ordering: converts a person's taps on a page into orders for robots."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class Ordering:
         self._captured_s: dict[str, float] = {}
 
     def drawn(self, robot: str, captured_s: float) -> None:
-        """Note that the page shows the picture of this time: a tap in it means the robot's place then."""
+        """Record that the page shows the picture of this time, because a tap in it refers to the robot's place then."""
         self._captured_s[robot] = captured_s
 
     def orders_for(self, intent: OrderRequest | PictureOrder) -> list[Order]:
-        """Return one order for each robot; places to go to lie side by side, on the floor.
+        """Return one order for each robot; goals are side by side, on the floor.
 
         Raises:
-            NoFloorThere: The point of the picture shows no place on the floor that can be told.
+            NoFloorThere: No place on the floor can be determined for the point of the picture.
         """
         match intent:
             case OrderRequest(kind=kind, robots=robots, x_m=x_m, y_m=y_m, target=target):

@@ -1,12 +1,12 @@
-"""Outbox of one browser: never more than the newest of each kind.
+"""Outbox of one browser: holds only the newest message of each kind.
 
 Rules of this file: no socket, no clock; times are seconds of the machine.
 
-* Nothing queues: a newer picture of a robot, a newer message of a key, or a newer section of the view takes the place
-  of the older.
-* At most ``PICTURES_UNDERWAY`` pictures of a robot are on their way; the next goes when the browser has drawn one. So a
-  slow link shows few pictures, not old ones.
-* Answers to the operator are all sent, but for the oldest when there are more than ``ANSWERS_KEPT``.
+* There are no queues: a newer picture of a robot, a newer message of a key, or a newer section of the view replaces the
+older one.
+* At most ``PICTURES_UNDERWAY`` pictures of a robot are in transit; the next is sent when the browser has drawn one. So
+a slow link shows few pictures, not old ones.
+* All answers to the operator are sent; if there are more than ``ANSWERS_KEPT``, the oldest is dropped.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 PICTURES_UNDERWAY = 2  # measured: with two, three cameras on 100 kB/s show pictures 0.4 s old, and LANs lose no rate
-DRAWN_WITHIN_S = 2.0  # chosen: a picture not drawn by then was lost with a hidden page; another may go
+DRAWN_WITHIN_S = 2.0  # chosen: a picture not drawn by then was lost in a hidden page; another one may be sent
 ANSWERS_KEPT = 20  # chosen: more than a person asks before reading
 
 
@@ -45,7 +45,7 @@ class Outbox:
 
     # ------------------------------------------------------------------ in
     def put_section(self, name: str, body: bytes) -> None:
-        """Queue a section of the view unless the browser has just that.
+        """Queue a section of the view, unless the browser already has it.
 
         Args:
             name: Of the section.
@@ -64,17 +64,17 @@ class Outbox:
         self._answers.append(body)
 
     def watch(self, robots: frozenset[str]) -> None:
-        """Show these robots' pictures, and those of the view that is looked at, and no others."""
+        """Show exactly these robots' pictures, and the pictures of the watched view."""
         self._robots = robots
         self._keep_streams()
 
     def look(self, view: str) -> None:
-        """Show the pictures of this debug view beside those of robots; empty: of none."""
+        """Show the pictures of this debug view in addition to those of robots; empty: no view."""
         self._view = view
         self._keep_streams()
 
     def open_beside(self, streams: frozenset[str]) -> None:
-        """Send what comes in these streams, too; a page says of each part, as of a picture, that it is drawn."""
+        """Also send the data of these streams; a page confirms each part after drawing, as for a picture."""
         self._beside = streams
         self._keep_streams()
 
@@ -88,17 +88,17 @@ class Outbox:
         return self._robots
 
     def put_picture(self, robot: str, number: int, captured_s: float, packet: bytes) -> None:
-        """Queue a picture in place of an older one of that robot; do nothing if the browser does not watch it."""
+        """Queue a picture, replacing an older one of that robot; if the browser does not watch it, do nothing."""
         stream = self._streams.get(robot)
         if stream is not None:
             self.skipped += stream.waiting is not None
             stream.waiting = (number, captured_s, packet)
 
     def drawn(self, robot: str, number: int) -> float | None:
-        """Note that a picture, and all pictures sent before it, are on the screen.
+        """Record that a picture, and all pictures sent before it, are on the screen.
 
         Returns:
-            Its time of capture; None: no such picture is on its way.
+            Its time of capture; None: no such picture is in transit.
         """
         stream = self._streams.get(robot)
         if stream is None or number not in stream.underway:
@@ -131,7 +131,7 @@ class Outbox:
         return packet
 
     def next_s(self) -> float | None:
-        """When a picture that was not drawn makes room for the next one; None: none waits for that."""
+        """Time at which an undrawn picture counts as lost and the next may be sent; None: no picture waits."""
         held = [
             min(sent_s for sent_s, _captured in stream.underway.values()) + DRAWN_WITHIN_S
             for stream in self._streams.values()

@@ -1,4 +1,4 @@
-"""The console of one person at a browser: none before the first take or order, then one until the person leaves."""
+"""The console of one person at a browser: created at the first claim or order, kept until the person leaves."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Opening = Callable[[str, Sequence[Order]], Awaitable[Teleoperation]]
 
 
 class OwnConsole:
-    """Opens it, lets it live, and passes verbs to it while it can take them.
+    """Opens the console, runs it, and passes actions to it while it is ready.
 
     Args:
-        opening: Makes the console.
-        failed: Called with the reason why there is none, or none any more.
+        opening: Creates the console.
+        failed: Called with the reason why there is no console.
         on_bug: Called with a bug of the console.
     """
 
@@ -35,12 +35,12 @@ class OwnConsole:
         self._claiming = asyncio.Lock()
 
     def act(self, verb: Callable[[Teleoperation], None]) -> None:
-        """Call a verb of the console, if there is one and it is ready."""
+        """Call a method of the console, if there is one and it is ready."""
         if (console := self._ready) is not None:
             verb(console)
 
     async def take(self, robot: str, kind: str) -> None:
-        """Claim a robot, in place of the present one."""
+        """Claim a robot; it replaces the present one."""
         async with self._claiming:
             if not self._lives:
                 await self._open(robot)
@@ -51,7 +51,7 @@ class OwnConsole:
         """Give orders; return False if the console is not ready for them.
 
         Args:
-            ordered: Returns the orders, when it is their turn.
+            ordered: Returns the orders when the console is ready for them.
         """
         async with self._claiming:
             orders = ordered()
@@ -63,7 +63,7 @@ class OwnConsole:
             return console is not None
 
     async def end_orders(self, robots: Sequence[str], at_stick: str) -> None:
-        """End the orders of these robots; the one at the stick is taken from its order."""
+        """End the orders of these robots; the stick keeps the robot at the stick."""
         if (console := self._ready) is None:
             return
         if at_stick in robots:

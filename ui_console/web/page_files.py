@@ -1,7 +1,7 @@
-"""The page: files of this package, each with the headers that make a browser trust nothing else.
+"""The page: files of this package, with headers that forbid the browser all other sources.
 
-Rules of this file: no socket; a path goes in, an answer comes out. Files are read once, and only those that the page
-names, so no path leads to another file.
+Rules of this file: no socket; a path goes in, an answer comes out. Only files that the page names are read, once, so no
+path leads to another file.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _NAMED = re.compile(r'(?:src|href)="(\w+\.\w+)"|^[^*\n]*from "\./([^"]+)"', re.M
 
 
 def _page(html: str) -> dict[str, tuple[str, str]]:
-    """Return the files of a page by their paths, each with its type: what it names, and what its modules import."""
+    """Return the files of a page by path, each with its type: those that it names or that its modules import."""
     names, found = [html], dict[str, str]()
     while names:
         name = names.pop()
@@ -51,7 +51,7 @@ SAFETY = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-cache",
 }
-"""Nothing from other sites, nothing inline, no frame around the page; revalidated each time: no old page is shown."""
+"""No content from other sites, no inline content, no framing; revalidation each time, so that no old page is shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class PageFiles:
         """Return the answer to a GET.
 
         Args:
-            path: Of the request, with query.
+            path: Path of the request, with query.
             known_tag: ``If-None-Match`` of the request.
         """
         found = self._answers.get(path.partition("?")[0])
@@ -93,10 +93,10 @@ class PageFiles:
 
 
 def is_own_page(origin: str, host: str) -> bool:
-    """Return whether a connection comes from this server's page, or from no page at all.
+    """Return whether a connection comes from this server's page, or not from a page.
 
     Args:
-        origin: ``Origin`` of the request; empty: a program, which needs the token too.
+        origin: ``Origin`` of the request; empty: a program; it also needs the token.
         host: ``Host`` of the request.
 
     Example:

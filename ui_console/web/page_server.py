@@ -1,4 +1,4 @@
-"""Server of pages: files over HTTP, messages over WebSockets; the application behind it gives them meaning."""
+"""Server of pages: files over HTTP, messages over WebSockets; an application interprets the messages."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from ui_console.web.outbox import Outbox
 from ui_console.web.page_files import SOCKET_PATH, Answer, PageFiles, is_own_page
 from ui_console.web.pending_connections import CLOSE_WITHIN_S, OPEN_WITHIN_S, PendingConnections
 
-PING_EVERY_S = 2.0  # chosen: a tablet that went out of reach gives its robot back within 6 s
-READ_WITHIN_S = 4.0  # chosen: a page held up for longer is of no use to drive by
+PING_EVERY_S = 2.0  # chosen: a tablet that goes out of reach releases its robot within 6 s
+READ_WITHIN_S = 4.0  # chosen: a page that is delayed for longer is useless for driving
 MOST_OPERATORS = 32  # chosen: more browsers than a team has people
-MOST_UNREAD = 8  # messages read ahead of the one carried out
-SEND_AHEAD_BYTES = 32768  # a picture and a half on top of what the system keeps
+MOST_UNREAD = 8  # messages read ahead of the present one
+SEND_AHEAD_BYTES = 32768  # a picture and a half in addition to the system's buffer
 FATAL_CODES = {
     ViolationKind.OVERSIZED: CloseCode.MESSAGE_TOO_BIG,
     ViolationKind.MALFORMED: CloseCode.INVALID_DATA,
     ViolationKind.SLOW: CloseCode.TRY_AGAIN_LATER,
     ViolationKind.CROWD: CloseCode.TRY_AGAIN_LATER,
 }
-MOST_REASON = 120  # of the 123 bytes for it in a close frame
+MOST_REASON = 120  # of the 123 bytes for the reason in a close frame
 NOT_SERVED = "this mission is not served any more"
 KEEPALIVE_REASON = "keepalive ping timeout"
 
@@ -55,7 +55,7 @@ class CannotListen(Refusal):
 
 
 class Client(Protocol):
-    """A person at a page, from the right token to the end of the connection."""
+    """A person at a page, from authentication to the end of the connection."""
 
     @property
     def welcome(self) -> Welcome:
@@ -67,7 +67,7 @@ class Client(Protocol):
 
     @property
     def news(self) -> asyncio.Event:
-        """Set when there is something to send."""
+        """Set when there is a message to send."""
 
 
 ClientT = TypeVar("ClientT", bound=Client)
@@ -85,7 +85,7 @@ class Application(Protocol[ClientT, HeardT_contra]):
         """Return a new client."""
 
     async def obey(self, client: ClientT, intent: HeardT_contra) -> None:
-        """Carry out a client's intent; the server reads no further message of that client until this returns."""
+        """Carry out a client's intent; until this returns, the server reads no further message of that client."""
 
     def refused(self, client: ClientT) -> None:
         """Stop the actions of a client whose violation ends its connection."""
@@ -126,7 +126,7 @@ class PageServer(Generic[ClientT, IntentT]):
 
     @asynccontextmanager
     async def open(self, host: str, port: int, encryption: SSLContext | None = None) -> AsyncIterator[Server]:
-        """Accept browsers, until left or the server is closed; see ``open_pages``.
+        """Accept browsers until the context is left or the server is closed; see ``open_pages``.
 
         Raises:
             CannotListen: The address is not free, or not one of this machine.
@@ -135,7 +135,7 @@ class PageServer(Generic[ClientT, IntentT]):
             yield server
 
     async def end(self) -> None:
-        """Close the connections of its pages, and serve no more."""
+        """Close the connections of its pages, and stop serving."""
         self._is_over = True
         closing = [connection.close(CloseCode.GOING_AWAY, NOT_SERVED) for connection in self._connections]
         await asyncio.gather(*closing)
@@ -145,12 +145,12 @@ class PageServer(Generic[ClientT, IntentT]):
         self._application.report_violation(who, violation)
 
     def answer(self, connection: ServerConnection, request: Request, path: str) -> Response | None:
-        """Return the file asked for; None: it is the page's socket.
+        """Return the requested file; None: the request is for the page's socket.
 
         Args:
             connection: The browser's.
             request: Its request.
-            path: Below this page's own.
+            path: Path relative to this page's path.
         """
         if self._is_over:
             return connection.respond(404, f"{NOT_SERVED}.\n")
@@ -220,7 +220,7 @@ class PageServer(Generic[ClientT, IntentT]):
             writing.result()
 
     def _end_earlier(self, connection: ServerConnection, welcome: Welcome) -> None:
-        """Cut off an earlier connection of the same page, whose link broke: it may still hold a robot."""
+        """Close an earlier connection of the same page after a broken link, because it may still hold a robot."""
         if not welcome.page:
             return
         earlier = self._pages.get((welcome.user, welcome.page))
@@ -266,7 +266,7 @@ class PageServer(Generic[ClientT, IntentT]):
     async def _write(
         self, connection: ServerConnection, session: ClientSession[IntentT], client: ClientT, who: str
     ) -> None:
-        """Send the newest content whenever the browser reads; cut off a browser that reads nothing."""
+        """Send the newest content whenever the browser reads; disconnect a browser that does not read."""
         outbox, news = client.outbox, client.news
         try:
             while True:
@@ -294,10 +294,10 @@ class PageServer(Generic[ClientT, IntentT]):
 async def open_pages(
     pages: Mapping[str, PageServer[Any, Any]], host: str, port: int, encryption: SSLContext | None = None
 ) -> AsyncIterator[Server]:
-    """Accept browsers of several pages at one address, until left or the server is closed.
+    """Accept browsers of several pages at one address, until the context is left or the server is closed.
 
     Args:
-        pages: Path of each, which ends with a slash; none begins with another.
+        pages: Path of each page; a path ends with a slash, and none begins with another one.
         host: Address to listen at.
         port: Port; 0: any that is free.
         encryption: See ``encryption_with``; None: plain HTTP.
@@ -370,7 +370,7 @@ def port_of(server: Server) -> int:
 
 
 async def _wait_news(news: asyncio.Event, until_s: float | None) -> None:
-    """Return when there is news, or at this time of the machine."""
+    """Wait until there is news, or until this machine time."""
     try:
         async with asyncio.timeout_at(until_s):
             await news.wait()

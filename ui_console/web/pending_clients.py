@@ -1,11 +1,13 @@
-"""Clients without a token: a new one always gets a place, and may displace the one that was silent for longest.
+"""Clients before authentication: a new client always gets a place, and may displace the client that was silent longest.
 
-Rules of this file: no socket, no clock; a displaced client is returned, not cut off.
+Rules of this file: no socket, no clock; a displaced client is returned; the caller disconnects it.
 
-* Pending clients take no operator's place, and there are never more of them than ``MOST_PENDING``.
-* One address, or one network of IPv6, has at most ``MOST_OF_AN_ADDRESS``: beyond that it displaces its own only.
-* If all places are taken, the address with the most pending clients loses one, so few make no room for many.
-* Of an address the oldest client without a request goes first.
+* Pending clients occupy no operator's place; there are at most ``MOST_PENDING``.
+* One address (or IPv6 network) has at most ``MOST_OF_AN_ADDRESS``: further clients displace only clients of the same
+  address.
+* If all places are taken, the address with the most pending clients loses one, so addresses with few clients keep
+  theirs.
+* Of an address, the oldest client without a request is displaced first.
 """
 
 from __future__ import annotations
@@ -16,13 +18,13 @@ from typing import Generic, TypeVar
 
 MOST_OF_AN_ADDRESS = 64  # chosen: a page opens six connections at a time; a team behind one address ten pages
 MOST_PENDING = 128  # chosen: far below the 1024 descriptors a process usually has
-IPV6_NETWORK_BITS = 64  # a provider assigns so large a network to one household or host
+IPV6_NETWORK_BITS = 64  # a provider assigns a network of this size to one household or host
 
 PendingT = TypeVar("PendingT")
 
 
 class PendingClients(Generic[PendingT]):
-    """The clients without a token, in the order of their connections."""
+    """The clients before authentication, in the order of their connections."""
 
     def __init__(self) -> None:
         self._places: dict[PendingT, str] = {}
@@ -32,7 +34,7 @@ class PendingClients(Generic[PendingT]):
         return len(self._places)
 
     def came(self, who: PendingT, address: str) -> PendingT | None:
-        """Add a client; return the client it displaces, which is removed; None: there is room.
+        """Add a client; return the displaced client, which is removed; None: there was room.
 
         Args:
             who: The new client.
@@ -52,11 +54,11 @@ class PendingClients(Generic[PendingT]):
         return displaced
 
     def asked(self, who: PendingT) -> None:
-        """Note that a client has sent a valid request."""
+        """Record that a client has sent a valid request."""
         self._silent.pop(who, None)
 
     def gone(self, who: PendingT) -> None:
-        """Remove a client: it has left, or was authenticated."""
+        """Remove a client that has left or was authenticated."""
         self._places.pop(who, None)
         self._silent.pop(who, None)
 

@@ -1,7 +1,7 @@
-"""Connections before authentication, from their first moment on.
+"""Connections before authentication.
 
-Encryption, request and token have one deadline together. A connection that misses it, or is displaced by a new one, is
-cut off. ``PendingClients`` decides which one is displaced.
+Encryption, request and token share one deadline. A connection that misses it, or is displaced by a new one, is closed.
+``PendingClients`` decides which one is displaced.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from ui_console.web.pending_clients import PendingClients
 
 OPEN_WITHIN_S = 5.0  # chosen: a request is a few lines
 AUTHENTICATED_WITHIN_S = 2 * OPEN_WITHIN_S + LOGIN_WITHIN_S + 1.0  # encryption, request, token, and a moment to refuse
-CLOSE_WITHIN_S = 1.0  # chosen: a client that does not complete the closing handshake is cut off
-TOLD_EVERY_S = 10.0  # chosen: a crowd is one piece of news
+CLOSE_WITHIN_S = 1.0  # chosen: a client that does not complete the closing handshake is disconnected
+TOLD_EVERY_S = 10.0  # chosen: many displaced connections make one report
 
 
 class PendingConnections:
-    """The connections without a token so far.
+    """The connections before authentication.
 
     Args:
         encryption: TLS context; None: plain HTTP.
-        report_violation: Called with each address whose connections were cut off for new ones.
+        report_violation: Called with each address whose connections were closed in favor of new ones.
     """
 
     def __init__(
@@ -54,22 +54,22 @@ class PendingConnections:
             self._report_displaced(displaced.address)
 
     def asked(self, connection: ServerConnection) -> None:
-        """Note that a connection has made a request."""
+        """Record that a connection has made a request."""
         self._clients.asked(self._protocols[connection])
 
     def admit(self, connection: ServerConnection) -> None:
-        """Admit a connection: no new connection displaces it any more."""
+        """Admit a connection, so that no new connection can displace it."""
         protocol = self._protocols[connection]
         protocol.be_known()
         self._clients.gone(protocol)
 
     def left(self, protocol: ConnectionProtocol) -> None:
-        """Forget a connection that has ended."""
+        """Remove a connection that has ended."""
         self._clients.gone(protocol)
         self._protocols.pop(protocol.connection, None)
 
     def close(self) -> None:
-        """Cut off all connections without a token."""
+        """Close all connections before authentication."""
         for protocol in list(self._protocols.values()):
             if not protocol.is_known:
                 protocol.abort()
@@ -88,13 +88,13 @@ class PendingConnections:
 class ConnectionProtocol(asyncio.Protocol):
     """asyncio's protocol of one connection: decrypts it if it is encrypted, and passes all data on.
 
-    It has the plain transport from the beginning, so that a client that never ends the handshake can be cut off; if
-    asyncio encrypts, the server gets a connection only after the handshake.
+    It has the plain transport from the beginning, so that a client that never completes the handshake can be
+    disconnected. If asyncio did the encryption, the server would get a connection only after the handshake.
 
     Attributes:
         connection: Receives the data.
         address: Address of the client.
-        is_known: True once the client has sent the right token.
+        is_known: True once the client has sent a valid token.
     """
 
     def __init__(self, pending: PendingConnections, connection: ServerConnection) -> None:
@@ -111,12 +111,12 @@ class ConnectionProtocol(asyncio.Protocol):
             self._deadline.cancel()
 
     def abort(self) -> None:
-        """Cut it off."""
+        """Disconnect the client."""
         if self._transport is not None:
             self._transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin the deadline, and make room."""
+        """Start the deadline, and make room."""
         loop = asyncio.get_running_loop()
         self._transport = cast(asyncio.Transport, transport)
         self.address = str((transport.get_extra_info("peername") or ("",))[0])
@@ -126,7 +126,7 @@ class ConnectionProtocol(asyncio.Protocol):
                 loop,
                 self.connection,
                 self._pending.encryption,
-                cast(Any, None),  # no future: no caller awaits the handshake
+                cast(Any, None),  # no future, because no caller awaits the handshake
                 server_side=True,
                 ssl_handshake_timeout=int(OPEN_WITHIN_S),
                 ssl_shutdown_timeout=int(CLOSE_WITHIN_S),

@@ -1,4 +1,4 @@
-"""Messages of a page that shows a recording: those that only look, and those that play it."""
+"""Messages of a page that shows a recording: for viewing and for playback."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Looking = (
 
 
 class PlayOn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="play_on"):
-    """Play on, so many mission seconds in a second."""
+    """Play at this number of mission seconds per second."""
 
     speed: Annotated[float, msgspec.Meta(ge=SLOWEST, le=FASTEST)] = 1.0
 
@@ -51,7 +51,7 @@ class StandStill(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fi
 
 
 class StepOn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="step_on"):
-    """Go on to the next picture, decision or event, and stand still there."""
+    """Go to the next picture, decision or event, and pause there."""
 
 
 class ShowTime(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="go_to"):

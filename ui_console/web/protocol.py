@@ -32,13 +32,13 @@ Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
 
 class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="drive"):
-    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be repeated meanwhile.
+    """A stick, key or pad is held; lasts for ``driving.STICK_LASTS_S`` and must be repeated meanwhile.
 
     Attributes:
-        moment: ``OwnView.moment`` as the page showed it when the press began; at a later one the press moves nothing.
+        moment: ``OwnView.moment`` that the page showed when the press began; at a later moment the press moves nothing.
         forward: −1 (full backward) to 1.
         right: −1 (full left) to 1.
-        speed: Share of the robot's most at full stick.
+        speed: Share of the robot's largest speed at full stick.
     """
 
     moment: Numbered
@@ -48,15 +48,15 @@ class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 
 class StopWheels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop"):
-    """The control was let go."""
+    """The control was released."""
 
 
 class GiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="give"):
-    """Give one command to the robot in hand.
+    """Send one command to the held robot.
 
     Attributes:
         moment: As in ``Steer``.
-        word: The command's.
+        word: Word of the command.
         values: Field → value; the ARC checks them.
         role: Role of the RC that obeys it.
     """
@@ -68,13 +68,13 @@ class GiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 
 
 class OrderRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="order"):
-    """Tell robots to do something by themselves.
+    """Give robots an order.
 
     Attributes:
         moment: As in ``Steer``.
-        kind: What they are to do.
-        robots: Their names; places to go to lie side by side.
-        x_m: Of the place to go to.
+        kind: Kind of order.
+        robots: Names of the robots; goals are side by side.
+        x_m: Goal.
         y_m: Same.
         target: The body to follow.
     """
@@ -88,16 +88,16 @@ class OrderRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_
 
 
 class PictureOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="order_in_picture"):
-    """Tell robots to go to the place on the floor that a point of a robot's picture shows.
+    """Order robots to go to the place on the floor at a point of a robot's picture.
 
     Attributes:
         moment: As in ``Steer``.
-        robot: The picture is its camera's.
-        robots: Who is to go there.
+        robot: Robot whose camera took the picture.
+        robots: Robots that go there.
         column_px: 0: the middle of the leftmost pixel.
         row_px: 0: the middle of the uppermost pixel.
-        width_px: Of the picture.
-        height_px: Same.
+        width_px: Width of the picture.
+        height_px: Height of the picture.
     """
 
     moment: Numbered
@@ -110,7 +110,7 @@ class PictureOrder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_
 
 
 class EndOrders(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="end_orders"):
-    """End the orders of these robots: the robot at the stick stays in hand, the others go back to the mission."""
+    """End the orders of these robots: the stick keeps the robot at the stick, the others return to the mission."""
 
     robots: Robots
 
@@ -120,7 +120,7 @@ class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
     Attributes:
         robot: Its name; empty: any free one with a camera.
-        kind: Kind of ARC; empty: that of now for the same robot, else one for the robot.
+        kind: Kind of ARC; empty: the present kind for the same robot, else a kind that fits the robot.
     """
 
     robot: ShortText
@@ -128,13 +128,13 @@ class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class MayI(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="may_i"):
-    """Ask the operator who holds the robot this one waits for."""
+    """Ask the operator who holds the robot for which this operator waits."""
 
     why: Annotated[str, msgspec.Meta(max_length=MAX_WHY)] = ""
 
 
 class Decide(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="decide"):
-    """Answer the operator who asks: for the robot, which is given back with a yes, or to lift a stop."""
+    """Answer an operator's question for the robot (a yes releases it) or for the lift of a stop."""
 
     is_given: bool
 
@@ -165,13 +165,13 @@ class LiftRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
 
 
 class Watch(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="watch"):
-    """Show the pictures of these robots, and of no others."""
+    """Show exactly the pictures of these robots."""
 
     robots: Annotated[list[ShortText], msgspec.Meta(max_length=MOST_WATCHED)]
 
 
 class Drawn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="drawn"):
-    """A picture is on the screen, which makes room for the next."""
+    """A picture is on the screen, so the next may be sent."""
 
     robot: ShortText
     number: Annotated[int, msgspec.Meta(ge=0, le=2**32 - 1)]
@@ -181,7 +181,7 @@ class LookInto(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
     """Show the debug views of a behavior, and the pictures of one of them.
 
     Attributes:
-        behavior: Name; empty: look into none.
+        behavior: Name; empty: no behavior.
         view: Name of the picture; empty: none.
     """
 
@@ -190,12 +190,12 @@ class LookInto(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class ListKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="list_keys"):
-    """Show the keys on the bus, and how much is said at each; while no page does, nothing is counted.
+    """Show the keys on the bus with their message rates; while no page shows them, messages are not counted.
 
     Attributes:
         is_open: False: show none.
-        words: Only rows with all of these in key, sender or schema.
-        order: Of the rows.
+        words: Only rows that contain all of these words in key, sender or schema.
+        order: Order of the rows.
     """
 
     is_open: bool
@@ -204,13 +204,13 @@ class ListKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class ViewKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="view_key"):
-    """Show the newest message of one key, and of no other.
+    """Show the newest message of exactly one key.
 
     Attributes:
-        number: Comes back in the names of the streams with what is shown.
-        key: As in the list; empty: show none.
+        number: Returned in the names of the streams.
+        key: Key in the list; empty: show none.
         source: Sender of the messages.
-        schema: Theirs.
+        schema: Schema of the messages.
     """
 
     number: Numbered
@@ -229,7 +229,7 @@ class SearchLog(LogQuestion, frozen=True, forbid_unknown_fields=True, tag_field=
     """Search the mission's log.
 
     Attributes:
-        number: Comes back with the result.
+        number: Returned with the result.
     """
 
     number: Numbered
@@ -240,7 +240,7 @@ class MoreLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 
     Attributes:
         number: Of the search.
-        first: How many events of it the page has.
+        first: Number of events that the page already has.
     """
 
     number: Numbered
@@ -264,11 +264,11 @@ class SetRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fi
 
     name: ShortText
     parameter: ShortText
-    value: Any  # as JSON has it; the component checks it
+    value: Any  # a JSON value; the component checks it
 
 
 class Here(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="here"):
-    """The operator touched the page, or it is no longer in front."""
+    """The operator used the page, or the page lost the focus."""
 
     is_there: bool
 

@@ -1,6 +1,6 @@
-"""The web console of a recording: the same page as of a mission that is up, and a time that people move.
+"""The web console of a recording: the same page as for a running mission, with a time that people can change.
 
-A hub hears what ``RecordedPlay`` plays. After a jump another hub does, and the pages stay.
+A hub receives the messages that ``RecordedPlay`` plays. A jump replaces the hub; the pages stay.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ TOLD_EVERY_S = 0.1  # chosen: the slider moves smoothly; machine seconds
 
 
 class RecordedHub(WebHub):
-    """A hub that hears a recording from one time on.
+    """A hub that receives a recording from one time on.
 
     Args:
         launch: See ``WebHub``.
-        network: On which the recording is played.
+        network: Network on which the recording is played.
         playback: Its time.
         reopened: Opens the recording once more.
     """
@@ -56,7 +56,7 @@ class RecordedHub(WebHub):
         self.hidden = COPIED
 
     async def run(self) -> None:
-        """Hear it, and keep the pages fresh; until cancelled.
+        """Receive the recording, and refresh the pages; until cancelled.
 
         Raises:
             BaseException: The bug that ended the hub's component.
@@ -68,7 +68,7 @@ class Viewer:
     """A person at a page that shows a recording.
 
     Args:
-        operator: At the hub of now.
+        operator: The operator at the present hub.
     """
 
     def __init__(self, operator: Operator) -> None:
@@ -81,7 +81,7 @@ class Viewer:
 
     @property
     def outbox(self) -> Outbox:
-        """What the page is sent; the same at any time of the recording."""
+        """Messages for the page; the same object at any time of the recording."""
         return self.operator.outbox
 
     @property
@@ -90,21 +90,21 @@ class Viewer:
         return self.operator.news
 
     def refuse(self, why: str) -> None:
-        """Tell the page what is not done."""
+        """Send the page a refusal."""
         self.outbox.put_answer(msgspec.json.encode({"answer": {"refused": why}}))
         self.news.set()
 
 
 class RecordingRoom:
-    """Shows a recording to any number of pages, all at the same time of it.
+    """Shows a recording to any number of pages, all at the same recorded time.
 
     Args:
         opened: Opens the recording's file once more.
-        machine: Its seconds are those of the machine.
+        machine: Clock of machine seconds.
 
     Raises:
-        NoRecording: The file is none, or its recorder was killed.
-        OtherForm: It is of another release.
+        NoRecording: The file is not a recording, or its recorder was killed.
+        OtherForm: The recording was made by another release.
     """
 
     def __init__(self, opened: Callable[[], IO[bytes]], machine: Clock) -> None:
@@ -131,14 +131,14 @@ class RecordingRoom:
         await self._hub.leave(viewer.operator, reason)
 
     def refused(self, viewer: Viewer) -> None:
-        """Do nothing: no wheels turn."""
+        """Do nothing, because no wheels turn."""
 
     def report_violation(self, who: str, violation: ProtocolViolation) -> None:
         """Show the viewers a client's violation."""
         self._hub.report_violation(who, violation)
 
     async def obey(self, viewer: Viewer, intent: Intent | Playing) -> None:
-        """Play, or look; a command to the mission is refused."""
+        """Carry out playback and viewing; refuse commands to the mission."""
         match intent:
             case PlayOn(speed):
                 self.play.play(speed)
@@ -149,7 +149,7 @@ class RecordingRoom:
             case ShowTime(at_s):
                 self.play.go_to(at_s)
             case WhyRequest() | ParametersRequest() | SearchLog():
-                await self.play.wait_arrived()  # the answer is of the time that is asked about
+                await self.play.wait_arrived()  # the answer is of the requested time
                 await self._hub.obey(viewer.operator, intent)
             case _ if isinstance(intent, Looking):
                 await self._hub.obey(viewer.operator, intent)
@@ -172,7 +172,7 @@ class RecordingRoom:
         await first_to_end(self.play.run(), self._keep_telling())
 
     async def _take_along(self, hub: RecordedHub) -> None:
-        """Show all pages the time that this hub shows."""
+        """Switch all pages to the time of this hub."""
         former, self._hub = self._hub, hub
         for viewer in list(self.clients):
             await former.leave(viewer.operator, "another time of the recording is shown")

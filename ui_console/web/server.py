@@ -1,4 +1,4 @@
-"""The web console's server: pages, sockets, and the lives of the components that subscribe to the missions."""
+"""The web console's server: pages, sockets, and the components that subscribe to the missions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Console(NamedTuple):
 
 
 def path_of(mission: str, *, is_alone: bool) -> str:
-    """Return the path of a mission's page; each of several has one of its own.
+    """Return the path of a mission's page; with several missions each has its own path.
 
     Example:
         >>> path_of("night", is_alone=True), path_of("night", is_alone=False)
@@ -40,10 +40,10 @@ def path_of(mission: str, *, is_alone: bool) -> str:
 class WebServer:
     """Serves the pages and sockets of one or several missions.
 
-    A page, its socket and its token belong to one mission, so no message of it reaches another mission's robots.
+    A page, its socket and its token belong to one mission, so no message of the page reaches another mission's robots.
 
     Args:
-        consoles: Of these missions, which have different names.
+        consoles: Consoles of the missions; the missions have different names.
     """
 
     def __init__(self, *consoles: Console) -> None:
@@ -58,14 +58,14 @@ class WebServer:
     async def run(
         self, host: str, port: int, ready: Callable[[int], None], encryption: SSLContext | None = None
     ) -> None:
-        """Serve until each hub's component has ended; its robots are given back then; see ``open_pages``.
+        """Serve until each hub's component has ended, which releases its robots; see ``open_pages``.
 
         Args:
             ready: Called with the port once the server listens.
 
         Raises:
             CannotListen: The address is not free, or not one of this machine.
-            BaseException: The bug that ended a component; it ends all.
+            BaseException: The bug that ended a component; it ends the server.
         """
         async with open_pages(self._pages, host, port, encryption) as server:
             lives = [

@@ -1,4 +1,4 @@
-"""The commands that serve pages: the consoles of missions that are up, and the addresses with tokens."""
+"""The commands that serve pages: consoles of running missions, and addresses with tokens."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ui_console.web.server import Console, WebServer, path_of
 from ui_console.web.token_file import TokenFile, TokensNotKept, kept_or_new
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
-ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104  only compared with what the operator said
+ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104  only compared with the operator's option
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class ServerOptions:
         port: Port; 0: any that is free.
         certificate: PEM file; empty: the page is not encrypted.
         key: PEM file with its key; empty: it is in the certificate's file.
-        has_new_tokens: True: tokens of the server before at this port are forgotten.
+        has_new_tokens: True: tokens of the previous server at this port are dropped.
     """
 
     host: str
@@ -54,17 +54,17 @@ class ServerOptions:
         return encryption_with(self.certificate, self.key) if self.certificate else None
 
     def rights_with(self, tokens: TokenFile | None, rights: Mapping[str, TokenRights]) -> Mapping[str, TokenRights]:
-        """Return the valid tokens: the tokens of the server before, if they are kept and wanted, else the new ones."""
+        """Return the valid tokens: the previous server's tokens, if they are stored and wanted, else the new ones."""
         return rights if tokens is None or self.has_new_tokens else kept_or_new(rights, tokens.read())
 
     def opened(self, port: int, tokens: TokenFile | None, rights: Mapping[str, TokenRights], mission: str = "") -> None:
-        """Keep the tokens for the next server, and print the page's address for each.
+        """Store the tokens for the next server, and print the page's address for each token.
 
         Args:
-            port: The server listens there.
-            tokens: The file that keeps the tokens; None: none does.
+            port: Port of the server.
+            tokens: The token file; None: tokens are not stored.
             rights: Token → its rights.
-            mission: One of several that are served; empty: the page is the only one.
+            mission: Name of the mission if several are served; empty: there is only one page.
         """
         _keep(tokens, rights)
         scheme = "https" if self.certificate else "http"
@@ -77,7 +77,7 @@ class ServerOptions:
             self.warn_if_readable()
 
     def warn_if_readable(self) -> None:
-        """Say so if others on the network can read the pages' messages."""
+        """Print a warning if others on the network can read the pages' messages."""
         if self.host not in LOOPBACK and not self.certificate:
             say(
                 "the connection is not encrypted, so others on the network can read its messages: use it on networks "
@@ -169,7 +169,7 @@ async def _console(
 
 
 def _tokens_of_mission(where: Where, mission: str, secret: str, port: int) -> TokenFile | None:
-    """Return the file that keeps the tokens of a console's page; None: none does, see ``token_file``."""
+    """Return the token file of a console's page; None: tokens are not stored, see ``token_file``."""
     if not port:
         return None
     if where.connect is None:
@@ -178,7 +178,7 @@ def _tokens_of_mission(where: Where, mission: str, secret: str, port: int) -> To
 
 
 def _keep(tokens: TokenFile | None, rights: Mapping[str, TokenRights]) -> None:
-    """Keep the tokens for the next server, so that open pages come back; a failure is printed, and serving goes on."""
+    """Store the tokens for the next server, so that open pages reconnect; print a failure, and continue."""
     try:
         if tokens is not None:
             tokens.keep(rights)

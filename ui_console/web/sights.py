@@ -1,4 +1,4 @@
-"""Debug views that browsers look at: each is looked at once, however many look, and packed once."""
+"""Debug views for browsers: each view is subscribed to and encoded once, however many browsers watch it."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from ui_console.web.pictures import jpeg, packet
 
 log = logging.getLogger(__name__)
 
-LIST_EVERY_S = 1.0  # chosen: values are read, not followed; seconds of the machine
+LIST_EVERY_S = 1.0  # chosen: a person reads values more slowly; machine seconds
 
 
 class PageSight(NamedTuple):
-    """What a page looks at.
+    """The behavior and view that a page watches.
 
     Attributes:
-        behavior: Name; empty: nothing.
+        behavior: Name; empty: none.
         view: Name of the picture; empty: only the list.
     """
 
@@ -35,12 +35,12 @@ class PageSight(NamedTuple):
 
     @property
     def stream(self) -> str:
-        """Name of its pictures beside those of robots, whose names have no slash; empty: it has none."""
+        """Name of its picture stream; unlike a robot's stream it contains a slash. Empty: no pictures."""
         return f"{self.behavior}/{self.view}" if self.behavior and self.view else ""
 
 
 class Looker(Protocol):
-    """A browser that looks at debug views."""
+    """A browser that watches debug views."""
 
     sight: PageSight
 
@@ -52,13 +52,13 @@ class Looker(Protocol):
 
 
 class Sights:
-    """Looks at what its clients look at, and at nothing else.
+    """Watches exactly the views that its clients watch.
 
     Args:
-        bus: Of the server.
-        clock: The mission's.
-        clients: Returns the browsers that are there.
-        start_task: Runs a coroutine until the server ends; its bug is the server's.
+        bus: Bus of the server.
+        clock: The mission's clock.
+        clients: Returns the connected browsers.
+        start_task: Runs a coroutine until the server ends; a bug in it ends the server.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Sights:
         return frozenset(self._looks)
 
     def changed(self) -> None:
-        """Begin and end looks, because a client came, went, or looks at something else."""
+        """Begin and end subscriptions, because a client came, left, or watches another view."""
         sights = [client.sight for client in self._clients() if client.sight.behavior]
         wanted = {PageSight(one.behavior) for one in sights} | {one for one in sights if one.view}
         for sight in self._looks.keys() - wanted:

@@ -1,11 +1,11 @@
-"""Tokens that outlive the server, for this user alone.
+"""Tokens that outlive the server, readable only by this user.
 
-A server that is restarted at the same port accepts the tokens of open pages, which reconnect by themselves. The place
-of the file decides when the tokens end:
+If a server is restarted at the same port, it accepts the tokens of open pages, which reconnect by themselves. The place
+of the file decides when the tokens become invalid:
 
-* A mission on this machine: beside its run files, which end with it.
+* A mission on this machine: beside its run files, which are removed with the mission.
 * A mission elsewhere: named after its hub and the secret of its run, so that the next run finds none.
-* A designer: named after the mission file; they end with the login session.
+* A designer: named after the mission file; removed with the login session.
 * Port 0: no file. A page belongs to the port it came from, and no open page finds a port that the system chose.
 """
 
@@ -26,11 +26,11 @@ from backbone.errors import Refusal
 from ui_console.web.login import TokenRights
 
 MODE = 0o600
-DIGITS = 16  # chosen: 64 bits; no two missions of one user have the same
+DIGITS = 16  # chosen: 64 bits, unique among one user's missions
 
 
 class TokensNotKept(Refusal):
-    """The tokens cannot be written to the file that the next server reads."""
+    """The tokens cannot be written to the file for the next server."""
 
     code = "web.tokens"
     remedy = "Free the disk; without that file open pages have to be given the next server's address."
@@ -40,8 +40,8 @@ class TokenFile:
     """The tokens of the server at one port.
 
     Args:
-        folder: Of the mission's run files, or the user's run files.
-        port: Of the server.
+        folder: Folder of the mission's or the user's run files.
+        port: Port of the server.
         of: The mission or file served, for a folder with several.
     """
 
@@ -50,21 +50,21 @@ class TokenFile:
 
     @classmethod
     def of_mission_here(cls, mission: str, port: int) -> TokenFile:
-        """Return the tokens of a mission that is up on this machine."""
+        """Return the token file of a mission that runs on this machine."""
         return cls(run_files.run_directory(mission), port)
 
     @classmethod
     def of_mission_elsewhere(cls, mission: str, endpoint: str, secret: str, port: int) -> TokenFile:
-        """Return the tokens of one run of a mission whose hub is reached over the network."""
+        """Return the token file for one run of a mission whose hub is reached over the network."""
         return cls(run_files.kept_directory(), port, _digest(mission, endpoint, secret))
 
     @classmethod
     def of_design(cls, source: str, port: int) -> TokenFile:
-        """Return the tokens of the designer of a mission file."""
+        """Return the token file of the designer of a mission file."""
         return cls(run_files.kept_directory(), port, _digest(str(Path(source).resolve())))
 
     def read(self) -> dict[str, TokenRights]:
-        """Return the tokens of the server before; none if there was none, or another user could have read them."""
+        """Return the previous server's tokens; empty if there are none, or if another user could have read them."""
         try:
             descriptor = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
         except OSError:
@@ -79,13 +79,13 @@ class TokenFile:
                 return {}
 
     def keep(self, rights: Mapping[str, TokenRights]) -> None:
-        """Keep these tokens, and no others, for the next server at this port.
+        """Store exactly these tokens for the next server at this port.
 
         Raises:
             TokensNotKept: The system refused.
         """
         try:
-            self.path.touch(mode=MODE)  # what replaces it has its mode
+            self.path.touch(mode=MODE)  # the replacing file gets the same mode
             self.path.chmod(MODE)
             replace_file(self.path, msgspec.json.encode(dict(rights)), is_lasting=False)
         except OSError as error:
@@ -98,9 +98,9 @@ def _digest(*of: str) -> str:
 
 
 def kept_or_new(new: Mapping[str, TokenRights], before: Mapping[str, TokenRights]) -> dict[str, TokenRights]:
-    """Return the valid tokens: each operator's token of before, if there was one, else the new one.
+    """Return the valid tokens: each operator's previous token, if there was one, else the new one.
 
-    The new server defines the rights of a token. An operator who is not among the new ones has no token any more.
+    The new server defines the rights of a token. An operator who is not among the new ones loses the token.
 
     Example:
         >>> kept_or_new({"b": TokenRights("anna", 50)}, {"a": TokenRights("anna", 100), "c": TokenRights("ben", 1)})

@@ -100,7 +100,7 @@ def agreement(
 
 
 def _during(samples: Sequence[Transmitting], begin_s: float, end_s: float) -> Iterable[Transmitting]:
-    """Yield the valid sample at the begin and all samples before the end."""
+    """Yield the sample valid at the begin, and all later samples before the end."""
     for number, sample in enumerate(samples):
         over = samples[number + 1].at_s <= begin_s if number + 1 < len(samples) else False
         if not over and sample.at_s < end_s:

@@ -25,7 +25,7 @@ app = typer.Typer(
 MOST_TRIALS = 1_000_000  # chosen: days of work
 LARGEST_SEED = 2**32 - 1  # the limit of numpy
 MOST_JOBS = 1024  # chosen: more cores than any tested machine
-PIPE_WIDTH = 200  # chosen: no table is wider, so files and pipes get whole tables
+PIPE_WIDTH = 200  # chosen: wider than every table, so that files and pipes get whole tables
 
 
 class Policy(StrEnum):
@@ -68,8 +68,8 @@ def surveillance(
     active: Annotated[int | None, typer.Option("--active", help="Scouts that watch.")] = None,
     extra: Annotated[list[int] | None, typer.Option("--extra", help="Scouts that consoles hold; repeatable.")] = None,
     channels: Annotated[int | None, typer.Option("--channels", help="Video frequencies.")] = None,
-    policy: Annotated[list[Policy] | None, typer.Option("--policy", help="How to ask; repeatable.")] = None,
-    target: Annotated[TargetKind | None, typer.Option("--target", help="What passes.")] = None,
+    policy: Annotated[list[Policy] | None, typer.Option("--policy", help="Policy of the requests; repeatable.")] = None,
+    target: Annotated[TargetKind | None, typer.Option("--target", help="Kind of target.")] = None,
     speed: Annotated[list[float] | None, typer.Option("--speed", help="Of the target, m/s; repeatable.")] = None,
     slice_s: Annotated[float | None, typer.Option("--slice", help="Minimum run time of all, seconds.")] = None,
     order: Annotated[TurnOrder | None, typer.Option("--order", help="Whose turns come first.")] = None,

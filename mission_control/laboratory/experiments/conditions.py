@@ -13,7 +13,7 @@ from mission_control.laboratory.experiments.geometry import EXTRAS, PASSAGES, SL
 Policy = Literal["paper", "adaptive"]
 Order = Literal["active-first", "extra-first", "interleaved"]
 
-CONSOLE_SLICE_S = 2.0  # chosen: half the time a Pioneer is in view, so that no slice hides it
+CONSOLE_SLICE_S = 2.0  # chosen: half the time for which a Pioneer is in view, so that no slice hides it
 MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
 
 
@@ -31,13 +31,13 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         active: Scouts that watch.
         extra: Scouts that consoles hold, of the mission's own priority.
         channels: Video frequencies, each with a framegrabber.
-        policy: ``paper``: all ask for ``slice_s``, in turns; ``adaptive``: watchers compute and draw their run times
-            and ask for an extension at a glimpse, equals get equal time, and consoles ask for at most
-            ``CONSOLE_SLICE_S`` and want no time while they do not drive.
+        policy: ``paper``: all ARCs request ``slice_s``, in turns. ``adaptive``: watchers compute and draw their run
+            times and request an extension at a glimpse; ARCs of equal priority get equal time; consoles request at most
+            ``CONSOLE_SLICE_S``, and no time while they do not drive.
         target: ``pioneer`` or ``person``.
         speed_m_s: Speed of the target; 0: the papers' speed.
         slice_s: Run time of watchers and consoles in the mission file, seconds.
-        order: Order of the claims of watchers and consoles, and so of their turns.
+        order: Order of the claims of watchers and consoles, and thus of their turns.
         driven: Share of the time in which each console drives.
         noise: Noise of the pictures: 0 none, 1 as in the papers.
         frames_wanted: Number of pictures of one slice with certain motion before a watcher publishes it.
@@ -117,7 +117,7 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 def checked(**wanted: object) -> Condition:
-    """Return the condition of these values.
+    """Return the condition with these values.
 
     Raises:
         ImpossibleCondition: A value is impossible; the detail names it with the reason.

@@ -17,7 +17,7 @@ def wilson(detected: int, trials: int) -> tuple[float, float]:
         trials: Above 0.
 
     Raises:
-        ValueError: The numbers are no count of successes.
+        ValueError: The numbers are not a count of successes.
 
     Example:
         >>> [round(bound, 2) for bound in wilson(16, 20)]
@@ -34,8 +34,8 @@ def wilson(detected: int, trials: int) -> tuple[float, float]:
 def standard_errors_apart(detected: int, trials: int, predicted: float) -> float:
     """Return the distance of a counted rate from a predicted one, in standard errors.
 
-    The standard error is that of the predicted rate, but at least that of half a success, so that one miss of a
-    prediction of 0 or 1 is no disagreement.
+    The standard error is that of the predicted rate, but at least that of half a success, so that a single deviation
+    from a prediction of 0 or 1 does not count as disagreement.
 
     Example:
         >>> round(standard_errors_apart(60, 100, 0.5), 6)

@@ -1,7 +1,7 @@
 """Operator: a console of an experiment, which drives one Scout for a while, rests, and drives again.
 
-It claims its ARC through ``arc_client``, as every console does, and sends commands during grants in its phases of
-driving. It needs no pictures, so it holds a robot and a video frequency, but no framegrabber.
+The operator claims an ARC through ``arc_client``, as every console does, and sends commands in its phases of driving
+during grants. It needs no pictures, so it holds a robot and a video frequency, but no framegrabber.
 
 Source: IROS 2001, "Experiments": extra Scouts are teleoperated through consoles that hold no framegrabber.
 """
@@ -46,9 +46,9 @@ class OperatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True
         minimum_runtime_s: Shortest useful time, seconds.
         period_s: Interval between radio packets, seconds.
         packet_time_s: Air time of one packet, seconds.
-        driven: Share of the time in which it drives, 0 to 1.
+        driven: Share of the time in which the operator drives, 0 to 1.
         drive_s: Mean duration of one phase of driving, seconds.
-        yields: True: it wants no time while it does not drive.
+        yields: True: it requests no time while it does not drive.
         seed: Seed of the phases.
     """
 
@@ -64,7 +64,7 @@ class OperatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 
 
 class DrivePhases:
-    """Alternating phases of driving and rest, from a seed; their begin lies in the past, so that all times are alike.
+    """Alternating phases of driving and rest, from a seed; they began in the past, so that all times are equivalent.
 
     Pure. The phases have exponentially distributed durations, whose means give the wanted share.
 
@@ -92,7 +92,7 @@ class DrivePhases:
 
 
 class SimulatedOperator(Component[OperatorParameters]):
-    """One console that drives in some phases."""
+    """A simulated console that drives in some phases."""
 
     parameters_type = OperatorParameters
     accepts: ClassVar[Accepts | None] = ArcNotice
@@ -167,7 +167,7 @@ class SimulatedOperator(Component[OperatorParameters]):
     async def _say_whether_wanted(self) -> None:
         try:
             await self._arc.idle(self._wants_nothing)
-        except (Refusal, LinkError) as error:  # the next change of phase repeats it
+        except (Refusal, LinkError) as error:  # the next change of phase repeats the wish
             self.story.note(self._arc.arc, f"did not answer whether time is wanted: {error}")
 
     async def _drive(self) -> None:

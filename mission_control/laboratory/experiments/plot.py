@@ -15,9 +15,9 @@ from mission_control.laboratory.experiments.surveillance import ConditionRow, Su
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
 """Okabe and Ito, "Color Universal Design", 2008: distinct for all kinds of color vision. Without yellow: too pale."""
 MARKERS = ("o", "^", "D", "v", "P", "X", "*")
-"""Makes series distinct in grey, too."""
+"""Distinguishes series even without color."""
 GREY = "#555555"
-SIDE_BY_SIDE = 0.035  # chosen: intervals of one load stand beside each other, and still belong to it
+SIDE_BY_SIDE = 0.035  # chosen: intervals of one load are beside each other, but clearly belong together
 LEAST_GAP = 4.5  # chosen: a line of text in percent of the picture's height
 
 
@@ -29,7 +29,7 @@ class NoPlotting(Refusal):
 
 
 class Point(NamedTuple):
-    """One counted rate, in percent.
+    """A counted rate, in percent.
 
     Attributes:
         extra: Number of extra robots.
@@ -47,7 +47,7 @@ class Point(NamedTuple):
 
 
 def require_plotting() -> None:
-    """Return if a plotting library is installed.
+    """Check that a plotting library is installed.
 
     Raises:
         NoPlotting: No plotting library is installed.
@@ -61,7 +61,7 @@ def require_plotting() -> None:
 def plot(outcome: SurveillanceOutcome, file: Path, title: str) -> None:
     """Write a plot of the rates over the number of extra robots, a line for each policy and way of driving.
 
-    Each line has its name beside its end; conditions, trials and seed stand above.
+    Each line has its name beside its end; conditions, trials and seed are above the plot.
 
     Raises:
         NoPlotting: No plotting library is installed.
@@ -112,7 +112,7 @@ def apart(heights: Sequence[float], gap: float = LEAST_GAP) -> list[float]:
         [48.0, 52.0, 10.0]
     """
     order = sorted(range(len(heights)), key=lambda place: heights[place])
-    blocks: list[tuple[float, list[int]]] = []  # middle and places of neighbors that touch
+    blocks: list[tuple[float, list[int]]] = []  # middle and indices of touching neighbors
     for place in order:
         middle, members = heights[place], [place]
         while blocks and middle - blocks[-1][0] < gap * (len(members) + len(blocks[-1][1])) / 2:
@@ -151,7 +151,7 @@ def _name(axes: Any, shown: Mapping[str, Sequence[Point]]) -> None:
     """Write the name of each line beside its last point, on the right of all."""
     right = max((points[-1].extra for points in shown.values()), default=0.0)
     left = min((points[0].extra for points in shown.values()), default=0.0)
-    axes.set_xlim(left - 0.2, right + 0.2)  # also with one point the names stand beside the axes, not far from them
+    axes.set_xlim(left - 0.2, right + 0.2)  # with a single point, too, the names are close to the axes
     heights = apart([points[-1].rate for points in shown.values()])
     for number, ((name, points), height) in enumerate(zip(shown.items(), heights, strict=True)):
         color = GREY if _is_published(name) else COLORS[number % len(COLORS)]

@@ -1,12 +1,12 @@
-"""Prediction from geometry alone: schedule phases, views, settling and the frames of a detector, drawn many times.
+"""Prediction from geometry alone: simulates schedule phases, views, settling and a detector's frames many times.
 
-Pure; no component runs, no picture is drawn. It uses only documented properties of the system: slices in turn or of
-equal time, their settling, the blind frames of a detector after each swap, the number of certain frames, the extension
-of a slice at a glimpse, and bursts of bad frames.
+Pure; no component runs, no picture is drawn. It uses only documented properties of the system: slices in turn or equal
+time, settling, the blind frames of a detector after each context switch, the number of certain frames, the extension of
+a slice at a glimpse, and bursts of bad frames.
 
 Source: SCHEDULING.md, section 6: a trial's outcome depends on the phase between target and schedule, the order of
-slots, the time each view lasts, the time a picture needs to settle and the frames the detector needs. Its rule 13:
-equal time.
+slots, the duration of each view, the settling time of a picture and the number of frames that the detector needs. Its
+rule 13: equal time.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ from mission_control.vision.motion_detection import FAST_FRAMES, VOTERS, VOTES
 
 SAMPLES = 2000  # chosen: a standard error of 1 %, a third of that of 200 trials
 BAD_SHARE, BAD_BURST_S = 0.25, 0.15  # SCHEDULING.md, section 6, at noise 1
-LEAST_M = 0.05  # measured: a region becomes, or ceases to be, large enough with 0.01 to 0.08 m of a target in view
+LEAST_M = 0.05  # measured: a region reaches the least size with 0.01 to 0.08 m of a target in view
 DRIVE_S = 5.0  # from the consoles' parameters
-TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: smaller differences of time do not count
+TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: smaller differences of time are ignored
 
 
 @lru_cache(maxsize=256)
 def predicted(condition: Condition, samples: int = SAMPLES) -> float:
-    """Return the share of passages that are detected, for this condition; the same at each call."""
+    """Return the share of detected passages under this condition; the same at each call."""
     dice = Random(f"prediction {samples}")
     return sum(_is_detected(condition, dice) for _ in range(samples)) / samples
 
@@ -67,7 +67,7 @@ def departs_s(condition: Condition, phase: float) -> float:
     when drawn run times have come apart.
 
     Args:
-        phase: Phase, 0 to 1, of a round: one slice of each, or as many of each as make their times equal.
+        phase: Phase, 0 to 1, of a round; in a round each claimant has one slice, or as many as make the times equal.
     """
     asked_s = [fmean((times.shortest_s, times.longest_s)) for times in _asked(condition)]
     longest_s = max(asked_s)
@@ -130,7 +130,7 @@ class _Slice:
     votes: deque[bool] = field(default_factory=lambda: deque(maxlen=VOTERS))
 
     def look(self, is_seen: bool, is_bad: bool) -> None:
-        """Take one frame."""
+        """Process one frame."""
         self.frames += 1
         if self.frames > FAST_FRAMES and not is_bad:
             self.votes.append(is_seen)
@@ -144,7 +144,7 @@ class _Slice:
 
 
 def _is_detected(condition: Condition, dice: Random) -> bool:
-    """Return whether a passage at a random phase is detected."""
+    """Simulate a passage at a random phase; return whether it is detected."""
     departs = departs_s(condition, dice.random())
     bursts = Bursts(condition.noise, dice)
     channels: list[list[_Claimant]] = [[] for _ in range(condition.channels)]
@@ -163,7 +163,7 @@ def _is_detected(condition: Condition, dice: Random) -> bool:
 
 
 class _Channel:
-    """One video frequency and its claimants."""
+    """A video frequency and its claimants."""
 
     def __init__(self, condition: Condition, claimants: list[_Claimant], bursts: Bursts, dice: Random) -> None:
         self._condition, self._claimants, self._bursts, self._dice = condition, claimants, bursts, dice
@@ -202,7 +202,7 @@ class _Channel:
         return False
 
     def _seniority(self, one: _Claimant, rivals: Sequence[_Claimant], now_s: float) -> tuple[bool, float, float, int]:
-        """Return the sort key among equals, smallest first. A claimant after its slice comes after its equals."""
+        """Return the sort key among equals, smallest first. After its slice a claimant goes behind its equals."""
         is_running = one is self._running
         stamp = (now_s, 0) if is_running else one.stamp
         if self._condition.policy == "paper":
@@ -226,7 +226,7 @@ class _Channel:
                     self._running = None
 
     def _watch(self, one: _Claimant, now_s: float, end_s: float) -> tuple[float, bool]:
-        """Return when the slice ends, and whether it is certain of the target."""
+        """Return the end of the slice, and whether the watcher is certain of the target."""
         frame_s = now_s + self._dice.random() / FRAME_RATE_HZ
         wanted = self._condition.frames_wanted
         while frame_s < end_s:

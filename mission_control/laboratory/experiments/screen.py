@@ -17,7 +17,7 @@ from mission_control.laboratory.experiments.surveillance import ConditionRow, Su
 from mission_control.laboratory.harness import Progress as OnProgress
 
 AGREES_WITHIN = 3.0
-"""Standard errors between rate and prediction that are no disagreement."""
+"""Standard errors between rate and prediction that do not count as disagreement."""
 EXPLAINED = (
     "95 %: Wilson's interval. off by: standard errors between rate and prediction; beyond "
     f"{AGREES_WITHIN:g} (marked !) one of both is wrong, or the trials are too few: take more, or another seed."

@@ -1,4 +1,4 @@
-"""The servoing experiment: from any place before a landmark to the robot's goal, in whole missions on a virtual clock.
+"""The servoing experiment: from a place before a landmark to the goal, in whole missions on a virtual clock.
 
 Each trial begins up to 2.5 m from the board and up to 45 degrees off its zero-angle line, with any heading, and noise
 on the air. It succeeds if the behavior succeeds and the robot really stands within 5 cm and 10 degrees of its goal.
@@ -35,7 +35,7 @@ OFF_AXIS_RAD = math.radians(45.0)
 WITHIN_M, WITHIN_RAD = 0.05, math.radians(10.0)
 LIMIT_S = 180.0  # chosen: four times what the usual approach takes
 LOOKED_AT_EVERY_S = 0.5  # chosen: the resolution of a trial's end
-COMES_TO_REST_S = 1.0  # chosen: a body that was stopped sways for less
+COMES_TO_REST_S = 1.0  # chosen: a stopped body sways for less
 ROBOT, SERVO, WORLD = "scout1", "servo", "world"
 
 _MISSION = f"""<?xml version="1.0" encoding="UTF-8"?>
@@ -92,7 +92,7 @@ class TrialStart:
 
 @dataclass(frozen=True, slots=True)
 class ServoOrder:
-    """One trial: seed of the experiment, number and noise."""
+    """The input of a trial: seed of the experiment, number and noise."""
 
     seed: int
     number: int
@@ -172,7 +172,7 @@ class ServoOutcome:
 
 
 def draw(seed: int, number: int) -> TrialStart:
-    """Return the start of this trial: the same for the same arguments, with any noise."""
+    """Return the start of this trial: the same for the same arguments, whatever the noise."""
     dice = Random(f"{seed} servoing {number}")
     range_m, off_axis_rad = dice.uniform(NEAREST_M, FARTHEST_M), dice.uniform(-OFF_AXIS_RAD, OFF_AXIS_RAD)
     x_m, y_m = BOARD_M[0] - range_m * math.cos(off_axis_rad), BOARD_M[1] + range_m * math.sin(off_axis_rad)
@@ -206,7 +206,7 @@ async def _play(order: ServoOrder) -> ServoTrial:
     start = draw(order.seed, order.number)
     async with mission_in_one_process(_mission_from(start, order.noise)) as running:
         behavior = running.component(SERVO)
-        assert isinstance(behavior, Behavior)  # noqa: S101  its mission file says so
+        assert isinstance(behavior, Behavior)  # noqa: S101  the mission file names this class
         while not behavior.status.is_final and running.clock.now_s() < LIMIT_S:
             await running.clock.sleep_s(LOOKED_AT_EVERY_S)
         took_s, counts = running.clock.now_s(), behavior.statistics()

@@ -24,7 +24,7 @@ TRIALS = 200
 
 
 class TrialOrder(msgspec.Struct, frozen=True):
-    """One trial to be run.
+    """The input of a trial.
 
     Attributes:
         trace: File for its schedule trace; empty: none.
@@ -47,7 +47,7 @@ class ConditionRow(msgspec.Struct, frozen=True):
         jammed_frames: Frames with two transmitters on one frequency, in all trials.
         stale_packets: Packets of stale epochs, in all trials.
         simulated_s: Mission time of all trials.
-        digest: Fingerprint of all decisions and events, in all trials.
+        digest: Hash of all decisions and events of all trials.
     """
 
     condition: Condition
@@ -74,7 +74,7 @@ class ConditionRow(msgspec.Struct, frozen=True):
 
     @property
     def errors_from_predicted(self) -> float:
-        """Standard errors between rate and prediction."""
+        """Distance between rate and prediction, in standard errors."""
         return standard_errors_apart(self.detected, self.trials, self.predicted)
 
     @property
@@ -220,5 +220,5 @@ def _row(condition: Condition, trials: Sequence[Trial]) -> ConditionRow:
 
 
 def digest_of(digests: Sequence[str]) -> str:
-    """Return one fingerprint of many."""
+    """Return one hash of many."""
     return hashlib.sha256("".join(digests).encode()).hexdigest()

@@ -48,13 +48,13 @@ class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         detected: True if a watcher published motion while the target was in its view.
         detected_s: Time of the first such picture after the target's departure, seconds; -1: no detection.
         seen_by: Scout that detected it; empty: none.
-        false_alarms: Number of times that a watcher published motion while the target was not in its view.
+        false_alarms: Number of motion events published while the target was not in the watcher's view.
         switches: Grants and ends of holds compared with the transmitters.
         disagreements: Disagreements, one line each.
         jammed_frames: Frames with two transmitters on one frequency.
         stale_packets: Packets of stale epochs on the air.
         simulated_s: Its mission time.
-        digest: Fingerprint of all decisions of the RC manager and all events.
+        digest: Hash of all decisions of the RC manager and all events.
     """
 
     number: int
@@ -88,9 +88,9 @@ class Draw:
 def draw(condition: Condition, seed: int, number: int) -> Draw:
     """Return the random values of this trial: the same for the same arguments.
 
-    The phase between the target's departure and the schedule is uniform over a round. If slices are equal and share one
-    frequency, the choice of the first claimant gives the whole turns of the phase, and a wait gives the rest. Otherwise
-    a wait gives all of it, after the first turn of every claimant.
+    The phase between the target's departure and the schedule is uniform over a round. If all slices are equal and share
+    one frequency, the choice of the first claimant makes the whole turns of the phase, and a wait makes the rest.
+    Otherwise the wait makes the whole phase, after the first turn of every claimant.
     """
     dice = Random(f"{seed} trial {number}")
     phase, world_seed = dice.random(), dice.randrange(2**31)
@@ -150,7 +150,7 @@ class _Trial:
 
     # ------------------------------------------------------------------ course of the trial
     async def _claim(self, running: RunningMission) -> None:
-        """Let watchers and consoles claim in order, each after the request of the one before."""
+        """Let watchers and consoles claim in order, each after the previous one's request."""
         condition = self._condition
         watchers = {order.name: order for order in behavior_orders(self._mission)}
         turns = condition.in_turn
@@ -186,7 +186,7 @@ class _Trial:
         await first_of(self._frame_number(round(passed * FRAMES_PER_S)), self._detected.wait())
 
     async def _frame_number(self, number: int) -> None:
-        """Return when the world has published this frame."""
+        """Wait until the world has published this frame."""
         if self._frame < number:
             event = asyncio.Event()
             self._waits_for = number, event

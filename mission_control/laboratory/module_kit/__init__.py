@@ -1,1 +1,1 @@
-"""Module kit: pytest fixtures for who writes modules and missions; see ``plugin``."""
+"""Module kit: pytest fixtures for authors of modules and missions; see ``plugin``."""

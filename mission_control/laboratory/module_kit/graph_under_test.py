@@ -1,4 +1,4 @@
-"""Modules connected as in one unit of a mission, run on virtual time, each held to the rules of modules."""
+"""Modules connected as in one unit of a mission, on virtual time; the rules of modules are checked for each."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from mission_control.modules.run import UNIT, connected
 
 
 class GraphUnderTest:
-    """Connected modules, and all that they made.
+    """Connected modules, and all values that they produced.
 
     Args:
-        modules: Each of another class.
+        modules: Modules of different classes.
         given: Keys that the test feeds.
-        frequency_hz: Rounds a second; 0: only when something is fed.
+        frequency_hz: Rounds a second; 0: rounds only when a value is fed.
 
     Attributes:
         now_s: Virtual time, from 0.
-        made: Key → all values that a module made, the oldest first.
+        made: Key → all values that a module produced, the oldest first.
 
     Raises:
-        GraphRefused: The modules cannot be connected; it says everything at once.
+        GraphRefused: The modules cannot be connected; the error lists all faults.
     """
 
     def __init__(self, *modules: Module, given: Iterable[str] = (), frequency_hz: float = 0.0) -> None:
@@ -40,11 +40,11 @@ class GraphUnderTest:
             self._units.listen(key, values.append)
 
     def feed(self, key: str, value: object) -> None:
-        """Give a value from outside; afterwards every module that is due because of it has run."""
+        """Feed a value from outside, and run every module that is due because of it."""
         self._units.feed(key, value, self.now_s)
 
     def advance(self, for_s: float) -> None:
-        """Let virtual time pass; afterwards each round that began before its end has run."""
+        """Let virtual time pass, and run each round that begins in it."""
         until_s = self.now_s + for_s
         while self._units.next_s < until_s:
             self.now_s = self._units.next_s
@@ -52,7 +52,7 @@ class GraphUnderTest:
         self.now_s = until_s
 
     def statistics(self) -> UnitStatistics:
-        """Return rounds, and how often and how long each module ran."""
+        """Return the number of rounds, and the number and duration of each module's runs."""
         return self._units.statistics()[UNIT]
 
 

@@ -1,12 +1,12 @@
-"""A module fed by hand, and the rules that every module must keep.
+"""A module that a test feeds by hand, and the rules that every module must obey.
 
 Rules:
 
-* inputs and outputs are of exactly the declared classes, and a required output is there;
-* a message among them is the same after it has crossed the bus;
-* an update changes neither its inputs nor what the update before handed over, because others have the same objects.
+* inputs and outputs are of exactly the declared classes, and no required output is missing;
+* a message among them is unchanged after encoding and decoding;
+* an update changes neither its inputs nor outputs of an earlier update, because other modules have the same objects.
 
-Values are compared by their pickles; what cannot be pickled is not compared.
+Values are compared by their pickles; a value that cannot be pickled is not compared.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class ModuleRuleBroken(Refusal):
 
 
 class ModuleUnderTest:
-    """A module fed by hand; each update checks the rules.
+    """A module that a test feeds by hand; each update checks the rules.
 
     Attributes:
         module: The module itself.
-        shown: Debug view → what the module showed last; pictures are made each time.
+        shown: Debug view → newest picture or value; pictures are always made.
     """
 
     def __init__(self, module: Module) -> None:
@@ -52,10 +52,10 @@ class ModuleUnderTest:
         self._history: list[tuple[dict[str, object], Pickles]] = []
 
     def update(self, **inputs: object) -> Any:
-        """Return the module's outputs for these inputs, which are named as its ``Inputs`` names them.
+        """Return the module's outputs for these inputs; the names are those of the fields of ``Inputs``.
 
         Raises:
-            ModuleRuleBroken: The inputs are not the declared ones, or the module broke a rule.
+            ModuleRuleBroken: The inputs differ from the declared ones, or the module broke a rule.
         """
         _check_names(self.module, inputs)
         outputs = self.module.update(self.module.Inputs(**inputs))
@@ -63,10 +63,10 @@ class ModuleUnderTest:
         return outputs
 
     def check_reset(self) -> None:
-        """Reset the module, feed all inputs so far again, and compare: it says the same.
+        """Reset the module, feed all inputs so far again, and check that the outputs are the same.
 
         Raises:
-            ModuleRuleBroken: It says something else, so its ``reset`` forgets to set an attribute.
+            ModuleRuleBroken: The outputs differ, so ``reset`` does not set all attributes.
         """
         self.module.reset()
         for number, (inputs, before) in enumerate(self._history, 1):
@@ -82,7 +82,7 @@ MakeModule = Callable[[Module], ModuleUnderTest]
 
 
 class ShownViews:
-    """The debug views of a module at which somebody always looks; see ``mission_control.modules.module.Debug``."""
+    """Debug views that are always watched; see ``mission_control.modules.module.Debug``."""
 
     def __init__(self, into: dict[str, object]) -> None:
         self._into = into
@@ -177,10 +177,10 @@ def _pickles(struct: object) -> Pickles:
 def _pickle(value: object) -> bytes | None:
     written = io.BytesIO()
     pickler = pickle.Pickler(written)
-    pickler.fast = True  # equal values are equal bytes, whichever of their parts are the same object
+    pickler.fast = True  # so that equal values give equal bytes, whichever of their parts are the same object
     pickler.dispatch_table = {memoryview: lambda view: (memoryview, (view.tobytes(),))}
     try:
         pickler.dump(value)
-    except (pickle.PicklingError, TypeError, AttributeError, ValueError):  # all that it raises on what it cannot write
+    except (pickle.PicklingError, TypeError, AttributeError, ValueError):  # raised for values that it cannot pickle
         return None
     return written.getvalue()

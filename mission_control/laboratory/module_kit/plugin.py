@@ -1,6 +1,6 @@
-"""The pytest plugin ``scout_backbone``: fixtures that try modules, graphs and missions.
+"""The pytest plugin ``scout_backbone``: fixtures to test modules, graphs and missions.
 
-pytest loads this file wherever scout-backbone is installed, so nothing else is imported until a test uses a fixture.
+pytest loads this file wherever scout-backbone is installed, so it imports other files only when a test uses a fixture.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def module_under_test() -> MakeModule:
-    """Give ``module_under_test(module)``, the module, fed by hand and held to the rules of modules.
+    """Provide ``module_under_test(module)``: the module, fed by hand, with checks of the rules of modules.
 
     Each update checks that inputs and outputs are of the declared classes, that messages can cross the bus, and that
-    neither an input nor an output of the update before was changed. A breach raises ``ModuleRuleBroken``.
+    neither an input nor an output of the update before was changed. A violation raises ``ModuleRuleBroken``.
 
     Example:
         >>> def test_smoothing_takes_its_share(module_under_test):
@@ -36,9 +36,9 @@ def module_under_test() -> MakeModule:
 
 @pytest.fixture
 def module_graph() -> MakeGraph:
-    """Give ``module_graph(*modules, given=…, frequency_hz=…)``, the modules, connected and run on virtual time.
+    """Provide ``module_graph(*modules, given=…, frequency_hz=…)``: the modules, connected and run on virtual time.
 
-    Connections are checked as in a mission, and each module is held to the rules, as by ``module_under_test``.
+    Connections are checked as in a mission, and each module is checked as by ``module_under_test``.
 
     Example:
         >>> def test_waves_are_smoothed(module_graph):
@@ -53,11 +53,11 @@ def module_graph() -> MakeGraph:
 
 @pytest.fixture
 def virtual_mission() -> Play:
-    """Give ``virtual_mission(mission, scene)``, which plays a whole mission in this process, on virtual time.
+    """Provide ``virtual_mission(mission, scene)``: it runs a whole mission in this process, on virtual time.
 
     The mission is a file's path, or the file's text. Nameserver, databases, RC manager and every component of the file
-    are the real ones, on the local bus; the placer and its creators are played. The scene is a coroutine function that
-    gets the running mission; its result is returned. A component that falls fails the test.
+    are the real ones, on the local bus; placer and creators are simulated. The scene is a coroutine function that gets
+    the running mission; its result is returned. If a component crashes, the test fails.
 
     Example:
         >>> def test_a_minute_of_waves(virtual_mission):
@@ -74,12 +74,12 @@ def virtual_mission() -> Play:
 
 @pytest.fixture
 def real_mission() -> BringUp:
-    """Give ``real_mission(mission, *options)``, a context manager: a mission of real processes over Zenoh.
+    """Provide ``real_mission(mission, *options)``, a context manager: a mission of real processes over Zenoh.
 
-    The mission is a file's path, or the file's text; the options are those of ``scout-backbone up``. It has a name and
-    a runtime folder of its own, in which its hub listens, so it meets no other mission and no port that is taken. At
-    the end it is taken down, and a process that is left fails the test. If the test fails, the ends of all logs are
-    printed with the failure.
+    The mission is a file's path, or the file's text; the options are those of ``scout-backbone up``. It has its own
+    name and its own runtime folder, in which its hub listens, so it conflicts with no other mission and needs no free
+    port. At the end the mission is taken down; if a process is left, the test fails. If the test fails, the ends of all
+    logs are printed.
 
     Example:
         >>> def test_both_modules_run(real_mission):

@@ -1,6 +1,6 @@
-"""A real mission for tests: started by the real command line, in a runtime folder of its own.
+"""A real mission for tests, started by the real command line in its own runtime folder.
 
-Its hub listens on a socket in that folder, so no other mission and no port that is taken is in its way.
+Its hub listens on a socket in that folder, so it conflicts with no other mission and needs no free port.
 """
 
 from __future__ import annotations
@@ -29,28 +29,28 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from mission_control.laboratory.module_kit.virtual_mission import is_text
 
-READY_WITHIN_S = 60.0  # chosen: a machine that is busy with other tests
+READY_WITHIN_S = 60.0  # chosen: enough on a machine that is busy with other tests
 MARK = "SCOUT_TEST_MARK"
-"""Environment variable by which all processes of a mission are found."""
+"""Environment variable that marks all processes of a mission."""
 BIN = Path(sys.executable).parent
 DOWN_WITHIN_S = 30.0  # chosen: same
-GONE_WITHIN_S = 3.0  # chosen: a process that was killed is gone at once, on a busy machine a moment later
+GONE_WITHIN_S = 3.0  # chosen: a killed process is gone at once, on a busy machine a moment later
 JsonObject = dict[str, Any]
 
-LAST_LINES, LAST_OF_A_LOG = 60, 15  # chosen: as much as a person reads of a failure
+LAST_LINES, LAST_OF_A_LOG = 60, 15  # chosen: a person reads no more of a failure
 
 
 @dataclass
 class RealMission:
-    """A mission that is up.
+    """A running mission.
 
     Attributes:
         name: Its name.
-        environment: For further commands of the same runtime folder.
+        environment: Environment for further commands in the same runtime folder.
         launcher: The ``up`` process.
-        lines: What ``up`` said so far.
-        is_over: No more lines can come.
-        news: Set with each line, and when it is over.
+        lines: Output of ``up`` so far.
+        is_over: True if no more lines can arrive.
+        news: Set at each line, and at the end of the output.
     """
 
     name: str
@@ -63,7 +63,7 @@ class RealMission:
     def command(
         self, *words: str, within_s: float = 60.0, stdin: str | None = None
     ) -> subprocess.CompletedProcess[str]:
-        """Run ``scout-backbone`` or ``scout-console`` with these words beside the mission."""
+        """Run ``scout-backbone`` or ``scout-console`` with these arguments against the mission."""
         return subprocess.run(  # noqa: S603  our own command lines
             [str(BIN / words[0]), *words[1:]],
             env=self.environment,
@@ -82,25 +82,25 @@ class RealMission:
         return found
 
     def wait_for_components(self, *names: str, within_s: float = 10.0) -> None:
-        """Return when components of these names run; children of behaviors come a moment after all is ready."""
+        """Wait until components of these names run; children of behaviors start a moment after the mission is ready."""
         ends_s = time.monotonic() + within_s
         while missing := set(names) - {component["name"] for component in self.status()["components"]}:
             if time.monotonic() > ends_s:
                 raise AssertionError(f"not there within {within_s} s: {', '.join(sorted(missing))}")
 
     def component(self, name: str) -> JsonObject:
-        """Return one component of the status."""
+        """Return the component of this name in the status."""
         found: list[JsonObject] = [c for c in self.status()["components"] if c["name"] == name]
         if not found:
             raise AssertionError(f"{name} is not there")
         return found[0]
 
     def processes(self) -> list[psutil.Process]:
-        """Return every process of this mission, launcher included."""
+        """Return all processes of this mission, including the launcher."""
         return marked(self.environment[MARK])
 
     def story(self) -> str:
-        """Return what ``up`` said and the ends of all logs, for failure messages."""
+        """Return the output of ``up`` and the ends of all logs, for failure messages."""
         parts = ["--- up said", *self.lines[-LAST_LINES:]]
         with contextlib.suppress(OSError):
             for log in sorted(self.directory.glob("log/*.log")):
@@ -114,7 +114,7 @@ class RealMission:
 
     @property
     def endpoint(self) -> str:
-        """Where its hub listens."""
+        """Endpoint of the hub."""
         with runtime_directory(self.environment["XDG_RUNTIME_DIR"]):
             return run_files.find(self.name).endpoint
 
@@ -136,7 +136,7 @@ class RealMission:
             await opened.close()
 
     def wait_for_line(self, pattern: str, within_s: float) -> str:
-        """Return the first line ``up`` said that matches."""
+        """Wait for a line of ``up`` that matches, and return it."""
         ends_s = time.monotonic() + within_s
         while True:
             self.news.clear()
@@ -148,7 +148,7 @@ class RealMission:
                 raise AssertionError(f"'up' said no line {pattern!r} within {within_s} s")
 
     def down(self) -> int:
-        """Take it down by command; return the exit code of ``up``."""
+        """Take the mission down by command; return the exit code of ``up``."""
         done = self.command("scout-backbone", "down", "--mission", self.name)
         _must_succeed(done)
         return self.launcher.wait(DOWN_WITHIN_S)
@@ -156,7 +156,7 @@ class RealMission:
 
 @contextlib.contextmanager
 def runtime_directory(path: str) -> Iterator[None]:
-    """Let this process look for missions in that runtime folder."""
+    """Make this process look for missions in this runtime folder."""
     before = os.environ.get("XDG_RUNTIME_DIR")
     os.environ["XDG_RUNTIME_DIR"] = path
     try:
@@ -169,7 +169,7 @@ def runtime_directory(path: str) -> Iterator[None]:
 
 
 def marked(mark: str) -> list[psutil.Process]:
-    """Return every process whose environment carries the mark."""
+    """Return all processes whose environment contains the mark."""
     found = []
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error):
@@ -186,14 +186,14 @@ def mission_up(
     change: Mapping[str, str] | None = None,
     beside: RealMission | None = None,
 ) -> Iterator[RealMission]:
-    """Bring a mission up, yield it when all is ready, and make sure that nothing of it is left afterwards.
+    """Bring a mission up, yield it when it is ready, and afterwards end everything that is left of it.
 
     Args:
         mission: Path of a mission file, or its text.
-        options: Further words for ``up``.
-        name: Its name; left out: one that no other mission has.
+        options: Further arguments for ``up``.
+        name: Name of the mission; left out: a unique name.
         change: Texts to replace in the file.
-        beside: Another mission of the same user; None: it has a runtime folder of its own.
+        beside: Another mission whose runtime folder to share; None: a new runtime folder.
     """
     mark = uuid.uuid4().hex
     name = name or f"test-{mark[:8]}"
@@ -224,7 +224,7 @@ def mission_up(
 
 
 def _renamed(mission: Path | str, name: str, change: Mapping[str, str]) -> str:
-    """Return the mission's text under this name, with these texts replaced."""
+    """Return the mission's text with this name and these texts replaced."""
     text = mission if is_text(mission) else Path(mission).read_text()
     text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{name}", text, count=1)
     for old, new in change.items():
@@ -241,7 +241,7 @@ def _started(words: Sequence[str], environment: Mapping[str, str]) -> subprocess
 
 
 def _end(launcher: subprocess.Popen[str], mark: str) -> None:
-    """End what is left, without mercy."""
+    """Kill all processes that are left."""
     if launcher.poll() is None:
         launcher.kill()
     launcher.wait(10)
@@ -253,7 +253,7 @@ def _end(launcher: subprocess.Popen[str], mark: str) -> None:
 
 
 def wait_gone(mark: str, within_s: float) -> list[psutil.Process]:
-    """Return the marked processes that are still there after at most this time."""
+    """Wait for the marked processes to end, at most for this time; return those that are left."""
     deadline = time.monotonic() + within_s
     while (left := marked(mark)) and time.monotonic() < deadline:
         psutil.wait_procs(left, timeout=0.1)

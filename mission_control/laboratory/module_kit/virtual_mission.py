@@ -1,4 +1,4 @@
-"""A whole mission in one process on virtual time, played for one scene."""
+"""A whole mission in one process on virtual time, for the duration of one scene."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Result = TypeVar("Result")
 
 
 def play(mission: Path | str, scene: Callable[[RunningMission], Awaitable[Result]]) -> Result:
-    """Return what the scene returns, played while the mission is up.
+    """Run the scene while the mission is up, and return its result.
 
     Args:
-        mission: Path of a mission file, or its text; the text's files are looked for in the working directory.
-        scene: Gets the running mission, at virtual time.
+        mission: Path of a mission file, or its text; relative paths in a text refer to the working directory.
+        scene: Called with the running mission, on virtual time.
 
     Raises:
-        MissionInvalid: With every fault of the file.
-        MissionFell: A component fell.
+        MissionInvalid: The file has faults; the error lists all of them.
+        MissionFell: A component crashed.
         Refusal: A component could not be started.
     """
     description = described(mission)
@@ -39,7 +39,7 @@ def described(mission: Path | str) -> MissionDescription:
     """Return the mission of a file, or of its text.
 
     Raises:
-        MissionInvalid: With every fault of the file.
+        MissionInvalid: The file has faults; the error lists all of them.
     """
     return read_mission_bytes(mission.encode(), "mission.xml") if is_text(mission) else read_mission(mission)
 
@@ -50,7 +50,7 @@ def is_text(mission: Path | str) -> TypeGuard[str]:
 
 
 class Play(Protocol):
-    """Plays a mission for one scene."""
+    """Runs a mission for one scene."""
 
     def __call__(self, mission: Path | str, scene: Callable[[RunningMission], Awaitable[Result]]) -> Result:
-        """Return what the scene returns; see ``play``."""
+        """Return the scene's result; see ``play``."""

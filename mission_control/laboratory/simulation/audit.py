@@ -1,7 +1,7 @@
-"""Audit: the events of a simulated mission, in order; the laws examine only these.
+"""Audit: the events of a simulated mission, in order; the laws examine only these events.
 
-Rule of this file: events contain no addresses of objects, no process ids and no time of a machine, so that two runs of
-one seed give the same bytes.
+Rule of this file: events contain no object addresses, process ids or machine times, so that two runs of one seed give
+the same bytes.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """One event.
+    """An event.
 
     Attributes:
-        who: Name of its component.
-        what: One word; see the laws for the meaning of each.
+        who: Name of the component.
+        what: Kind of event, one word; see the laws for the meanings.
         values: The names and numbers of this case.
     """
 
@@ -55,7 +55,7 @@ class Audit:
         self.happenings.append(Happening(asyncio.get_running_loop().time(), who, what, values))
 
     def digest(self) -> str:
-        """Return a fingerprint of all events."""
+        """Return a hash of all events."""
         digest = hashlib.sha256()
         for happening in self.happenings:
             digest.update(happening.to_line().encode() + b"\n")
@@ -63,7 +63,7 @@ class Audit:
 
 
 current_audit: ContextVar[Audit] = ContextVar("current_audit")
-"""The audit of the present task's run; drivers, which a mission names by class path, find it here."""
+"""The audit of the present task's run; drivers find it here, because a mission names them only by class path."""
 
 
 def _flat(value: object) -> Iterator[object]:

@@ -1,6 +1,6 @@
-"""The real RC manager, RCs and ARCs, which record the fate of each hold, gate and packet in an audit.
+"""The real RC manager, RCs and ARCs; they record the events of each hold, gate and packet in an audit.
 
-Rule of this file: no decisions. Each overriding method records, then calls the original.
+Rule of this file: no decisions. Each overriding method records, then calls the original method.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Fault campaign: many simulated missions on all processors, and the story of the first that breaks a law."""
+"""Fault campaign: runs many simulated missions on all processors; reports the story of the first broken law."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class CampaignCount:
     """Counts of some runs.
 
     Attributes:
-        runs: Number of seeds; each stands for a pool mission and a supervised one.
+        runs: Number of seeds; each seed gives a pool mission and a supervised mission.
     """
 
     runs: int = 0
@@ -59,7 +59,7 @@ class Finding:
         supervised: True: the supervised mission of this seed; False: its pool mission.
         chaos: True if faults were injected.
         broken: The law, in the run with the fewest faults.
-        faults: The smallest found set of faults that breaks the law.
+        faults: The smallest set of faults, as far as found, that breaks the law.
         faults_before: Number of faults in the first run that broke it.
         story: Events of the concerned components up to the breach.
     """
@@ -130,7 +130,7 @@ class CampaignOutcome:
 def simulate(
     first: int, seeds: int, *, chaos: bool, tell: Callable[[str], None], processes: int | None = None
 ) -> CampaignOutcome:
-    """Run the missions of these seeds until one breaks a law; reproduce and shrink that one.
+    """Run the missions of these seeds until a mission breaks a law; reproduce and shrink that mission.
 
     Args:
         first: First seed.
@@ -189,7 +189,7 @@ def _run_batch(batch: Sequence[int], *, chaos: bool) -> tuple[CampaignCount, int
 
 
 def _run_quietly(seed: int, supervised: bool, chaos: bool, faults: Sequence[AnyFault] | None = None) -> MissionRun:
-    """Run the mission without logging: components log every fault, and the audit holds all that matters."""
+    """Run the mission without logging, because components log every fault and the audit has all relevant events."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:

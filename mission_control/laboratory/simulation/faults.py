@@ -1,10 +1,9 @@
 """Injected faults of a pool mission: lost messages, hanging components, killed components.
 
-Every fault has an identity that does not depend on other faults: the id of a message is its sender, its receiver, its
-kind and its number of this kind. So a run can be repeated with some of its faults only, to find the smallest set that
-breaks a law.
+Every fault has an id that does not depend on other faults: the id of a message is its sender, receiver, kind and number
+of this kind. So a run can be repeated with a subset of its faults, to find the smallest set that breaks a law.
 
-Pure: a seed gives the faults, or a list does.
+Pure: the faults follow from a seed or from a list.
 """
 
 from __future__ import annotations
@@ -19,9 +18,9 @@ from mission_control.laboratory.simulation.shape import BRING_UP_S, MissionShape
 
 Effect = Literal["lost", "late", "doubled"]
 
-LONGEST_DELAY_S = 2.5  # chosen: longer than a lease, so that a late message comes after its time-out
+LONGEST_DELAY_S = 2.5  # chosen: longer than a lease, so that a late message arrives after its time-out
 LONGEST_HANG_S = 3.0  # chosen: longer than a lease
-LONGEST_ABSENCE_S = 1.5  # chosen: a creator restarts at once, and later each time
+LONGEST_ABSENCE_S = 1.5  # chosen: a creator restarts at once the first time, and later each further time
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +47,7 @@ class KillFault:
 
     Attributes:
         target: Name of the component.
-        away_s: Time until its creator has restarted it, if it restarts it.
+        away_s: Time until its creator has restarted it, if the creator restarts it at all.
     """
 
     at_s: float
@@ -61,7 +60,7 @@ class KillFault:
 
 @dataclass(frozen=True, slots=True)
 class Hang:
-    """A component that for a while neither gets nor sends messages; then all of them travel, in order.
+    """A component that neither receives nor sends messages for a while; then all messages are delivered, in order.
 
     Attributes:
         target: Address of the component.
@@ -134,7 +133,7 @@ def _moment(dice: Random, begin_s: float, end_s: float) -> float:
 
 
 class DrawnFates:
-    """Decides on each message from the seed and the message's identity alone."""
+    """Decides on each message only from the seed and the message's id."""
 
     def __init__(self, seed: int, weather: Weather) -> None:
         self._key = f"fate {seed}".encode()
@@ -152,7 +151,7 @@ class DrawnFates:
             return MessageFault(message, "lost")
         if share < self._late:
             part = int.from_bytes(digest[8:], "big") / 2.0**64
-            return MessageFault(message, "late", round(LONGEST_DELAY_S * part**3, 6))  # mostly by little
+            return MessageFault(message, "late", round(LONGEST_DELAY_S * part**3, 6))  # mostly by a short time
         return MessageFault(message, "doubled") if share < self._doubled else None
 
 

@@ -1,6 +1,6 @@
-"""Hostile messages: impossible numbers in the name of a component that may send such a message.
+"""Hostile messages: impossible numbers under the address of a component that may send such a message.
 
-They are encoded and decoded as between processes, so a message that the decoder refuses reaches no component.
+They are encoded and decoded as between processes, so a message that the decoder rejects reaches no component.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ TIMES = (1e9, 1e308, math.inf, -math.inf, math.nan, -1.0)
 
 @dataclass(frozen=True, slots=True)
 class HostileMessage:
-    """One hostile message.
+    """A hostile message.
 
     Attributes:
         source: Address of its alleged sender.
@@ -91,7 +91,7 @@ def hostile_message(shape: SupervisedShape, target: str, number: int) -> Hostile
 
 
 async def say_hostile(message: HostileMessage, join: Callable[[str, Clock], Bus], clock: Clock, audit: Audit) -> None:
-    """Send the message, and record whether the decoder accepted it, and the answer."""
+    """Send the message; record whether the decoder accepted it, and the answer."""
     body = message.body
     try:
         raw = write(Envelope(1, message.source, 1, clock.now_s(), "", body))

@@ -6,15 +6,15 @@ The laws, by name:
 * epochs-grow: every hold of an RC has a larger epoch than all earlier holds, also over restarts.
 * fenced: after a command under an epoch, the robot gets no packet of an older epoch; after the connection of the next
   ARC it gets only the safe packet; and no packet is sent outside its ARC's hold of the radio.
-* freed: when the RC manager counts an ARC's RCs as free, the ARC holds no RC that is up.
+* freed: when the RC manager records an ARC's RCs as free, the ARC holds no running RC.
 * safe: the last packet to a robot from an ARC and a radio is the safe packet.
 * whole-set: a gate opens only when all its RCs were connected to its ARC under exactly these epochs.
-* true: an owner's belief agrees with its ARC's gate, and the gate with the RCs, except for known delays.
+* true: an owner's belief agrees with its ARC's gate, and the gate agrees with the RCs, except for known delays.
 * schedule: the invariants of the RC manager's schedule hold after each event.
-* kept: if every message arrives and the RC manager dies and is soon back, holders and epochs stay unless it decides
-  otherwise.
-* progress: without further faults, each owner that wants time and has no higher rival gets it (not under the policy
-  ``strict``).
+* kept: if every message arrives, and the RC manager dies and is soon restarted, holders and epochs stay unless the RC
+manager decides otherwise.
+* progress: without further faults, each owner that wants time and has no rival of higher priority gets it (not under
+the policy ``strict``).
 * no-bug: no component ends by a bug.
 
 Events of the audit: ``begins killed ends fails`` of components; ``held``, ``let go``, ``safe``, ``unsafe`` of RCs;
@@ -35,17 +35,17 @@ from mission_control.laboratory.simulation.faults import LONGEST_DELAY_S, LONGES
 from mission_control.laboratory.simulation.shape import MissionShape
 
 SAFE, FREED = "S", "freed"
-FREED_WITHIN_S = 0.5  # chosen: an RC ends one hold after the other, each within 0.4 s; the next is not connected before
-RECOVERY_S = 6.0  # chosen: a lease, a late message, and the time in which a lost ARC is claimed again
-SOON_BACK_S = 0.6  # chosen: with the time for its questions to all components, it renews before any lease expires
+FREED_WITHIN_S = 0.5  # chosen: an RC ends its holds one after the other, each within 0.4 s, before it connects the next
+RECOVERY_S = 6.0  # chosen: a lease, a late message, and the time to claim a lost ARC again
+SOON_BACK_S = 0.6  # chosen: including its questions to all components, it renews before any lease expires
 UNDISTURBED_S = 4.0  # chosen: two leases
 RC_MANAGER = "rc_manager"
 Path = tuple[tuple[str, int], ...]
-CALM_DELAY_S = 1.5  # chosen: in the calm a notice takes no time, a death is seen at once, a lost owner in half a second
+CALM_DELAY_S = 1.5  # chosen: in the calm a notice takes no time; a death is seen at once, a lost owner in half a second
 STORM_DELAY_S = LEASE_S + LONGEST_DELAY_S + LONGEST_HANG_S + 2.0
 """Chosen: with faults, a renewal may be late by the longest delay and then wait for the end of a hang; the renewed hold
 lasts a lease, and the owner gets the notice of its end within the next second."""
-STORY_LENGTH = 30  # chosen: a screen
+STORY_LENGTH = 30  # chosen: one screen
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Broken:
     """A broken law.
 
     Attributes:
-        what: One sentence with the names and numbers of this case.
+        what: A sentence with the names and numbers of this case.
         names: Components concerned.
     """
 
@@ -89,7 +89,7 @@ def first_broken(
 
 
 def story_of(broken: Broken, happenings: Sequence[Happening], length: int = STORY_LENGTH) -> list[Happening]:
-    """Return the last events of the concerned components before the breach, equal packets once."""
+    """Return the last events of the concerned components before the violation; equal packets appear once."""
     story: list[Happening] = []
     for happening in reversed([h for h in happenings if h.at_s <= broken.at_s and h.concerns(broken.names)]):
         if story and happening.what == story[-1].what == "packet" and happening.values == story[-1].values:
@@ -143,7 +143,7 @@ class _Judge:
 
     # ------------------------------------------------------------------ one thing after the other
     def judge(self, h: Happening) -> Iterator[Broken]:
-        """Record an event and yield each law that it breaks."""
+        """Record an event and yield each law that it violates."""
         yield from self._overdue(h.at_s)
         match h.what:
             case "held":
@@ -266,7 +266,7 @@ class _Judge:
 
     # ------------------------------------------------------------------ the RC manager's restart
     def _note_restart(self, h: Happening) -> None:
-        """Record the holds that must stay, if only the RC manager had a fault lately and is soon back."""
+        """Record the holds that must stay, if only the RC manager had a fault lately and is soon restarted."""
         if h.what == "ends" or (h.what == "begins" and h.who != RC_MANAGER):
             self._need_not_keep(h.who)
         if h.who == RC_MANAGER and h.what == "begins" and h.at_s > self._struck_s + SOON_BACK_S:
@@ -287,7 +287,7 @@ class _Judge:
 
     # ------------------------------------------------------------------ beliefs
     def _compare(self, now_s: float) -> None:
-        """Record since when each pair that should agree disagrees."""
+        """Record for each pair that should agree the time since which it disagrees."""
         doubts: set[tuple[str, ...]] = set()
         for owner in self._shape.owners:
             believed = self._beliefs[owner.name].epochs
@@ -324,9 +324,9 @@ class _Judge:
 
     # ------------------------------------------------------------------ the end
     def _progress(self, now_s: float) -> Iterator[Broken]:
-        """Judge the calm: each owner that wanted time throughout and had no higher rival got time."""
+        """Judge the calm: each owner that wanted time throughout, and had no rival of higher priority, got time."""
         if self._shape.policy == "strict":
-            return  # it leaves RCs idle for ARCs that may not start yet
+            return  # this policy leaves RCs idle for ARCs that may not start yet
         wanting = [owner for owner in self._shape.owners if owner.name in self._wanting]
         for owner in wanting:
             paths = [*(other.path for other in wanting if other is not owner), *self._others]

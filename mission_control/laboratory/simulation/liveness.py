@@ -1,11 +1,11 @@
 """The liveness law: soon after the last fault, each wanted component runs again or is reported as absent.
 
-* said: the launcher never publishes health ``ok`` for more than ``SAID_WITHIN_S`` while the same component is missing;
-  its last word counts until it has been silent for ``SILENT_AFTER_S``.
+* said: the launcher never publishes health ``ok`` for more than ``SAID_WITHIN_S`` while the same component is missing.
+Its last publication counts until it has published nothing for ``SILENT_AFTER_S``.
 * liveness: ``RUNS_AGAIN_S`` after the last fault each wanted component runs, and the RC manager knows the request of
   each ARC among them, or a component's ``absent`` names it.
-* no-false-alarm: if all of them run then, health is ``ok``.
-* lives: no process is ended as hung that was not paused, because a starved process is late, not dead.
+* no-false-alarm: if all wanted components run at that time, health is ``ok``.
+* lives: only paused processes are ended as hung, because a starved process is late, not dead.
 
 ``Watcher`` records; ``first_unhealed`` judges the records and is pure.
 """
@@ -31,8 +31,8 @@ from mission_control.laboratory.simulation.supervised_shape import CORE, Supervi
 RUNS_AGAIN_S = 40.0
 """Chosen: hung for 3 s, ended within 2 s, restarted after at most 2 s, while its owner compares every 20 s and then
 tries every 5 s; a second time for components that depend on it."""
-SAID_WITHIN_S = 2.0  # the promise
-LOOK_EVERY_S = 0.25  # chosen: an eighth of it
+SAID_WITHIN_S = 2.0  # the guaranteed time
+LOOK_EVERY_S = 0.25  # chosen: an eighth of that time
 
 
 class Watcher:
@@ -55,7 +55,7 @@ class Watcher:
         self._word, self._heard_s, self._ok_since_s = HealthWord.DEGRADED, clock.now_s(), math.inf
 
     async def watch(self, bus: Bus) -> None:
-        """Compare until cancelled."""
+        """Compare repeatedly, until cancelled."""
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard)
         while True:
             now_s = self._clock.now_s()
@@ -108,7 +108,7 @@ class Watcher:
 
 
 def first_unhealed(happenings: Sequence[Happening]) -> Broken | None:
-    """Return the first breach of the liveness law, or None if it holds."""
+    """Return the first violation of the liveness law, or None if the law holds."""
     struck: set[str] = set()
     for h in happenings:
         match h.what:

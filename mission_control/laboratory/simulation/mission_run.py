@@ -1,7 +1,7 @@
-"""One mission from a seed, from first start to last law; only hardware, placer and creators are simulated.
+"""Runs one mission from a seed, from bring-up to the last law; only hardware, placer and creators are simulated.
 
-Source: the idea of judging a whole distributed system in one process on virtual time is FoundationDB's
-(Zhou et al., SIGMOD 2021, section 4).
+Source: FoundationDB tests a whole distributed system in one process on virtual time (Zhou et al., SIGMOD 2021, section
+4).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class MissionRun:
     """The result of one mission.
 
     Attributes:
-        digest: Fingerprint of all events.
+        digest: Hash of all events.
         broken: The first broken law; None if all hold.
     """
 

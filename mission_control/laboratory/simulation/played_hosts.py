@@ -1,6 +1,6 @@
-"""Played hosts: placer, creators and hosts in one process, which start, watch, kill and restart components by name.
+"""Played hosts: placer, creators and hosts in one process; they start, watch, kill and restart components by name.
 
-They replace the real placer and creators, which handle processes; here a component is a task.
+They replace the real placer and creators. The real ones handle processes; here a component is a task.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from backbone.waiting import end_tasks
 from mission_control.laboratory.simulation.audit import Audit
 
 HOST = "host"  # chosen: all components are on one host
-PID = 1  # chosen: they share one process; its true pid would make two runs of one seed differ
+PID = 1  # chosen: all components share one process; its real pid would make two runs of one seed differ
 FALLEN_AWAY_S = 0.3  # chosen: a creator's first back-off is of this order
-STOP_WITHIN_S = 3.0  # chosen: longer than an ARC waits for the RC manager when it withdraws
+STOP_WITHIN_S = 3.0  # chosen: longer than an ARC waits for the RC manager when it withdraws its request
 
 
 @dataclass(frozen=True, slots=True)
 class PlayedRole:
-    """All that is needed to start a component repeatedly.
+    """The data needed to start a component repeatedly.
 
     Attributes:
         component: Its class, or a factory.
-        is_restarted: True if its creator restarts it when it falls.
+        is_restarted: True if its creator restarts it after a crash.
     """
 
     component: Callable[[Launch, Bus, Clock], AnyComponent]
@@ -62,10 +62,10 @@ class PlayedHosts:
         self._watching: dict[str, asyncio.Task[None]] = {}
 
     def begin(self, role: PlayedRole) -> None:
-        """Start the component; restart it when it falls, if its role says so.
+        """Start the component; restart it after a crash, if its role requires that.
 
         Raises:
-            NameTaken: A component of this name lives or is being restarted.
+            NameTaken: A component of this name runs or is being restarted.
         """
         if role.name in self._lives:
             raise NameTaken(f"{role.name} is placed already", name=role.name)
@@ -82,7 +82,7 @@ class PlayedHosts:
         return await self.wait_ready(role.name)
 
     async def wait_ready(self, name: str) -> bool:
-        """Return True when the component of this name is ready, False if it has ended for good before."""
+        """Wait until the component of this name is ready (True) or has ended for good (False)."""
         life, watching = self._lives[name], self._watching[name]
         waiting = asyncio.create_task(life.ready.wait(), name=f"readiness of {name}")
         try:
@@ -93,16 +93,16 @@ class PlayedHosts:
         return life.ready.is_set()
 
     def knows(self, name: str) -> bool:
-        """Return whether a component of this name lives or is being restarted."""
+        """Return whether a component of this name runs or is being restarted."""
         return name in self._lives
 
     def running(self, name: str) -> AnyComponent | None:
-        """Return the living component of this name, or None."""
+        """Return the running component of this name, or None."""
         life = self._lives.get(name)
         return life.component if life is not None else None
 
     def kill(self, name: str, away_s: float) -> None:
-        """End the component as SIGKILL does; if it is restarted, then after ``away_s``."""
+        """End the component as SIGKILL does; a restart follows after ``away_s``, if at all."""
         life = self._lives.get(name)
         if life is None or life.component is None or life.task is None:
             return
@@ -113,7 +113,7 @@ class PlayedHosts:
         life.task.cancel()
 
     async def stop(self, name: str, reason: str) -> EndedBy:
-        """End the component for good: ask it to, and kill it if that takes too long.
+        """End the component for good: ask it to end, and kill it if that takes too long.
 
         Raises:
             NotPlaced: No component has this name.
@@ -138,7 +138,7 @@ class PlayedHosts:
         await end_tasks(*self._watching.values())
 
     async def _watch(self, life: _Life) -> None:
-        """Run the component; run it again after a pause whenever it falls, if its role says so."""
+        """Run the component; after a crash run it again after a pause, if its role requires that."""
         name = life.role.name
         try:
             while True:
@@ -152,7 +152,7 @@ class PlayedHosts:
                 del self._lives[name], self._watching[name]
 
     async def _live(self, life: _Life) -> None:
-        """Run one life of the component to its end."""
+        """Run the component once, to its end."""
         role = life.role
         launch = Launch(
             self._network.mission, role.subsystem, role.name, role.kind, "", HOST, "", 0.0, 1.0, dict(role.parameters)

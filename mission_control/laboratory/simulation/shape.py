@@ -18,8 +18,8 @@ from backbone.scheduling.requests import Usage
 
 MISSION = "simulated"
 MOST_OWNERS = 8
-BRING_UP_S = 1.0  # chosen: on virtual time all components are ready within a tenth of it
-SHORTEST_ACTIVE_S, LONGEST_ACTIVE_S = 6.0, 16.0  # chosen: several turns of each owner, several runs a second
+BRING_UP_S = 1.0  # chosen: on virtual time all components are ready within a tenth of this time
+SHORTEST_ACTIVE_S, LONGEST_ACTIVE_S = 6.0, 16.0  # chosen: several turns of each owner, yet several runs a second
 
 POOL = "mission_control.laboratory.simulation.audited_pool"
 RADIO_DRIVER, GRABBER_DRIVER = f"{POOL}:AuditedRadio", f"{POOL}:AuditedGrabber"
@@ -42,7 +42,7 @@ POOL_TYPES = (
 
 @dataclass(frozen=True, slots=True)
 class OwnerShape:
-    """One decision process and the ARC it claims.
+    """A decision process and the ARC that it claims.
 
     Attributes:
         kind: Kind of its ARC.
@@ -53,7 +53,7 @@ class OwnerShape:
         wish: Role → name.
         usage: Use of the radio.
         begins_s: Mission time of its first claim.
-        rests: True if it gives its ARC back in the calm at the end.
+        rests: True if it releases its ARC in the calm at the end.
     """
 
     name: str
@@ -75,7 +75,7 @@ class OwnerShape:
 
 @dataclass(frozen=True, slots=True)
 class MissionShape:
-    """One mission.
+    """A mission.
 
     Attributes:
         asleep: RCs that start only when an ARC claims them.
@@ -84,7 +84,7 @@ class MissionShape:
         grace_s: Time to stop cleanly at the end of a slice.
         policy: Policy of the RC manager.
         active_s: Mission time until which decision processes have moods and faults happen.
-        calm_s: Time after that in which owners only drive, without faults.
+        calm_s: Time after that: owners only drive, and no faults happen.
     """
 
     seed: int
@@ -136,8 +136,8 @@ def draw_shape(seed: int) -> MissionShape:
     )
 
 
-CALM_LEAST_S = 8.0  # chosen: a lost ARC is found by its beat, a lost hold by its lease, and both are claimed again
-SWITCH_S = 0.5  # chosen: a context switch whose every step is slow
+CALM_LEAST_S = 8.0  # chosen: a heartbeat reveals a lost ARC, a lease a lost hold, and both are claimed again
+SWITCH_S = 0.5  # chosen: a context switch in which every step is slow
 
 
 def _resources(dice: Random) -> tuple[Resource, ...]:

@@ -15,13 +15,13 @@ MOST_TRIALS = 300  # chosen: at five to ten runs a second, a minute at most
 
 
 def smallest(causes: Sequence[T], breaks: Callable[[Sequence[T]], bool], most_trials: int = MOST_TRIALS) -> list[T]:
-    """Return a subset of the causes, in their order, that together still break it.
+    """Return a subset of the causes, in their order, that still breaks the law.
 
-    No single cause of the result can be left out, unless the trials were used up.
+    Unless the trials were used up, no cause of the result can be left out.
 
     Args:
-        causes: Causes that break it together.
-        breaks: Returns whether a subset breaks it; deterministic.
+        causes: Causes that break the law together.
+        breaks: Returns whether a subset breaks the law; deterministic.
         most_trials: Largest number of calls.
 
     Example:

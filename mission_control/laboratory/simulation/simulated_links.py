@@ -1,11 +1,12 @@
-"""A network of simulated processes: each has one link to the hub, which is the nameserver's process.
+"""A network of simulated processes. Each process has one link to the hub, the nameserver's process.
 
 It behaves as measured on the real bus (decision 0003):
 
-* A link that is cut, or whose process or hub is paused, keeps messages until it heals. After a lease it is given up: it
-  loses these messages, its questions end without an answer, and tokens fall at both of its ends.
-* The death of a process or of the hub is noticed at once.
-* A link that was given up comes back a moment after its fault ends; tokens and services return by themselves.
+* If a link is cut, or its process or the hub is paused, the link keeps messages until it heals. After a lease the link
+is given up: these messages are lost, its questions end without an answer, and tokens disappear at both of its ends.
+* The death of a process or of the hub is detected at once.
+* A link that was given up is re-established a moment after its fault ends; tokens and services then return by
+  themselves.
 * Neighbors in one process reach each other without a link.
 """
 
@@ -54,7 +55,7 @@ class Link:
         return self._blocks > 0
 
     def carry(self, act: Act, lost: Act = _nothing) -> None:
-        """Call ``act`` when a message sent now arrives, or ``lost`` if it never does."""
+        """Call ``act`` when a message sent now arrives, or ``lost`` if it never arrives."""
         if not self.is_up:
             lost()
         elif self.is_blocked:
@@ -63,7 +64,7 @@ class Link:
             act()
 
     def block(self) -> None:
-        """Stop all messages until ``unblock`` is called as often."""
+        """Stop all messages until ``unblock`` has been called as often as ``block``."""
         self._blocks += 1
         if self._blocks == 1:
             self._ring(LINK_LEASE_S, self.give_up)
@@ -136,7 +137,7 @@ class LinkedBus(LocalBus):
         self.link = link
 
     def declare_to_neighbors(self, address: str) -> NeighborDeclaration:
-        """Raise a token; behind a cut link another token of this address may stand."""
+        """Declare a token; behind a cut link another token of this address may exist."""
         tokens = self.network.tokens.setdefault(address, [])
         self.link.shown[address] = None
 
@@ -167,7 +168,7 @@ class LinkedNetwork(LocalNetwork):
     """See the rules of this file.
 
     Args:
-        mission: One network is one mission.
+        mission: Name of the mission; each mission has its own network.
         hub: Name of the component whose process is the hub.
     """
 
@@ -187,12 +188,12 @@ class LinkedNetwork(LocalNetwork):
         return self._hub is not None
 
     def processes(self) -> list[SimulatedProcess]:
-        """Return all processes, ended ones too, in the order of their starts."""
+        """Return all processes, including ended ones, in the order of their starts."""
         return list(self._begun)
 
     # ------------------------------------------------------------------ life of processes
     def begin(self, process: SimulatedProcess) -> Link:
-        """Return the link of a new process, which comes up as soon as possible."""
+        """Return the link of a new process; the link comes up as soon as possible."""
         self._begun.append(process)
         link = self.links[process] = Link(self, process, is_hub=process.name == self._hub_name)
         if link.is_hub:
@@ -230,7 +231,7 @@ class LinkedNetwork(LocalNetwork):
             self._block(self.links[process], -1)
 
     def cut(self, process: SimulatedProcess) -> None:
-        """Cut the link of one process; the hub has none."""
+        """Cut the link of one process; the hub has no link."""
         if not self.links[process].is_hub:
             self.links[process].block()
 
@@ -240,7 +241,7 @@ class LinkedNetwork(LocalNetwork):
             self.links[process].unblock()
 
     def cut_host(self, host: str) -> None:
-        """Cut the links of all processes of a host but the hub's, also of those that begin meanwhile."""
+        """Cut the links of all processes of a host except the hub, including processes that begin meanwhile."""
         self._host_cuts[host] = self._host_cuts.get(host, 0) + 1
         for link in self._of_host(host):
             link.block()
@@ -268,7 +269,7 @@ class LinkedNetwork(LocalNetwork):
         return LinkedBus(self, source, clock, self.links[_own()])
 
     def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
-        """Carry the question over both links, and the answer back."""
+        """Deliver the question over both links, and return the answer."""
         own, server = self.links.get(_own()), self.servers.get(address)
         if own is None or own.process.is_dead:
             raise NoResponder("this process is dead")
@@ -311,7 +312,7 @@ class LinkedNetwork(LocalNetwork):
         own.carry(arrive, end)
 
     def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Message]) -> None:
-        """Carry the publication over both links."""
+        """Deliver the publication over both links."""
         own, theirs = self.links.get(_own()), self._link_of(listening)
         if own is None or theirs is None or own.process.is_dead:
             return
@@ -325,7 +326,7 @@ class LinkedNetwork(LocalNetwork):
             own.carry(lambda: theirs.carry(deliver))
 
     def carry_life(self, watching: Watching, address: str, alive: bool) -> None:  # noqa: ARG002
-        """Update the watcher with the tokens that it can see."""
+        """Update the watcher with the tokens that are visible to it."""
         own = self.links.get(_own())
         if own is None or own.process.is_dead or own is self._link_of(watching):
             self._look(watching, address)
@@ -365,7 +366,7 @@ class LinkedNetwork(LocalNetwork):
             link.process.run(watching.notify, address, stands)
 
         if link.is_up:
-            link.carry(tell, _nothing if stands else tell)  # with a lost link every token falls
+            link.carry(tell, _nothing if stands else tell)  # with a lost link every token disappears
         elif not link.process.is_dead:
             tell()
 

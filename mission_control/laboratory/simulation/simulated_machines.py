@@ -1,7 +1,7 @@
 """Simulated machines in one event loop: creators and keepers are real, only zygotes and processes are simulated.
 
-A process dies as a real one does: at once and without a further message. With a creator die all processes that its
-zygote forked. The audit gets the events of the laws: begins, killed, ends, gives up, fails.
+A process dies as a real one does: at once and without a further message. If a creator dies, all processes forked by its
+zygote die, too. The audit gets the events of the laws: begins, killed, ends, gives up, fails.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from mission_control.laboratory.simulation.simulated_processes import ProcessLoo
 FORK_S = 0.02  # chosen: the duration of a fork and of a component's imports
 HUB_WITHIN_S = 5.0  # zenoh_settings.OPEN_TIMEOUT_MS
 FIRST_PID = 1000
-LATE_STEPS = 5  # chosen: creator, owner, nameserver and observer need a step each, and one was just missed
+LATE_STEPS = 5  # chosen: creator, owner, nameserver and observer each need a step, and may have just missed one
 
 
 class Machines:
@@ -61,7 +61,7 @@ class Machines:
         return None
 
     def component(self, name: str) -> AnyComponent | None:
-        """Return the living component of this name, or None."""
+        """Return the running component of this name, or None."""
         for process, life in self.lives.items():
             if isinstance(life, SharedProcess):
                 if name in life.members():
@@ -71,7 +71,7 @@ class Machines:
         return None
 
     def names(self, process: SimulatedProcess) -> list[str]:
-        """Return the components that live in this process."""
+        """Return the components of this process."""
         life = self.lives.get(process)
         return list(life.members()) if isinstance(life, SharedProcess) else [process.name]
 
@@ -87,7 +87,7 @@ class Machines:
 
     # ------------------------------------------------------------------ faults
     def starve(self, host: str, until_s: float, gap_s: float) -> None:
-        """Give every process of this host, also new ones, a processor only for a moment every ``gap_s``."""
+        """Give every process of this host, including new ones, a processor only for a moment every ``gap_s``."""
         self._starved[host] = max(until_s, self._starved.get(host, (0.0, 0.0))[0]), gap_s
         for process in self.lives:
             if process.host == host:
@@ -99,7 +99,7 @@ class Machines:
         if process.is_dead or process not in self.lives:
             return
         if number is not signal.SIGKILL:
-            if life is None:  # it has no handler yet
+            if life is None:  # the process has no handler yet
                 self.kill(process)
             else:
                 process.run(self._loop.call_soon, life.end, number.name)
@@ -134,7 +134,7 @@ class Machines:
         self._zygotes[owner] = zygote
 
     async def end_all(self) -> None:
-        """End all processes at once; return when they have ended."""
+        """End all processes at once and wait for that."""
         for process in list(self.lives):
             process.die()
         while tasks := [task for process in self.network.processes() for task in process.end_tasks()]:
@@ -185,7 +185,7 @@ class Machines:
 
 
 current_machines: ContextVar[Machines] = ContextVar("current_machines")
-"""The machines of the present mission; creators, which a mission names by class path, find them here."""
+"""The machines of the present mission; creators find them here, because a mission names them only by class path."""
 
 
 class SimulatedZygote:

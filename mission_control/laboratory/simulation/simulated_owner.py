@@ -1,4 +1,4 @@
-"""A decision process with moods: it drives, idles, asks for other run times, releases, claims again.
+"""A decision process with random moods: it drives, idles, requests other run times, releases, claims again.
 
 It uses its ARC through ``arc_client`` as every behavior and console does, and records notices and outcomes of commands
 in the audit.
@@ -39,7 +39,7 @@ from resource_pool.messages import Applied
 log = logging.getLogger(__name__)
 
 TICK_S = 1e-6  # chosen: far above the rounding of times, far below every meaningful time
-AGAIN_S = 0.3  # chosen: an unconfirmed wish is repeated at a person's pace
+AGAIN_S = 0.3  # chosen: an unconfirmed wish is repeated about as fast as a person would
 TOP_WHEEL_SPEED_RAD_S = 10.0  # chosen: below the motor's limit
 
 
@@ -52,8 +52,8 @@ class OwnerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         path: Its place in the behavior tree.
         console: True for a console.
         begins_s: Mission time of its first claim.
-        calm_at_s: Mission time from which it only drives.
-        rests: True if it then gives its ARC back.
+        calm_at_s: Mission time from which the owner only drives.
+        rests: True if the owner releases its ARC at that time.
     """
 
     seed: int
@@ -78,14 +78,14 @@ class SimulatedOwner(Component[OwnerParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._audit = current_audit.get()
-        # A later life begins at another time and must have other moods.
+        # A restarted owner begins at another time and must have other moods.
         self._dice = Random(f"{self.parameters.seed} {self.name} {clock.now_s():.6f}")
         self._driving_dice = Random(f"driving {self.parameters.seed} {self.name} {clock.now_s():.6f}")
         self._arc: ArcClient | None = None
 
     # ------------------------------------------------------------------ life
     async def serve(self) -> None:
-        """Claim, use and release the ARC repeatedly; from the calm on keep the ARC and drive, or rest."""
+        """Claim, use and release the ARC repeatedly; in the calm keep the ARC and drive, or rest."""
         await self.clock.sleep_until_s(self.parameters.begins_s)
         while not self._is_calm():
             await self._live_with_arc()
@@ -103,7 +103,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         return await self._arc.handle(notice)
 
     def absences(self) -> list[Absence]:
-        """Return its ARC if it is wanted and missing."""
+        """Return the ARC if it is wanted and missing."""
         absence = self._arc.wish.absence() if self._arc is not None else None
         return [absence] if absence is not None else []
 
@@ -139,7 +139,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         await self._until_said(lambda: arc.release("had enough"))
 
     async def _have_moods(self, arc: ArcClient) -> None:
-        """Change its requests until it releases; in the calm want time and never release."""
+        """Change the requests until the ARC is released; in the calm want time and never release."""
         dice, given = self._dice, self.parameters
         while not self._is_calm():
             await self._until_calm_or(dice.uniform(0.2, 2.5))

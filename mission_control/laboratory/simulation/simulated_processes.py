@@ -1,10 +1,10 @@
-"""Simulated processes in one event loop; each can be paused, starved and killed alone.
+"""Simulated processes in one event loop; each can be paused, starved and killed separately.
 
 A process is a context: all tasks of a component run in a copy of its process's context, so the loop knows the process
-of each of its steps. The steps of a stopped process wait. When it continues, it first handles arrivals, then due
+of each step. The steps of a stopped process wait. When the process continues, it first handles arrivals, then due
 timers, as a real event loop does after SIGCONT.
 
-Rule of this file: it knows no components and decides nothing.
+Rule of this file: no knowledge of components, no decisions.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from backbone.component.heartbeat import BEAT_EVERY_S, Vitals
 R = TypeVar("R")
 Ts = TypeVarTuple("Ts")
 
-WINDOW_S = 1e-6  # chosen: in it a starved process does all due work, because virtual time stands still meanwhile
+WINDOW_S = 1e-6  # chosen: enough for all due work of a starved process, because virtual time stands still meanwhile
 _NO_PROCESS = Context()
 
 
 class SimulatedProcess:
-    """One process.
+    """A simulated process.
 
     Args:
         loop: Its event loop.
@@ -63,18 +63,18 @@ class SimulatedProcess:
         return not self.is_dead and (self.is_paused or (self._is_starved and not self._in_window))
 
     def pause(self) -> None:
-        """Stop it until ``go_on`` is called as often."""
+        """Stop the process until ``go_on`` has been called as often as ``pause``."""
         self._settle()
         self._pauses += 1
 
     def go_on(self) -> None:
-        """End one pause."""
+        """Undo one ``pause``."""
         self._settle()
         self._pauses -= 1
         self._catch_up()
 
     def starve(self, until_s: float, gap_s: float) -> None:
-        """Give it a processor only for a moment every ``gap_s`` until this time."""
+        """Give the process a processor only for a moment every ``gap_s``, until this time."""
         self._settle()
         self._starved_until_s = max(until_s, self._starved_until_s)
         self._is_starved = True
@@ -83,7 +83,7 @@ class SimulatedProcess:
         self._loop.call_at(until_s, self._end_starving, context=_NO_PROCESS)
 
     def die(self) -> None:
-        """Run its remaining steps; the caller keeps their messages from leaving."""
+        """Run the remaining steps; the caller prevents that their messages leave the process."""
         self.is_dead = True
         self._catch_up()
 
@@ -150,7 +150,7 @@ current_process: ContextVar[SimulatedProcess | None] = ContextVar("current_proce
 
 
 class _Step(asyncio.Handle):
-    """One step of a process."""
+    """A step of a process."""
 
     timer: asyncio.TimerHandle | None = None
 

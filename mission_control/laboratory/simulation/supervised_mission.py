@@ -1,7 +1,7 @@
-"""One supervised mission from a seed: real launcher, keepers, creators, placer and owners, on simulated machines.
+"""Runs one supervised mission from a seed: real launcher, keepers, creators, placer and owners on simulated machines.
 
-``mission_run`` has faults of messages and a simulated creator. Here the creator's real decisions run, and the faults
-are those of processes, links and machines.
+``mission_run`` has message faults and a simulated creator. Here the creator's real decisions run, and the faults
+concern processes, links and machines.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ from mission_control.laboratory.simulation.supervision_faults import (
 )
 
 HUB = "nameserver"
-LOOK_EVERY_S = 0.02  # chosen: far below the time in which a mission comes up
-UP_WITHIN_S = 60.0  # chosen: of virtual time, in which only forks and settling pass
+LOOK_EVERY_S = 0.02  # chosen: far below the bring-up time of a mission
+UP_WITHIN_S = 60.0  # chosen: virtual time; only forks and settling take virtual time
 
 
 def run_supervised(seed: int, *, chaos: bool, faults: Sequence[SupervisionFault] | None = None) -> MissionRun:
@@ -76,7 +76,7 @@ class _Observer:
     def connected(self, bus: Bus) -> None:
         """Do nothing."""
 
-    async def up(self, bus: Bus, clock: Clock) -> None:  # noqa: ARG002  the protocol's names
+    async def up(self, bus: Bus, clock: Clock) -> None:  # noqa: ARG002  names of the protocol
         """Wait until the mission ends."""
         await asyncio.Event().wait()
 

@@ -35,18 +35,18 @@ CLASSES = {
     "rc_manager": f"{POOL}:AuditedRcManager",
 }
 OWNER = "mission_control.laboratory.simulation.simulated_owner:SimulatedOwner"
-NODE = "mission_control.behavior:Behavior"  # named, as a mission names its classes: imports run downwards only
+NODE = "mission_control.behavior:Behavior"  # class paths, as in a mission file, because imports run downwards only
 SHARED_PROCESS = "minds"
-NODE_RUNTIME_S = 1.0  # chosen: as short as the owners' own
+NODE_RUNTIME_S = 1.0  # chosen: as short as the owners' times
 
 
 @dataclass(frozen=True, slots=True)
 class SupervisedShape:
-    """One supervised mission.
+    """A supervised mission.
 
     Attributes:
         pool: Hardware, owners and times.
-        hosts: The first has the core services.
+        hosts: Hosts; the first runs the core services.
         places: RC → host of its hardware.
         trees: Roots of the behavior tree beside the owners.
     """
@@ -133,7 +133,7 @@ def walk(nodes: tuple[BehaviorDescription, ...]) -> Iterator[BehaviorDescription
 
 def arc_of(node: BehaviorDescription) -> str:
     """Return the name of the node's ARC."""
-    assert node.arc is not None  # noqa: S101  asked only of those that have one
+    assert node.arc is not None  # noqa: S101  called only for nodes that have an ARC
     return f"{node.name}-{node.arc.kind}"
 
 

@@ -1,6 +1,6 @@
-"""Injected faults of a supervised mission: processes, links and machines. Pure: a seed gives the faults.
+"""Injected faults of a supervised mission: processes, links and machines. Pure: the faults follow from a seed.
 
-The id of a fault is its time and target, so a run can be repeated with some of its faults only.
+The id of a fault is its time and target, so a run can be repeated with a subset of its faults.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import Literal
 from mission_control.laboratory.simulation.shape import BRING_UP_S
 from mission_control.laboratory.simulation.supervised_shape import SupervisedShape
 
-SHORTEST_S, LONGEST_S = 0.1, 30.0  # of pauses and cuts
-LONGEST_STARVED_S = 10.0  # chosen: longer than every time-out of a second or five
-GAPS_S = (0.3, 1.0, 2.5)  # chosen: 20 busy processes beside it; a machine that swaps; a machine that almost hangs
-MOST_FAULTS = 5  # chosen: so few faults are understandable; more faults hide the effect of one
+SHORTEST_S, LONGEST_S = 0.1, 30.0  # durations of pauses and cuts
+LONGEST_STARVED_S = 10.0  # chosen: longer than the time-outs of one and of five seconds
+GAPS_S = (0.3, 1.0, 2.5)  # chosen: 20 other busy processes; a machine that swaps; a machine that almost hangs
+MOST_FAULTS = 5  # chosen: a run with few faults is understandable; more faults hide the effect of each
 END = Literal["killed", "politely"]
 
 
@@ -30,7 +30,7 @@ class _Sudden:
 
     @property
     def over_s(self) -> float:
-        """Mission time of its end; the end of a successor is not known beforehand."""
+        """Mission time of its end; that of a successor is not known in advance."""
         return self.at_s
 
 
@@ -63,7 +63,8 @@ class End(_Sudden):
     Attributes:
         target: A component in the process.
         how: As by SIGKILL, or in good order as by SIGTERM.
-        again_after_s: Time from the fork of its successor to the successor's end in the same way; negative: none.
+        again_after_s: Time from the fork of its successor until the successor ends in the same way; negative: the
+            successor does not end.
     """
 
     how: END
@@ -80,7 +81,7 @@ class Cut(_Lasting):
     """A link that is cut and heals.
 
     Attributes:
-        target: Component whose process is cut off, or host, whose processes cannot reach the hub.
+        target: Component whose process is cut off, or host whose processes cannot reach the hub.
     """
 
     def __str__(self) -> str:
@@ -89,7 +90,7 @@ class Cut(_Lasting):
 
 @dataclass(frozen=True, slots=True)
 class Starve(_Lasting):
-    """A machine whose processes get a processor only for moments.
+    """A machine whose processes get a processor only for short moments.
 
     Attributes:
         gap_s: Time between two moments.
@@ -103,7 +104,7 @@ class Starve(_Lasting):
 
 @dataclass(frozen=True, slots=True)
 class Hostile(_Sudden):
-    """A message with impossible numbers, in the name of a component that may send such a message.
+    """A message with impossible numbers, under the address of a component that may send such a message.
 
     Attributes:
         number: Its number in ``hostile_numbers``.
@@ -145,7 +146,7 @@ def _draw(dice: Random, shape: SupervisedShape) -> SupervisionFault:
 
 
 def _lasts_s(dice: Random, longest_s: float) -> float:
-    """Draw a duration, as many short as long ones: leases and time-outs are between 0.1 and 20 s."""
+    """Draw a duration, short and long ones equally often: leases and time-outs are between 0.1 and 20 s."""
     return round(SHORTEST_S * math.exp(dice.uniform(0.0, math.log(longest_s / SHORTEST_S))), 6)
 
 

@@ -2,12 +2,13 @@
 
 Rules of this file:
 
-* A link keeps its order, as a TCP connection does: messages after a late message arrive after it. A doubled message
-  arrives twice in a row.
+* A link keeps the order of messages, as a TCP connection does: messages after a late message arrive after it. A doubled
+  message arrives twice in a row.
 * A question and its answer have separate faults. The requester cannot know which of them was lost.
-* A component that is cut off neither gets nor sends messages; when the cut ends, all of them travel on.
-* Messages to and from the placer always arrive, because the placer is simulated and not judged.
-* The rise and fall of liveliness tokens may be late, but is never lost, because a hub keeps tokens.
+* A component that is cut off neither receives nor sends messages; when the cut ends, all waiting messages are
+  delivered.
+* Messages to and from the placer always arrive, because the placer is simulated and no law concerns it.
+* The appearance and withdrawal of liveliness tokens may be late, but are never lost, because a hub keeps tokens.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ class UnreliableNetwork(LocalNetwork):
     """See the rules of this file.
 
     Args:
-        mission: One network is one mission.
+        mission: Name of the mission; each mission has its own network.
         fates: Decides the fault of each message.
         begin_s: Mission time from which messages have faults.
-        end_s: Mission time from which they all arrive again.
+        end_s: Mission time from which all messages arrive again.
     """
 
     def __init__(self, mission: str, fates: Fates, begin_s: float, end_s: float) -> None:
@@ -49,12 +50,12 @@ class UnreliableNetwork(LocalNetwork):
         self._cut_until_s[address] = max(until_s, self._cut_until_s.get(address, 0.0))
 
     def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
-        """Carry question and answer, each with its own fault."""
+        """Deliver question and answer, each with its own fault."""
         source = asked.source
         fault = self._fault(source, address, type(asked.body).__name__)
 
         def travel_back(outcome: Envelope[Message] | None) -> None:
-            if outcome is None:  # the component died over it, which the fall of its link reports
+            if outcome is None:  # the component died meanwhile; the loss of its link reports that
                 answered(None)
                 return
             name = f"answer {type(outcome.body).__name__}"
@@ -78,7 +79,7 @@ class UnreliableNetwork(LocalNetwork):
             self._travel(source, address, None, lambda: self._ask_again(ask))
 
     def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Message]) -> None:
-        """Carry the publication to this listener with its fault."""
+        """Deliver the publication to this listener, with its fault."""
         source, target = envelope.source, listening.owner.source
         fault = self._fault(source, target, type(envelope.body).__name__)
         self._travel(source, target, fault, lambda: listening.deliver(address, envelope))
@@ -86,7 +87,7 @@ class UnreliableNetwork(LocalNetwork):
             self._travel(source, target, None, lambda: listening.deliver(address, envelope))
 
     def carry_life(self, watching: Watching, address: str, alive: bool) -> None:
-        """Carry the change of a token, late to a component that is cut off."""
+        """Deliver the change of a token; to a component that is cut off, late."""
         self._travel("", watching.owner.source, None, lambda: watching.notify(address, alive))
 
     @staticmethod

@@ -4,7 +4,7 @@ Nameserver, databases, RC manager, world, RCs, ARCs, behaviors and all other com
 file names. They use a ``LocalNetwork`` and a ``VirtualClock``, so the mission runs as fast as the machine can, and the
 same mission gives the same run to the byte.
 
-Rule of this file: it brings the mission up, and neither decides nor judges.
+Rule of this file: it brings the mission up; it contains no decisions and no laws.
 """
 
 from __future__ import annotations
@@ -55,15 +55,15 @@ from mission_control.laboratory.simulation.audit import Audit, Happening
 from mission_control.laboratory.simulation.played_hosts import HOST, PlayedHosts, PlayedRole
 from resource_pool.rcs.framegrabber import Framegrabber
 
-START_TIME_S = 60.0  # chosen: virtual time, in which only settling and back-offs pass
-REPLY_TIME_S = 5.0  # chosen: virtual time; an answer takes none
+START_TIME_S = 60.0  # chosen: virtual time; only settling and back-offs take virtual time
+REPLY_TIME_S = 5.0  # chosen: virtual time; an answer takes no virtual time
 MEETING_AT = "backbone/launcher"
 SIMULATED = "simulated"
 FELL = frozenset({"fails", "gives up"})
 
 
 class MissionFell(BackboneError):
-    """A component of a mission in one process fell; the text names the first one and the reason."""
+    """A component of a mission in one process crashed; the text names the first such component and the reason."""
 
 
 @dataclass(slots=True)
@@ -72,7 +72,7 @@ class RunningMission:
 
     Attributes:
         network: Its network; ``network.join(source, clock)`` gives one more bus.
-        bus: A bus like the launcher's.
+        bus: A bus with the launcher's address.
         clock: The mission's clock, which shows the event loop's time.
         hosts: All its components by name.
         trace: Lines of the schedule trace until now; the first is ``meta``.
@@ -107,7 +107,7 @@ class RunningMission:
         """Return the component of this name.
 
         Raises:
-            NotPlaced: No living component has this name.
+            NotPlaced: No running component has this name.
         """
         found = self.hosts.running(name)
         if found is None:
@@ -118,7 +118,7 @@ class RunningMission:
         """Return a component's counters, as an answer over the bus.
 
         Raises:
-            NotPlaced: No living component has this name.
+            NotPlaced: No running component has this name.
         """
         at = self.component(name).address
         return (await self.bus.ask(at, AskStatistics(), Statistics, within_s=REPLY_TIME_S)).values
@@ -131,7 +131,7 @@ async def mission_in_one_process(
     trace: Callable[[Line], None] | None = None,
     consoles: Mapping[str, Callable[[Launch, Bus, Clock], AnyComponent]] | None = None,
 ) -> AsyncIterator[RunningMission]:
-    """Yield the mission, up and ready, on the running loop's time; end all components at the end of the block.
+    """Yield the mission when it is ready, on the running loop's time; end all components at the end of the block.
 
     Run it under ``run_virtual``. At the end hardware is closed in good order; all other components end as by SIGKILL.
 
@@ -141,8 +141,9 @@ async def mission_in_one_process(
         consoles: Component type → factory of its consoles; a mission file has no consoles.
 
     Raises:
-        MissionFell: A component fell; raised at the end of the block, also in place of what came of the fall.
-        Refusal: Something could not be started.
+        MissionFell: A component crashed; raised at the end of the block, also in place of an exception that the crash
+            caused.
+        Refusal: A component could not be started.
 
     Example:
         >>> from backbone.bus.clock import run_virtual
@@ -186,8 +187,8 @@ async def mission_in_one_process(
 
 
 def _painted(mission: MissionDescription) -> MissionDescription:
-    """Return the mission with the painter behind each simulated receiver: its pictures are the same everywhere."""
-    used = {resource.type for resource in mission.resources}  # others are not imported
+    """Return the mission with the painter for each simulated receiver: its pictures are the same everywhere."""
+    used = {resource.type for resource in mission.resources}  # other drivers are not imported
     types = {kind.name: kind.class_path for kind in mission.types if kind.name in used}
     receivers = {name for name, class_path in types.items() if issubclass(load_class(class_path), Framegrabber)}
     resources = tuple(
@@ -238,9 +239,9 @@ async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[...
 
 
 class WholePlacer(Component[NoParameters]):
-    """Starts and stops all components but core services, in this process, with the real placer's messages.
+    """Starts and stops all components except core services, in this process, with the real placer's messages.
 
-    With ``restarts`` the types that creators restart are restarted when they fall.
+    With ``restarts``, components of the types that creators restart are restarted after a crash.
     """
 
     accepts = PlacerQuestion

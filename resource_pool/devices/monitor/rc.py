@@ -1,6 +1,7 @@
-"""RC of a video monitor behind a tuned receiver: all that is on its frequency, for people.
+"""RC of a video monitor behind a tuned receiver: shows people every picture on its frequency.
 
-It needs no framegrabber, so a person who watches keeps none from a behavior. Its holder's console shows the pictures.
+A monitor needs no framegrabber, so a watching person leaves the framegrabbers to behaviors. The holder's console shows
+the pictures.
 
 Source: RAM 2002, "Examples of ARCs and RCs".
 """
@@ -12,7 +13,7 @@ from resource_pool.rcs.framegrabber import Framegrabber
 
 
 class Monitor(Framegrabber):
-    """Shows its frequency as it is: people recognize snow, interference and another robot's picture."""
+    """Delivers every picture: people recognize snow, interference and another robot's picture by themselves."""
 
     def is_wanted(self, picture: Picture, expected: str) -> bool:  # noqa: ARG002
         """Return True."""

@@ -2,8 +2,8 @@
 
 Rules:
 
-* It pans at ``PAN_RAD_S``. A halt or safe packet stops it where it looks then.
-* Without a packet for ``COMMAND_TIMEOUT_S`` its transmitter goes off and it stops.
+* It pans at ``PAN_RAD_S``. A halt or safe packet stops the pan motor at its present angle.
+* If no packet arrives for ``COMMAND_TIMEOUT_S``, the transmitter switches off and the pan motor stops.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _LOOK = struct.Struct("!cf")
 
 
 def encode_look(pan_rad: float) -> bytes:
-    """Return the packet that turns the camera there, to the left is positive."""
+    """Return the packet that turns the camera to this angle; left is positive."""
     return _LOOK.pack(b"L", pan_rad)
 
 
@@ -45,7 +45,7 @@ class PanCamera:
 
     @property
     def motors(self) -> float:
-        """Whether it pans, which disturbs its picture, 0 or 1."""
+        """1 while the camera pans, else 0; panning disturbs its picture."""
         return float(self._asked_rad != self._pan_rad)
 
     def hear(self, payload: bytes, now_s: float) -> None:
@@ -58,7 +58,7 @@ class PanCamera:
             self._heard, self._heard_s = self._heard + 1, now_s
 
     def controls(self, now_s: float) -> dict[str, float]:
-        """Advance to this time and return where the pan motor shall be."""
+        """Advance to this time and return the target angle of the pan motor."""
         past_s, self._now_s = now_s - self._now_s, now_s
         if (self.motors or self.frequency) and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
             self._timeouts += 1
@@ -69,13 +69,13 @@ class PanCamera:
         return {"pan": self._pan_rad}
 
     def counts(self) -> dict[str, int]:
-        """Return packets obeyed and ignored, and how often silence stopped it."""
+        """Return the numbers of packets obeyed, packets ignored and stops by the watchdog."""
         return {"heard": self._heard, "malformed": self._malformed, "timeouts": self._timeouts}
 
     def _obey(self, payload: bytes) -> None:
         if payload[:1] == b"L":
             _, asked_rad = _LOOK.unpack(payload)
-            if not -MOST_PAN_RAD <= asked_rad <= MOST_PAN_RAD:  # no number either
+            if not -MOST_PAN_RAD <= asked_rad <= MOST_PAN_RAD:  # NaN is rejected, too
                 raise MalformedPacket(f"it cannot look to {asked_rad} rad")
             self._asked_rad = asked_rad
             return

@@ -1,4 +1,4 @@
-"""RC of a camera on a stand, which sends video and pans, if it has a motor."""
+"""RC of a camera on a stand: sends video, and pans if it has a motor."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from resource_pool.rcs.robot import RobotParameters, RobotRc
 
 
 class Look(Command, frozen=True):
-    """Turn there and stay.
+    """Turn the camera to this angle and keep it there.
 
     Attributes:
         pan_rad: From straight ahead; to the left is positive.
@@ -30,7 +30,7 @@ class PanProtocol(SimulatedRobotProtocol):
     """Encodes the packets of a camera that pans."""
 
     def look(self, pan_rad: float) -> bytes:
-        """Return the packet that turns the camera there."""
+        """Return the packet that turns the camera to this angle."""
         return encode_look(pan_rad)
 
 
@@ -50,7 +50,7 @@ class VideoCamera(RobotRc[RobotParameters]):
     _protocol: PanProtocol
 
     async def obey(self, hold: Hold, order: Command) -> Mapping[str, float]:
-        """Look, halt, or switch the transmitter."""
+        """Turn the camera, halt, or switch the transmitter."""
         if not isinstance(order, Look):
             return await super().obey(hold, order)
         values = clipped(order, self.limits)

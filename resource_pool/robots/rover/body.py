@@ -1,16 +1,16 @@
-"""The rover's on-board program: wheels, gripper, bumpers and what it says of itself.
+"""The rover's on-board program: wheels, gripper, bumpers and status replies.
 
 Rules:
 
-* Speeds are clipped and change no faster than the motors may; a stop brakes harder than a start accelerates.
-* Reflex: a bumper pressed in front while it drives forward, or shall, stops all forward motion at once. It stays so
-  until a packet asks for anything but forward. Turning and backing off stay possible.
-* Without a packet for ``COMMAND_TIMEOUT_S`` the wheels stop and the transmitter goes off; the gripper keeps its grip.
-  So it does at halt and safe. A stop packet stops the gripper, too, as it is.
-* With an empty battery it hears and answers nothing, its wheels are not driven, its transmitter is off; the gripper's
-  screws hold by themselves.
+* Speeds are clipped, and change at limited rates; braking is harder than acceleration.
+* Reflex: if a front bumper is pressed while the rover drives forward or is about to, all forward motion stops at once.
+  Forward motion stays blocked until a packet requests another motion. Turning and backing off stay possible.
+* If no packet arrives for ``COMMAND_TIMEOUT_S``, the wheels stop and the transmitter switches off; the gripper keeps
+  its grip, as it does at halt and safe. A stop packet also stops the gripper in its present place.
+* With an empty battery the rover receives and answers nothing, its wheels are not driven and its transmitter is off;
+  the gripper's screws hold without power.
 
-Size, mass and payload are those of a Pioneer 2-DX's data sheet, sonars those of Stage's ``pioneer.inc``.
+Sources: data sheet of the Pioneer 2-DX for size, mass and payload; Stage's ``pioneer.inc`` for the sonars.
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ TRACK_M = 0.343  # chosen: the wheels' outsides are 38 cm apart, the width of th
 TOP_M_S = 1.5  # chosen: a person's brisk walk, what robots of this class reach
 TOP_RAD_S = 2.6  # chosen: 150 degrees a second, on the spot without slipping
 ACCELERATION_M_S2 = 1.0  # chosen: a load on the deck stays where it is
-BRAKING_M_S2 = 2.0  # chosen: from top speed it stands after 0.6 m; the caster keeps its load
+BRAKING_M_S2 = 2.0  # chosen: stops from top speed within 0.6 m, and the caster stays loaded
 TURN_RAD_S2 = 4.0  # chosen: to full turn in two thirds of a second
-TORQUE_LIMIT_N_M = 4.0  # chosen: carries 20 kg up a slope of 10 degrees
-PADDLES_M = 0.10  # chosen: way of each paddle; they open 21 cm
-LIFT_M = 0.10  # chosen: way of the lift; a lifted paddle is below the sonars
+TORQUE_LIMIT_N_M = 4.0  # chosen: drives up a slope of 10 degrees with 20 kg
+PADDLES_M = 0.10  # chosen: travel of each paddle; together they open 21 cm
+LIFT_M = 0.10  # chosen: travel of the lift; a lifted paddle is below the sonars
 PADDLES_M_S = 0.05  # chosen: closes in two seconds
 LIFT_M_S = 0.02  # Pioneer Gripper manual: approximately two centimeters per second of travel
-HOLDING_N = 10.0  # chosen: a third of what the paddles' drive can; moving freely takes far less
+HOLDING_N = 10.0  # chosen: a third of the paddle drive's maximum; free motion needs far less
 NEAREST_CM = 10  # Stage's pioneer.inc: from 0.1 m
 SPRINGS_S2 = 986.96  # stiffness over mass of the accelerometer's springs, (2 pi 5 Hz) squared, as in body.xml
 BATTERY_J = 252 * 3600.0  # chosen: three batteries of 12 V and 7 Ah, as robots of this class carry
 CONSUMPTION = Consumption(
     idle_w=12.0,  # chosen: with three batteries a robot of this class stands for most of a day
-    transmitter_w=2.0,  # chosen: a stronger one than a Scout's
+    transmitter_w=2.0,  # chosen: stronger than a Scout's
     motors_w=60.0,  # chosen: two motors of 30 W
 )
 
@@ -69,11 +69,11 @@ _FELT_NOTHING: dict[str, Sequence[float]] = {
 
 
 class Rover:
-    """A Pioneer 2-class rover: stands, transmitter off, gripper open and down at the beginning."""
+    """A Pioneer 2-class rover; at the beginning it stands, transmitter off, gripper open and down."""
 
     def __init__(self) -> None:
         self.battery = Battery(BATTERY_J)
-        """What it lives on."""
+        """The battery."""
         self._asked = _STAND
         self._forward_m_s = self._turn_rad_s = 0.0
         self._grip = GripPacket(0.0, 0.0)
@@ -96,7 +96,7 @@ class Rover:
 
     @property
     def motors(self) -> float:
-        """How hard its motors are driven, 0 to 1."""
+        """Load of its motors, 0 to 1."""
         return min(1.0, max(abs(self._forward_m_s) / TOP_M_S, abs(self._turn_rad_s) / TOP_RAD_S))
 
     def hear(self, payload: bytes, now_s: float) -> None:
@@ -131,11 +131,11 @@ class Rover:
                 assert_never(packet)
 
     def feel(self, readings: Mapping[str, Sequence[float]], now_s: float) -> None:  # noqa: ARG002 - of the protocol
-        """Take the newest readings of all its sensors."""
+        """Record the newest readings of all sensors."""
         self._readings = readings
 
     def controls(self, now_s: float) -> dict[str, float]:
-        """Advance watchdog, reflex and ramps to this time and return what the actuators shall do."""
+        """Advance watchdog, reflex and ramps to this time and return the actuator controls."""
         past_s, self._now_s = now_s - self._now_s, now_s
         if self.battery.is_empty(now_s):
             self._switch_off()
@@ -153,14 +153,14 @@ class Rover:
         }
 
     def reply(self, now_s: float) -> bytes:
-        """Return its state if it obeyed a packet since its last answer; else nothing."""
+        """Return the rover's state as a packet; empty if it obeyed no packet since its last answer."""
         if self._answered == self._heard or self.battery.is_empty(now_s):
             return b""
         self._answered = self._heard
         return encode_reply(self._state(now_s))
 
     def counts(self) -> dict[str, int]:
-        """Return packets obeyed and ignored, and how often watchdog and reflex stopped it."""
+        """Return the numbers of packets obeyed and ignored, and of stops by watchdog and reflex."""
         return {
             "heard": self._heard,
             "malformed": self._malformed,
@@ -232,10 +232,10 @@ def _clip(number: float, most: float) -> float:
 
 
 def _towards(now: float, wanted: float, most: float) -> float:
-    """Return where a quantity is that moves towards another by no more than this."""
+    """Return the value moved towards the target by at most this step."""
     return wanted if abs(wanted - now) <= most else now + (most if wanted > now else -most)
 
 
 def _sonar_cm(range_m: float) -> int:
-    """Return what a sonar reports; a ray that meets nothing within reach reads less than 0."""
+    """Return a sonar's distance in cm; a negative reading means that the ray met nothing within range."""
     return MOST_CM if range_m < 0.0 else max(NEAREST_CM, min(MOST_CM, round(100 * range_m)))

@@ -1,13 +1,13 @@
-"""The rover's packets: what it understands and answers, as bytes.
+"""The rover's packets: encoding and decoding of commands and replies.
 
-One byte says which command it is, then come its values in network byte order:
+A packet is one byte for the command, followed by the command's values in network byte order:
 
 * ``M`` move: two 16-bit integers, forward in mm/s and turn in mrad/s, to the left is positive
-* ``G`` grip: two bytes, how far the paddles are closed and the lift is up, 255 is all the way
-* ``Q`` stop: nothing more
+* ``G`` grip: two bytes, closing of the paddles and height of the lift; 255: closed, up
+* ``Q`` stop: no values
 * halt, safe, transmitter on and off: as in ``scout_model.radio_link``
 
-Its answer is ``R`` and 38 bytes. Network id and check sum are the radio's business, as they are for every robot.
+The reply is ``R`` and 38 bytes. The radio adds network id and check sum, as for every robot.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class MovePacket:
 
 @dataclass(frozen=True, slots=True)
 class GripPacket:
-    """Move paddles and lift there.
+    """Move paddles and lift to these positions.
 
     Attributes:
         closed: 0, open, to 1, closed.
@@ -64,7 +64,7 @@ class StopPacket:
 
 @dataclass(frozen=True, slots=True)
 class Bumpers:
-    """Which of its bumpers are pressed: in front, at the tips of the paddles, behind."""
+    """Bumpers that are pressed: in front, at the tips of the paddles, at the rear."""
 
     front: bool
     left_tip: bool
@@ -74,17 +74,18 @@ class Bumpers:
 
 @dataclass(frozen=True, slots=True)
 class RoverReply:
-    """What the rover answers.
+    """The rover's reply.
 
     Attributes:
         battery: Charge of its battery, 0 to 1.
-        left_m: Way of its left wheel since it was switched on, from the wheel's encoder; backward is negative.
-        right_m: Way of its right wheel.
-        sonars_cm: Distance that each sonar measures, from left to right; ``MOST_CM`` is that or more.
-        bumpers: Which are pressed.
-        is_blocked: Whether a bumper in front stopped it, and no packet asked for anything but forward since.
-        gyroscope_rad_s: How fast it turns about forward, left and up.
-        acceleration_m_s2: What its accelerometer measures forward and to the left.
+        left_m: Way of the left wheel since power-on, by the wheel's encoder; backward is negative.
+        right_m: Way of the right wheel.
+        sonars_cm: Distance measured by each sonar, from left to right; ``MOST_CM`` means this distance or more.
+        bumpers: Bumpers that are pressed.
+        is_blocked: True if a front bumper stopped the rover, and no packet has requested another motion than forward
+            since.
+        gyroscope_rad_s: Angular velocity about forward, left and up.
+        acceleration_m_s2: Measured acceleration forward and to the left.
         closed: How far the paddles are closed, 0 to 1.
         lift: How far the lift is up, 0 to 1.
         is_holding: Whether something keeps the paddles from closing further.
@@ -130,10 +131,10 @@ def encode(packet: Packet) -> bytes:
 
 
 def decode(payload: bytes) -> Packet:
-    """Return what the packet says.
+    """Decode a packet to the rover.
 
     Raises:
-        MalformedPacket: The bytes are no packet of the rover's.
+        MalformedPacket: The bytes are not a packet to a rover.
 
     Example:
         >>> decode(encode(MovePacket(0.5, -1.0)))
@@ -155,10 +156,11 @@ def decode(payload: bytes) -> Packet:
 
 
 def encode_reply(reply: RoverReply) -> bytes:
-    """Return the answer as bytes, its numbers rounded to what a field holds; what is too large becomes its largest.
+    """Return the reply as bytes; numbers are rounded to their field's resolution and clipped to its range.
 
     Raises:
-        MalformedPacket: A share is none, a sonar's distance does not fit, or there are not ``SONARS`` of them.
+        MalformedPacket: A share is outside 0 to 1, a sonar's distance is out of range, or their number is not
+            ``SONARS``.
     """
     if len(reply.sonars_cm) != SONARS or not all(0 <= range_cm <= MOST_CM for range_cm in reply.sonars_cm):
         raise MalformedPacket(f"{reply.sonars_cm} are no {SONARS} distances of 0 to {MOST_CM} cm")
@@ -180,10 +182,10 @@ def encode_reply(reply: RoverReply) -> bytes:
 
 
 def decode_reply(payload: bytes) -> RoverReply:
-    """Return what the rover answered.
+    """Decode a reply of the rover.
 
     Raises:
-        MalformedPacket: The bytes are no answer of a rover.
+        MalformedPacket: The bytes are not a reply of a rover.
     """
     if payload[:1] != b"R" or len(payload) != _REPLY.size:
         raise MalformedPacket(f"{len(payload)} bytes that begin with {payload[:1]!r} are no answer of a rover")
@@ -218,7 +220,7 @@ def _clipped(number: int) -> int:
 
 
 def _wrapped(number: int) -> int:
-    """Return the number as a 32-bit counter shows it, which begins anew after 2000 km."""
+    """Return the number as a 32-bit counter shows it; the counter wraps around after 2000 km."""
     return (number + (1 << 31)) % (1 << 32) - (1 << 31)
 
 

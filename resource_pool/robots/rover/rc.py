@@ -1,7 +1,7 @@
 """RC of a rover: speeds, gripper, video transmitter.
 
-In its safe state wheels and transmitter are off, and the gripper keeps its grip. An operator's stop stops the gripper,
-too.
+In the safe state wheels and transmitter are off, and the gripper keeps its grip. An operator's stop also stops the
+gripper.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scout_model.errors import MalformedPacket
 
 
 class Grip(Command, frozen=True):
-    """Move paddles and lift there, and keep them there.
+    """Move paddles and lift to these positions, and keep them there.
 
     Attributes:
         closed: How far the paddles are closed, 0 to 1.
@@ -38,18 +38,18 @@ class Grip(Command, frozen=True):
 
 
 class RoverProtocol(SimulatedRobotProtocol):
-    """Encodes the rover's packets; the ``protocol`` of its resource in the mission file."""
+    """Encodes the rover's packets. The mission file names this class as ``protocol`` of the resource."""
 
     def move(self, forward_m_s: float, turn_rad_s: float) -> bytes:
         """Return the packet for these speeds."""
         return encode(MovePacket(forward_m_s, turn_rad_s))
 
     def grip(self, closed: float, lift: float) -> bytes:
-        """Return the packet for these places of paddles and lift."""
+        """Return the packet for these positions of paddles and lift."""
         return encode(GripPacket(closed, lift))
 
     def read(self, payload: bytes) -> RoverReport:
-        """Return the rover's reply; see ``ReplyReader``."""
+        """Decode the rover's reply; see ``ReplyReader``."""
         try:
             return report_of(payload)
         except MalformedPacket as error:

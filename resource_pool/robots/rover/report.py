@@ -1,4 +1,4 @@
-"""What the rover reports: its answer on the radio as single values, so that each is a gauge."""
+"""The rover's report: its radio reply as single values, one for each gauge."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ class RoverReport(Message, frozen=True):
         battery_share: Charge of its battery, 0 to 1.
         closed: How far the paddles are closed, 0 to 1.
         lift: How far the lift is up, 0 to 1.
-        is_holding: Something keeps the paddles from closing further.
-        is_blocked: A bumper in front stopped it; back off or turn.
+        is_holding: True if something keeps the paddles from closing further.
+        is_blocked: True if a front bumper stopped the rover; back off or turn.
         front_bumper: Pressed.
         left_tip: Bumper at the tip of the left paddle, pressed.
         right_tip: The same of the right paddle.
         rear_bumper: Pressed.
-        left_wheel_m: Way of its left wheel since it was switched on; backward is negative.
-        right_wheel_m: Way of its right wheel.
-        roll_rad_s: How fast it turns about forward.
+        left_wheel_m: Way of the left wheel since power-on; backward is negative.
+        right_wheel_m: Way of the right wheel.
+        roll_rad_s: Angular velocity about forward.
         pitch_rad_s: About left.
         yaw_rad_s: About up.
         forward_m_s2: Acceleration forward.
         left_m_s2: Acceleration to the left.
-        sonar_0_m: Distance that the leftmost sonar measures; the largest means that or more.
+        sonar_0_m: Distance measured by the leftmost sonar; the largest value means this distance or more.
         sonar_1_m: The next one to the right.
         sonar_2_m: The next one to the right.
         sonar_3_m: Nearly straight ahead, on the left.
@@ -38,8 +38,8 @@ class RoverReport(Message, frozen=True):
         sonar_5_m: The next one to the right.
         sonar_6_m: The next one to the right.
         sonar_7_m: The rightmost.
-        way_m: Way of its middle since it was switched on, by its wheels; backward is negative.
-        turned_rad: Its turn since then, by its wheels; left is positive.
+        way_m: Way of the rover's middle since power-on, by wheel odometry; backward is negative.
+        turned_rad: Turn since power-on, by wheel odometry; left is positive.
     """
 
     battery_share: Share
@@ -71,10 +71,10 @@ class RoverReport(Message, frozen=True):
 
 
 def report_of(payload: bytes) -> RoverReport:
-    """Return what the rover answered.
+    """Return the report in the rover's reply.
 
     Raises:
-        MalformedPacket: The bytes are no answer of a rover.
+        MalformedPacket: The bytes are not a reply of a rover.
     """
     reply = decode_reply(payload)
     bumpers = reply.bumpers

@@ -1,8 +1,8 @@
 """A walking robot with four legs and twelve servos, the size of a small AIBO: 0.28 m long, 0.2 m high, 2.1 kg.
 
-``body`` is its body and its on-board program, a servo board; ``link`` its packets. The motion control (``motion``)
-works off board: a request of forward and turning speed becomes foot curves (``gait``), these become joint targets
-(``kinematics``), fifty times a second; the newest go to the board twenty times a second.
+``body`` has the body and the on-board program (a servo board); ``link`` has the packets. The motion control
+(``motion``) runs off board. Fifty times a second it turns the requested speeds into foot curves (``gait``), and these
+into joint targets (``kinematics``). The newest targets go to the board twenty times a second.
 
 The gait follows Hengst, Ibbotson, Pham, Sammut, "Omnidirectional Locomotion for Quadruped Robots", RoboCup 2001, and
 the MotionControl of Petters, Thomas, von Stryk, RoboFrame, 2006, section IV.

@@ -1,6 +1,6 @@
 """ARC kinds of a walker: drive it, or drive it and capture its video.
 
-At a period of 100 ms instead of 50 the trot keeps two thirds of its speed.
+If the packet period is 100 ms instead of 50 ms, the trot keeps two thirds of its speed.
 """
 
 from __future__ import annotations

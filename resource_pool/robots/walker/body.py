@@ -1,14 +1,14 @@
-"""The walker's on-board program: a servo board that hears joint targets and reports what its sensors read.
+"""The walker's on-board program: a servo board that receives joint targets and reports sensor readings.
 
 Rules:
 
-* A packet that is none changes nothing, also not the watchdog.
+* A malformed packet changes nothing and does not reset the watchdog.
 * Between packets the board moves each joint evenly to its target, never faster than its servo.
-* The world asks for controls thirty times a second, which suffices: with targets interpolated for each of the 240 steps
-  of the physics the trot was no faster and tilted no less. Packets suffice at 15 to 30 a second; at ten, the trot keeps
+* The world asks for controls thirty times a second. That is enough: with targets interpolated for each of the 240
+  physics steps, the trot was no faster and tilted no less. 15 to 30 packets a second are enough; at ten, the trot keeps
   two thirds of its speed.
 * Halt, safe and half a second without a packet bring the legs to the standing posture; the last two also switch the
-  transmitter off. A standing walker's controls are all zero, so that the world lets it sleep.
+  transmitter off. While the walker stands, all controls are zero, so that the world can put it to sleep.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from scout_model.dimensions import COMMAND_TIMEOUT_S, FRAMES_PER_S
 from scout_model.errors import MalformedPacket
 from scout_model.radio_link import HaltPacket, Safe, TransmitterOff, TransmitterOn
 
-SERVO_SPEED_LIMIT_RAD_S = 8.0  # chosen: a quick hobby servo; with 5 the trot is a tenth slower, without limit no faster
+SERVO_SPEED_LIMIT_RAD_S = 8.0  # chosen: a fast hobby servo; with 5 the trot is a tenth slower, without limit no faster
 STAND_S = 0.3  # chosen: sets lifted feet down without a blow
 CHARGE_J = 75_000.0  # chosen: 7.2 V and 2.9 Ah, the size of an AIBO's battery
 IDLE_W = 4.0  # chosen: computer, camera, radio
 SERVOS_W = 20.0  # chosen: with all servos at full speed; empty after two hours of trot, five of standing
-TICK_S = 1 / FRAMES_PER_S  # the world's
+TICK_S = 1 / FRAMES_PER_S  # the world's frame
 MOST_WAY_RAD = SERVO_SPEED_LIMIT_RAD_S * TICK_S
 STANDING: Angles = (0.0,) * len(JOINTS)
 
 
 class Walker:
-    """A four-legged robot's program; stands with its transmitter off and a full battery in the beginning."""
+    """A four-legged robot's program; at the beginning the robot stands, transmitter off, battery full."""
 
     def __init__(self) -> None:
         self._frequency = ""
@@ -65,11 +65,11 @@ class Walker:
 
     @property
     def motors(self) -> float:
-        """How fast its servos move on average, 0 to 1 of their limit."""
+        """Average speed of its servos, 0 to 1 of their limit."""
         return self._motors
 
     def counts(self) -> dict[str, int]:
-        """Return packets obeyed, packets ignored because they were none, and the watchdog's interventions."""
+        """Return the numbers of packets obeyed, malformed packets and interventions of the watchdog."""
         return {"heard": self._heard, "malformed": self._malformed, "timeouts": self._timeouts}
 
     def hear(self, payload: bytes, now_s: float) -> None:
@@ -109,7 +109,7 @@ class Walker:
         return dict(zip(JOINTS, self._driven_rad, strict=True))
 
     def feel(self, readings: Mapping[str, Sequence[float]], now_s: float) -> None:  # noqa: ARG002  # as reply
-        """Take the newest reading of each sensor of the body, by the sensor's name."""
+        """Record the newest reading of each sensor of the body, by the sensor's name."""
         self._has_felt = True
         self._tilt_rad = _tilt_rad(*readings["attitude"])
         self._turn_rad_s = float(readings["gyro"][2])
@@ -117,7 +117,7 @@ class Walker:
         self._on_floor = tuple(readings[f"{leg}_foot"][0] > 0.0 for leg in LEGS)
 
     def reply(self, now_s: float) -> bytes:  # noqa: ARG002  # the robots' common signature
-        """Return its status as a packet; empty before it has felt anything."""
+        """Return the walker's status as a packet; empty before the first sensor readings."""
         if not self._has_felt:
             return b""
         battery = self._charge_j / CHARGE_J
@@ -130,7 +130,7 @@ class Walker:
         self._aim(STANDING, now_s + STAND_S)
 
     def _move(self, left_s: float) -> None:
-        """Drive the joints to where they shall be after the coming tick, on their way to arrive in the time left."""
+        """Set the joints' targets for the next tick, so that the joints arrive evenly within the time left."""
         share = TICK_S / left_s if left_s > TICK_S else 1.0
         before_rad = self._driven_rad
         self._driven_rad = tuple(
@@ -149,5 +149,5 @@ def _tilt_rad(w: float, x: float, y: float, z: float) -> tuple[float, float]:
 
 
 def _approach(driven_rad: float, wanted_rad: float) -> float:
-    """Return the wanted angle, or how far a servo gets towards it in a tick."""
+    """Return the wanted angle, or the nearest angle that the servo can reach in one tick."""
     return max(driven_rad - MOST_WAY_RAD, min(driven_rad + MOST_WAY_RAD, wanted_rad))

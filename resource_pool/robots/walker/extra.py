@@ -1,4 +1,4 @@
-"""The extra ``walker``: what the motion control needs beyond the dependencies of every mission."""
+"""The extra ``walker``: additional dependencies of the motion control."""
 
 from __future__ import annotations
 

@@ -1,16 +1,16 @@
-"""Gait: from a request, forward and turning speed, to the foot positions of a trot or a walk.
+"""Gait: computes the foot positions of a trot or a walk from the requested forward and turning speed.
 
-Each foot goes round a closed curve: on the floor it moves straight back as fast as the trunk shall move forward (on a
-circle if the trunk shall turn), in the air it returns over a hump. A gait is the curve's parameters and the phases at
-which the four feet go round it.
+Each foot follows a closed curve. On the floor it moves straight back at the trunk's forward speed (on a circle if the
+trunk turns); in the air it returns along a hump. A gait consists of the curve's parameters and the phases of the four
+feet.
 
 Rules of this file:
 
 * Feet are positions of the feet's middles in the trunk's frame: x forward, y left, z up, origin between the hips.
-* A request never moves a foot by itself. Speed and lift change at limited rates, and all curves meet in the standing
+* A request never makes a foot jump. Speed and lift change at limited rates, and all curves meet in the standing
   posture, so that start, stop and change are smooth at any phase.
 * A foot has the floor's speed when it lifts off and when it touches down.
-* While the gait rests, its feet are ``STANDING``, bit for bit.
+* While the gait rests, its feet are exactly ``STANDING``.
 
 Source: Hengst, Ibbotson, Pham, Sammut, "Omnidirectional Locomotion for Quadruped Robots", RoboCup 2001: each foot
 treads as a wheel would that is steered for the wanted motion; Petters, Thomas, von Stryk, RoboFrame, 2006, section IV:
@@ -34,10 +34,10 @@ Foot = tuple[float, float, float]
 Feet = tuple[Foot, Foot, Foot, Foot]
 
 MAX_FORWARD_M_S = 0.3  # measured: at 0.35 one of thirty disturbed walks ended with a fall, here none
-MAX_TURN_RAD_S = 1.8  # chosen: the feet are then as fast as at two thirds of the forward limit
+MAX_TURN_RAD_S = 1.8  # chosen: the feet then have two thirds of their speed at the forward limit
 ACCELERATION_M_S2 = 0.8  # chosen: full speed after one period of the trot
 TURN_ACCELERATION_RAD_S2 = 5.0  # chosen: same
-RISE_S = 0.25  # chosen: each foot's first step is lower than its second
+RISE_S = 0.25  # chosen: so each foot's first step is lower than its second
 
 
 class ImpossibleGait(Refusal):
@@ -56,7 +56,7 @@ class ImpossibleMove(Refusal):
 
 @dataclass(frozen=True, slots=True)
 class TrunkSpeed:
-    """A wanted or expected motion of the trunk; turning left is positive."""
+    """A requested or expected motion of the trunk; turning left is positive."""
 
     forward_m_s: float = 0.0
     turn_rad_s: float = 0.0
@@ -64,18 +64,18 @@ class TrunkSpeed:
 
 @dataclass(frozen=True, slots=True)
 class GaitParameters:
-    """One gait. The defaults are measured: of some 300 gaits tried, the one that kept speed and direction best.
+    """Parameters of a gait. The defaults are the best in speed and direction of some 300 gaits that were measured.
 
     Attributes:
-        period_s: Time of one round of a foot.
-        duty: Share of the period that a foot is on the floor.
+        period_s: Duration of one cycle of a foot.
+        duty: Share of the period during which a foot is on the floor.
         lift_m: Height of the hump.
         height_m: From the hips down to the feet on the floor.
         half_length_m: From the trunk's middle forward to the front feet, and back to the hind feet.
         half_width_m: From the trunk's middle to the feet of one side.
-        lead_s: By how much the feet's targets are ahead of the wanted motion on the floor, because servos lag.
-        longest_stride_m: Longest way of a foot on the floor; faster requests are slowed down.
-        sway_m: How far the hips swing to each side, once in a round.
+        lead_s: Time by which the feet's targets lead the wanted motion on the floor, because servos lag.
+        longest_stride_m: Longest way of a foot on the floor; a request that needs more is slowed down.
+        sway_m: Amplitude of the hips' sideways swing, once per cycle.
         sway_phase: Phase at which the hips are farthest to the right, 0 to 1.
         phases: Phase at which each of ``LEGS`` touches down, 0 to 1.
 
@@ -107,7 +107,7 @@ class GaitParameters:
         "sway_m": (0.0, 0.025),
         "sway_phase": (0.0, 1.0),
     }
-    """Legal values of each number; the legs reach all feet that they allow."""
+    """Limits of each number; within them the legs can reach every foot position."""
 
     def __post_init__(self) -> None:
         for name, (least, most) in self.RANGES.items():
@@ -119,7 +119,7 @@ class GaitParameters:
 
 
 TROT = GaitParameters()
-"""Diagonal legs together; the faster one."""
+"""Trot: diagonal legs move together; faster than the walk."""
 WALK = GaitParameters(
     period_s=0.8,
     duty=0.82,
@@ -130,7 +130,7 @@ WALK = GaitParameters(
 )
 """One foot in the air at a time: hind left, front left, hind right, front right; the hips over the other three.
 
-It is slow and steady.
+This gait is slow and steady.
 """
 
 STANDING: Feet = (
@@ -143,7 +143,7 @@ STANDING: Feet = (
 
 
 def clip(move: TrunkSpeed, gait: GaitParameters) -> TrunkSpeed:
-    """Return the motion the gait really makes of a request: the same curve, slower where it would be too fast.
+    """Return the motion that the gait makes for a request: the same curve, slower if the request is too fast.
 
     Raises:
         ImpossibleMove: A speed is not finite.
@@ -163,16 +163,16 @@ def clip(move: TrunkSpeed, gait: GaitParameters) -> TrunkSpeed:
 
 
 class Gait:
-    """The feet of one walker; at rest in the beginning."""
+    """The feet of one walker; at rest at the beginning."""
 
     def __init__(self, parameters: GaitParameters = TROT) -> None:
         self.parameters = parameters
         self.commanded = TrunkSpeed()
         """The last request, clipped."""
         self.expected = TrunkSpeed()
-        """The motion that the feet now make."""
+        """The motion that results from the feet now."""
         self.phase = 0.0
-        """Where in its round the gait is, 0 to 1."""
+        """Phase of the gait, 0 to 1."""
         self._rise = 0.0
 
     @property
@@ -189,7 +189,7 @@ class Gait:
         self.commanded = clip(move, self.parameters)
 
     def advance(self, elapsed_s: float) -> Feet:
-        """Return the feet this much later.
+        """Advance by this time and return the feet.
 
         Args:
             elapsed_s: Time since the last call, not negative.
@@ -241,9 +241,9 @@ def _chord_of_arc(angle_rad: float) -> float:
 
 
 def _round(phase: float, duty: float) -> tuple[float, float]:
-    """Return where on its round a foot is: from 0.5 in front to -0.5 behind, and its height, 0 to 1.
+    """Return a foot's place in its cycle: 0.5 in front to -0.5 behind, and its height, 0 to 1.
 
-    The way in the air is the cubic that begins and ends with the speed of the way on the floor.
+    In the air the foot follows the cubic whose speed at both ends equals the speed on the floor.
     """
     if phase < duty:
         return 0.5 - phase / duty, 0.0

@@ -1,11 +1,11 @@
-"""Inverse kinematics: from the positions of four feet to twelve joint angles, by ``mink``.
+"""Inverse kinematics: computes twelve joint angles from the positions of four feet, by ``mink``.
 
-The body's MJCF is the only source of the legs' geometry and of the joints' ranges. A foot out of reach gets the
-nearest legal posture.
+The body's MJCF is the only source of the legs' geometry and of the joints' ranges. If a foot's position is out of
+reach, the leg takes the nearest legal posture.
 
-Why mink in the loop, and no closed form: of the 20 ms between two steps at 50 Hz it takes 0.3 ms of a processor on
-average, 0.6 ms in 99 of 100 steps, 3 ms at worst, and nothing while the walker stands. It loads scipy, qpsolvers and
-daqp besides MuJoCo: 0.4 s and 80 MB in all, which the motion control's own process can afford.
+Why mink in the loop, and no closed form: a step at 50 Hz has 20 ms. Mink takes 0.3 ms of processor time on average, at
+most 0.6 ms in 99 of 100 steps, 3 ms at worst, and nothing while the walker stands. Besides MuJoCo it loads scipy,
+qpsolvers and daqp: 0.4 s and 80 MB in all. The motion control has its own process, which can afford that.
 
 Source: https://github.com/kevinzakka/mink, differential inverse kinematics as a quadratic program.
 """
@@ -22,17 +22,17 @@ from resource_pool.robots.walker.link import JOINTS, Angles
 
 try:
     import mink
-except ImportError as error:  # an extra; before a mission starts, its check says what is missing
+except ImportError as error:  # an extra; the check before the start of a mission reports it if it is missing
     raise NoMink(f"the motion control of a walker needs mink: {error}") from error
 
 TOLERANCE_M = 1e-4  # chosen: a hundredth of a foot
-MOST_ROUNDS = 4  # chosen: from one step of the motion control to the next two suffice
+MOST_ROUNDS = 4  # chosen: two suffice between successive steps of the motion control
 _DAMPING = 1e-8  # chosen: far below the tasks' costs; keeps a stretched leg's solution finite
 _ROUND_S = 1.0  # any: rounds are displacements
 
 
 class Kinematics:
-    """The legs of a walker whose trunk is held; begins in the standing posture."""
+    """The legs of a walker with a fixed trunk; begins in the standing posture."""
 
     def __init__(self) -> None:
         spec = mujoco.MjSpec.from_string(Walker.body_mjcf())

@@ -1,6 +1,6 @@
-"""The walker's packets on the digital link: joint targets to it, and its status back.
+"""The walker's packets on the digital link: joint targets to the walker, status from it.
 
-A packet is one byte that says which command it is, then the command's values in network byte order:
+A packet is one byte for the command, followed by the command's values in network byte order:
 
 * ``Q`` joint targets: time in which the joints shall arrive, one byte in units of 4 ms; twelve 16-bit joint angles in
   units of 1e-4 rad, in the order of ``JOINTS``
@@ -9,7 +9,7 @@ A packet is one byte that says which command it is, then the command's values in
   turning speed, 16 bits in units of 1e-3 rad/s; one byte with a bit for each foot on the floor, in the order of
   ``LEGS``, the first is the lowest
 
-Network id and check sum are the radio's business and stand outside of the payload.
+The radio adds network id and check sum outside of the payload.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class JointTargets:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What the walker reports.
+    """The walker's status.
 
     Attributes:
         battery: Share of its charge that is left, 0 to 1.
@@ -100,10 +100,10 @@ def encode_status(status: Status) -> bytes:
 
 
 def decode(payload: bytes) -> Packet:
-    """Return what a packet to the walker says.
+    """Decode a packet to the walker.
 
     Raises:
-        MalformedPacket: The bytes are no packet, or one that a walker does not understand.
+        MalformedPacket: The bytes are not a packet to a walker.
     """
     if payload[:1] == b"Q":
         ticks, *units = _unpack(_TARGETS, payload)
@@ -115,10 +115,10 @@ def decode(payload: bytes) -> Packet:
 
 
 def decode_status(payload: bytes) -> Status:
-    """Return what the walker replied.
+    """Decode a reply of the walker.
 
     Raises:
-        MalformedPacket: The bytes are no status.
+        MalformedPacket: The bytes are not a status.
     """
     if payload[:1] != b"T":
         raise MalformedPacket(f"no status begins with {payload[:1]!r}")

@@ -1,6 +1,7 @@
 """Motion control of a walker: a request goes in, joint targets and the state of motion come out.
 
-Pure: no bus, no clock but ``now_s``, no dice. The same requests at the same times give the same targets.
+Pure: no bus, no random numbers, no clock except the argument ``now_s``. The same requests at the same times give the
+    same targets.
 
 Source: Petters, Thomas, von Stryk, RoboFrame, 2006, section IV: the MotionControl module executes requests of the
 behavior "using inverse kinematics" and "provides information on the robot's current state of motion (e.g. speed,
@@ -17,21 +18,21 @@ from resource_pool.robots.walker.kinematics import Kinematics
 from resource_pool.robots.walker.link import Angles
 
 STEP_S = 0.02  # chosen: 50 Hz, twenty steps in a period of the trot
-LONGEST_STEP_S = 0.1  # chosen: a control that was held up walks on from where it was instead of leaping
+LONGEST_STEP_S = 0.1  # chosen: after a delay the control continues from its last phase instead of leaping
 
 
 @dataclass(frozen=True, slots=True)
 class StateOfMotion:
-    """What the motion control knows without sensors.
+    """State of the motion control, computed without sensors.
 
     Attributes:
-        phase: Where in its round the gait is, 0 to 1.
+        phase: Phase of the gait, 0 to 1.
         is_resting: Whether the feet stand still.
-        commanded: The last request, clipped to what the gait can do.
-        expected: The motion that the feet now make.
+        commanded: The last request, clipped to the gait's limits.
+        expected: The motion that results from the feet now.
         x_m: Way since the beginning by dead reckoning; x is forward at the beginning.
         y_m: Same, to the left.
-        heading_rad: Same, it counts turns.
+        heading_rad: Heading relative to the beginning; full turns are counted.
         way_m: Length of that way; backward is negative.
         joints_rad: The last targets.
     """
@@ -48,7 +49,7 @@ class StateOfMotion:
 
 
 class MotionControl:
-    """The motion control of one walker; at rest in the beginning."""
+    """The motion control of one walker; at rest at the beginning."""
 
     def __init__(self, parameters: GaitParameters = TROT) -> None:
         self._gait = Gait(parameters)
@@ -66,7 +67,7 @@ class MotionControl:
         self._gait.request(move)
 
     def rest(self) -> None:
-        """Stand at once, because the legs were put down without this motion control; dead reckoning goes on."""
+        """Reset to standing, because the board has put the legs down by itself; dead reckoning continues."""
         self._gait = Gait(self._gait.parameters)
         self._stepped_s = None
         self._joints_rad = self._kinematics.joints(self._gait.advance(0.0))
@@ -75,7 +76,7 @@ class MotionControl:
         """Return the joint targets at this time, in the order of ``JOINTS``.
 
         Args:
-            now_s: Never before an earlier step's. After a gap longer than ``LONGEST_STEP_S`` only so much has passed.
+            now_s: Not earlier than the last step's. A gap longer than ``LONGEST_STEP_S`` counts as ``LONGEST_STEP_S``.
         """
         gap_s = 0.0 if self._stepped_s is None else now_s - self._stepped_s
         elapsed_s = max(0.0, min(LONGEST_STEP_S, gap_s))

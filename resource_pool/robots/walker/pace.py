@@ -1,6 +1,6 @@
-"""Pace: when the steps of a loop at a fixed rate are due, and how late they were.
+"""Pace: due times and delays of the steps of a loop at a fixed rate.
 
-Pure; times are mission seconds. A late step moves no later one; steps that are missed altogether are left out.
+Pure; times are mission seconds. A late step does not shift later steps; missed steps are skipped.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class Pace:
     def __init__(self, step_s: float) -> None:
         self._step_s = step_s
         self.due_s = 0.0
-        """When the next step is due."""
+        """Due time of the next step."""
         self.steps = 0
         self.late = 0
         """Steps that began more than half a step after they were due."""
@@ -26,11 +26,11 @@ class Pace:
         """The greatest delay of a step."""
 
     def begin(self, now_s: float) -> None:
-        """Have the next step now."""
+        """Make the next step due now."""
         self.due_s = now_s
 
     def step(self, now_s: float) -> None:
-        """Count the step that begins now, and set when the next one is due."""
+        """Count the step that begins now, and set the due time of the next step."""
         late_s = max(0.0, now_s - self.due_s)
         self.steps += 1
         self.late += late_s > self._step_s / 2

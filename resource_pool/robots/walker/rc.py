@@ -1,13 +1,13 @@
-"""RC of a walker: a request of speeds comes in, joint targets go out on the radio.
+"""RC of a walker: turns requested speeds into joint targets for the radio.
 
 Rules of this file:
 
-* From the first move on the motion control steps at its fixed rate, until the walker stands. It waits for nothing but
-  its clock: a late step is counted, and goes on from where the feet were.
-* The newest targets are loaded after each step, so that a turn of the radio, whenever it comes, sends targets that are
-  at most a step old. A slow radio gets fewer.
-* Halt and silence walk to a stand. An emergency stop and the end of the hold end the loop at once, and the walker's
-  board puts the legs down.
+* From the first move until the walker stands, the motion control steps at its fixed rate. It waits only for its clock.
+  A late step is counted, and continues from the feet's last positions.
+* The newest targets are loaded after each step, so that each turn of the radio sends targets that are at most one step
+  old. A slow radio sends fewer targets.
+* After a halt, or if commands stop, the walker walks to a stand. An emergency stop and the end of the hold end the loop
+  at once, and the walker's board puts the legs down.
 
 Source: Petters, Thomas, von Stryk, RoboFrame, 2006, section IV: the MotionControl module.
 """
@@ -38,10 +38,10 @@ from scout_model.dimensions import CAMERA_TILT_RAD, HORIZONTAL_VIEW_RAD
 from scout_model.errors import MalformedPacket
 
 GAITS = {"trot": TROT, "walk": WALK}
-ARRIVE_S = DEFAULT_DRIVE_USAGE.period_s  # joints arrive when the next packet comes
-LASTS_S = 0.2  # chosen: without newer targets for four packets the legs go down, before the walker's own watchdog
+ARRIVE_S = DEFAULT_DRIVE_USAGE.period_s  # the joints arrive when the next packet is due
+LASTS_S = 0.2  # chosen: after four packets without newer targets the legs go down, before the walker's own watchdog
 STILL = TrunkSpeed()
-CAMERA_HEIGHT_M = 0.19  # measured: as it stands
+CAMERA_HEIGHT_M = 0.19  # measured while it stands
 
 
 class WalkerParameters(RobotParameters, frozen=True, kw_only=True):
@@ -62,14 +62,14 @@ class WalkerProtocol(SimulatedRobotProtocol):
     def __init__(self, site: DriverSite) -> None:
         super().__init__(site)
         self.motion: Callable[[], StateOfMotion] | None = None
-        """Returns the state of the motion control, which is a part of the walker's reports."""
+        """Returns the state of the motion control, for the walker's reports."""
 
     def joints(self, targets_rad: Angles) -> bytes:
-        """Return the packet after which the joints are there when the next one comes."""
+        """Return the packet that brings the joints to these angles by the time of the next packet."""
         return encode_joint_targets(JointTargets(targets_rad, ARRIVE_S))
 
     def read(self, payload: bytes) -> WalkerReport:
-        """Return the walker's reply; see ``ReplyReader``."""
+        """Decode the walker's reply; see ``ReplyReader``."""
         if self.motion is None:
             raise MalformedReply("no motion control completes the walker's reply")
         try:
@@ -80,7 +80,7 @@ class WalkerProtocol(SimulatedRobotProtocol):
 
 @dataclass(eq=False, slots=True)
 class _Walk:
-    """What the motion control steps for, from rest to rest: a hold, and its last order to move."""
+    """One walk, from rest to rest: its hold and the last order to move."""
 
     hold: Hold
     order: Move
@@ -112,7 +112,7 @@ class WalkerRc(RobotRc[WalkerParameters]):
         self._begun, self._stepped = asyncio.Event(), asyncio.Event()
 
     async def serve(self) -> None:
-        """Step the motion control while the walker walks, too."""
+        """Also step the motion control while the walker walks."""
         self.start_task(self._step_at_rate(), "motion control")
         self.start_task(self._load_when_stepped(), "joint targets")
         await super().serve()
@@ -149,11 +149,11 @@ class WalkerRc(RobotRc[WalkerParameters]):
             self._control.rest()
 
     def statistics(self) -> dict[str, float]:
-        """Count the motion control's steps and those that were late, too."""
+        """Also count the motion control's steps and late steps."""
         return {**super().statistics(), **self._pace.statistics()}
 
     async def _step_at_rate(self) -> None:
-        """Step each ``STEP_S`` of mission time while there is a walk."""
+        """Make a step every ``STEP_S`` of mission time during a walk."""
         while True:
             if self._walk is None:
                 self._begun.clear()

@@ -1,4 +1,4 @@
-"""What a walker reports: its status on the radio, and what the motion control knows, as single values."""
+"""The walker's report: its radio status and the state of its motion control, as single values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from resource_pool.robots.walker.gait import LEGS
 from resource_pool.robots.walker.link import JOINTS, decode_status
 from resource_pool.robots.walker.motion import StateOfMotion
 
-GRIP_SHARE = 0.81  # measured: of the way that the feet make in a trot, on the simulated floor
+GRIP_SHARE = 0.81  # measured: share of the feet's way that is not lost by slip, in a trot on the simulated floor
 
 
 class WalkerReport(msgspec.Struct, frozen=True):
@@ -22,18 +22,18 @@ class WalkerReport(msgspec.Struct, frozen=True):
         roll_rad: Tilt to the right.
         pitch_rad: Tilt forward, nose down.
         turn_rad_s: Measured turning speed, left is positive.
-        phase: Where in its round the gait is, 0 to 1.
+        phase: Phase of the gait, 0 to 1.
         commanded_m_s: Forward speed of the last command, clipped.
         commanded_rad_s: Turning speed of the last command, clipped.
-        expected_m_s: Forward speed that the feet now make.
-        expected_rad_s: Turning speed that the feet now make.
-        way_m: Way that it has made since its RC began, less what its feet slip; backward is negative.
-        turned_rad: Turn that they have made since then; left is positive.
-        front_left_foot: Carries weight.
-        front_right_foot: Carries weight.
-        hind_left_foot: Carries weight.
-        hind_right_foot: Carries weight.
-        front_left_abduction_rad: Measured angle; all are 0 while it stands.
+        expected_m_s: Forward speed that results from the feet now.
+        expected_rad_s: Turning speed that results from the feet now.
+        way_m: Way since the begin of its RC, corrected for slip; backward is negative.
+        turned_rad: Turn since the begin of its RC; left is positive.
+        front_left_foot: True if the foot carries weight.
+        front_right_foot: Same.
+        hind_left_foot: Same.
+        hind_right_foot: Same.
+        front_left_abduction_rad: Measured angle; all angles are 0 while the walker stands.
         front_left_hip_rad: Measured angle.
         front_left_knee_rad: Measured angle.
         front_right_abduction_rad: Measured angle.
@@ -80,7 +80,7 @@ def report_of(payload: bytes, motion: StateOfMotion) -> WalkerReport:
     """Return the status in the walker's reply, with the motion control's state at this time.
 
     Raises:
-        MalformedPacket: The bytes are no status.
+        MalformedPacket: The bytes are not a status.
     """
     status = decode_status(payload)
     feet = {f"{leg}_foot": on_floor for leg, on_floor in zip(LEGS, status.on_floor, strict=True)}

@@ -87,7 +87,7 @@ async def test_a_server_that_does_not_hear_the_mission_has_its_pages_say_so(
         silent_s = stage.clock.now_s()
         monkeypatch.setattr(stage.hub.team.links, "down_s", lambda _now_s: silent_s)
         await page.get_by_text("A STOP PRESSED HERE MAY NOT ARRIVE").wait_for()
-        assert "has not heard the mission" in await page.locator("#blind-why").inner_text()
+        assert "has received nothing from the mission" in await page.locator("#blind-why").inner_text()
         assert await card(page).locator("button.emergency").is_enabled(), "it may arrive all the same"
         monkeypatch.undo()
         await page.wait_for_selector("body:not(.is-blind)")

@@ -7,8 +7,8 @@ import { set } from "./text.js";
 const LOOK_EVERY_MS = 250;
 
 /**
- * Shows that the page is cut off, since when, and other means to stop robots; the page is gray meanwhile. A server
- * without a link to the mission counts as well: its page is connected, and cannot stop a robot.
+ * Shows that the page is cut off, for how long, and other means to stop robots; the page is gray meanwhile. A server
+ * without a link to the mission also counts, because its page cannot stop a robot.
  */
 export class Blindness {
   /**
@@ -28,7 +28,7 @@ export class Blindness {
   }
 
   /**
-   * Since when the server has no link to the mission, in milliseconds; negative: it has one.
+   * Time from which the server has no link to the mission, in milliseconds; negative: it has a link.
    *
    * @param {number} ageMs
    */
@@ -51,8 +51,8 @@ export class Blindness {
     set(
       this.why,
       is === "fresh"
-        ? `The server has not heard the mission for ${since(this.hubAgeMs)}. What you see is older than that.`
-        : `Nothing was heard for ${since(this.link.ageMs)} (${this.link.why}). What you see is as old as that.`,
+        ? `The server has received nothing from the mission for ${since(this.hubAgeMs)}. The content is older.`
+        : `This page has received nothing for ${since(this.link.ageMs)} (${this.link.why}). The content is that old.`,
     );
   }
 }

@@ -1,4 +1,4 @@
-// Messages on the bus: a list of keys, or a view of one of them; a closed panel or a hidden page costs nothing.
+// Messages on the bus: a list of keys, or a view of one key; a closed panel or a hidden page costs nothing.
 
 import { idOf, KeyTable, toldOf } from "./key_list.js";
 import { KeyView } from "./key_view.js";
@@ -10,7 +10,7 @@ import { set } from "./text.js";
 const LOOK_EVERY_MS = 250;
 const LIST = "/keys";
 
-/** Shows the list, and after a press on a key that key instead, until the person goes back. */
+/** Shows the list; after a press on a key, the key instead, until the person goes back. */
 export class BusKeys {
   /**
    * @param {{ panel: HTMLDetailsElement, list: HTMLElement, words: HTMLInputElement, order: HTMLSelectElement,
@@ -36,13 +36,13 @@ export class BusKeys {
     setInterval(() => this.view?.age(performance.now()), LOOK_EVERY_MS);
   }
 
-  /** The connection is new: the server does not know yet what is looked at. */
+  /** The connection is new, so the server does not know yet what this page watches. */
   again() {
     this.asked = this.viewed = "";
     this.look();
   }
 
-  /** Ask for what is looked at, if that is something else than before. */
+  /** Request the watched list or key, if it has changed. */
   look() {
     const { panel, words, order } = this.given;
     const isSeen = panel.open && !document.hidden;
@@ -104,7 +104,7 @@ export class BusKeys {
   }
 
   /**
-   * Take in what the server sends of the list, or of the view that is open now.
+   * Handle the server's data for the list or the open view.
    *
    * @param {Picture} packet
    */

@@ -12,7 +12,7 @@ import { lasting, set } from "./text.js";
 /** @import { Act, Picture, Say, Tap } from "./types.d.ts" */
 
 const LOOK_EVERY_MS = 250;
-const HOLD = "hold to lift"; // the model's line for a stop that this operator alone may lift; the button shows it
+const HOLD = "hold to lift"; // the model's line for a stop that only this operator set; the button shows it
 const MOST_WATCHED = 16; // the server's limit
 
 /** Shows all robots, one of them on the stage; `act(what, robot, more)` carries out a person's action. */
@@ -72,7 +72,7 @@ export class Cards {
   }
 
   /**
-   * Show this one large; a press that is under way on a card still hits its button.
+   * Show this robot large; a press in progress on a card still hits its button.
    *
    * @param {string} name
    */
@@ -105,7 +105,7 @@ export class Cards {
     return document.activeElement?.closest(".robot")?.getAttribute("data-robot") ?? this.large;
   }
 
-  /** A button that is held down on a card counts no more. */
+  /** Ignore a button that is held down on a card. */
   letGo() {
     for (const card of this.cards.values()) card.dropLift();
   }
@@ -134,7 +134,7 @@ class Card {
     this.root.dataset.robot = name;
     this.root.setAttribute("aria-label", `robot ${name}`);
     this.screen = new Screen({ name, drawn, tapped: (tap) => this.tapped(tap) });
-    // Over the picture of a stopped robot: the authors of the stop, and the lift button far from every Stop.
+    // Over the picture of a stopped robot: the authors of the stop, and the lift button, far from every Stop button.
     this.standing = make("div", "standing");
     this.standing.hidden = true;
     this.whose = make("p", "whose");

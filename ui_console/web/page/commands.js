@@ -1,4 +1,4 @@
-// The commands of the robot in hand: a button for each, with sliders, switches and selects for its fields.
+// The commands of the held robot: a button for each, with sliders, switches and selects for its fields.
 
 import { make, makeButton } from "./dom.js";
 import { set } from "./text.js";
@@ -8,7 +8,7 @@ import { set } from "./text.js";
 /** @typedef {string | number | boolean} Value Of a field. */
 
 const UNLIMITED = 1e18; // the limit of all numbers on the bus
-const STEPS = 100; // chosen: a slider is no finer than a finger
+const STEPS = 100; // chosen: a slider is not finer than a finger
 
 /**
  * The kind of control for a field. Pure.
@@ -34,7 +34,7 @@ export function stepOf(field) {
 }
 
 /**
- * The value that a field has at first: its default; without one 0, or the value in its range nearest to 0. Pure.
+ * The initial value of a field: its default, or else the value in its range nearest to 0. Pure.
  *
  * @param {Pick<FieldForm, "kind" | "least" | "most" | "choices" | "default" | "is_required">} field
  * @returns {Value}
@@ -46,7 +46,7 @@ export function firstOf(field) {
   return field.kind === "text" ? "" : Math.min(Math.max(0, field.least), field.most);
 }
 
-/** Shows the commands of the abilities; `give(word, values, role)` gives one. */
+/** Shows the commands of the abilities; `give(word, values, role)` sends a command. */
 export class Commands {
   /**
    * @param {{ root: HTMLFieldSetElement, give: (word: string, values: Record<string, Value>, role: string) => void }}
@@ -61,7 +61,7 @@ export class Commands {
   }
 
   /**
-   * Draw these commands, unless they are there; what a person has set stays as long as they do.
+   * Draw these commands, unless they are already shown; a person's settings stay as long as the commands do.
    *
    * @param {ArcAbilities | null} abilities
    */
@@ -81,7 +81,7 @@ export class Commands {
   }
 
   /**
-   * Give the first command of this word, if there is one that needs no values; return whether there is.
+   * Send the first command with this word that needs no values; return whether there is one.
    *
    * @param {string} word
    */
@@ -117,7 +117,7 @@ export class Commands {
   }
 }
 
-/** One field of a command, with its label. Keys that it needs itself drive nothing while it has the focus. */
+/** A field of a command, with its label. While it has the focus, the keys that it needs do not drive. */
 class Control {
   /**
    * @param {FieldForm} field
@@ -128,7 +128,7 @@ class Control {
     this.kind = controlOf(field);
     this.isRequired = field.is_required;
     this.root = make("label");
-    this.shown = make("span"); // an output would take the label for itself
+    this.shown = make("span"); // an output element would claim the label
     this.shown.setAttribute("aria-hidden", "true");
     this.input = this.kind === "select" ? selectOf(field) : inputOf(field, this.kind);
     this.input.dataset.keys = "own";

@@ -1,4 +1,4 @@
-// The designer's page: joins the connection, the parts, the tree, the details, and the panes below.
+// The designer's page: connects the socket, the palette, the tree, the details and the panes below.
 
 import { Acts } from "./design_acts.js";
 import { Adding } from "./design_adding.js";
@@ -25,7 +25,7 @@ import { followTheme } from "./theme.js";
 /** @import { LinkChange } from "./types.d.ts" */
 
 const OLD_MS = 2000,
-  SILENT_MS = 5000; // chosen: nothing moves here; a check of a large mission takes a moment
+  SILENT_MS = 5000; // chosen: no robot moves here, and a check of a large mission takes a moment
 /** @type {Partial<DesignView>} */
 const view = {};
 
@@ -72,7 +72,7 @@ followTheme(find("theme", HTMLSelectElement));
 let wasDown = true;
 
 /**
- * The server refused the last message: show that at its place.
+ * Show a refusal of the last message at its place.
  *
  * @param {string} text
  * @param {string} remedy
@@ -94,7 +94,7 @@ function changed({ is, why }) {
   if (is === "fresh") {
     if (wasDown) came();
     return;
-  } // else the server was only silent for a moment
+  } // otherwise the server was only silent for a moment
   wasDown = true;
   changes.drop();
   if (is === "refused") {

@@ -1,4 +1,4 @@
-// Actions of buttons and keys on the chosen element and the draft; they can do everything that dragging can.
+// Actions of buttons and keys on the chosen element and the draft; they cover everything that dragging can do.
 
 import { ask, choose } from "./design_dialogs.js";
 import { notice, titleOf } from "./design_status.js";
@@ -87,7 +87,7 @@ export class Acts {
   }
 
   /**
-   * Keys that mean the same anywhere on the page.
+   * Keys with the same meaning anywhere on the page.
    *
    * @param {KeyboardEvent} event
    */
@@ -122,7 +122,7 @@ export class Acts {
   }
 
   /**
-   * Change the element that is chosen when the turn comes.
+   * Change the element that is chosen when it is this change's turn.
    *
    * @param {(path: Path, row: ElementRow) => WantedChange | null} make
    */

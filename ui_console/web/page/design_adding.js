@@ -12,7 +12,7 @@ export class Adding {
     this.places = places;
     this.view = view;
     /** @type {OfferView | null} */
-    this.asked = null; // the questions of the dialog whose answers were sent last
+    this.asked = null; // the questions whose answers were sent last
   }
 
   /**
@@ -29,7 +29,7 @@ export class Adding {
   }
 
   /**
-   * Ask again if the answers that were given last were refused; returns whether they were.
+   * If the last answers were refused, ask again; returns whether they were refused.
    *
    * @param {DraftChange | null} change
    * @param {string} why

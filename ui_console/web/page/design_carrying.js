@@ -1,4 +1,4 @@
-// A carried element: taken up by a button or a key, put into the next chosen element.
+// A carried element: picked up by a button or a key, and put into the next chosen element.
 
 import { notice } from "./design_status.js";
 import { isWithin } from "./design_tree.js";
@@ -19,7 +19,7 @@ export class Carrying {
     this.carried = null;
   }
 
-  /** Take up the chosen element, or drop the carried one. */
+  /** Pick up the chosen element, or drop the carried one. */
   toggle() {
     if (this.carried) this.drop();
     else this.take(this.tree.at);

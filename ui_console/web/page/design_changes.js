@@ -1,9 +1,10 @@
-// One change of the draft after the other.
+// Queue of changes to the draft.
 
 /** @import { DraftChange, MakeChange } from "./design_types.d.ts" */
 
 /**
- * Sends a change as soon as the one before it was done; it is made only then, so that it is not refused as too old.
+ * Sends a change as soon as the previous one is done; the change is created only then, so that its revision is not too
+ *     old.
  *
  * `say` returns whether it was sent, `revision` the draft's, undefined if none is known yet; `refused` is called when a
  * change cannot be sent, `busy` with whether a change waits for the server.

@@ -8,7 +8,7 @@ import { find, keepingFocus, make, makeButton } from "./dom.js";
 /** @import { Input, Path } from "./design_types.d.ts" */
 
 /**
- * The field of a property: the value that is set, and the value that was sent last and is not set yet.
+ * The field of a property: the present value, and the last sent value that is not applied yet.
  *
  * @typedef {{ path: Path, property: Property, input: Input, refused: HTMLElement, is: string,
  *   said: string | null }} Field
@@ -95,7 +95,7 @@ export class Details {
   }
 
   /**
-   * A value was refused: show that at its field.
+   * Show the refusal of a value at its field.
    *
    * @param {Path} path
    * @param {{ name: string, is_parameter?: boolean }} property
@@ -111,7 +111,7 @@ export class Details {
   }
 
   /**
-   * Show the value, unless a person is writing another one, or one was refused and nothing has changed since.
+   * Show the value, unless a person is typing another one, or a refused value is unchanged since.
    *
    * @param {Property} one
    */

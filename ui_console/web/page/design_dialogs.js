@@ -1,4 +1,4 @@
-// Questions: one dialog to answer, one to choose, one to read. Each is a promise; null: the person chose nothing.
+// Dialogs to answer, to choose and to read. Each returns a promise; null: the person cancelled.
 
 import { find, make, makeButton, query } from "./dom.js";
 
@@ -43,7 +43,7 @@ export function ask(title, doc, asks, refused = "") {
 }
 
 /**
- * Let one of `options` be chosen; resolves to it, or to null.
+ * Let a person choose one of `options`; resolves to it, or to null.
  *
  * @template {{ label: string, doc: string }} Option
  * @param {string} title

@@ -4,13 +4,13 @@ import { around, make } from "./dom.js";
 
 /** @import { Dragged, DropPlace, RowPart } from "./design_types.d.ts" */
 
-const BEGINS_AFTER_PX = 6; // chosen: a click that shakes is still a click
+const BEGINS_AFTER_PX = 6; // chosen: a shaky click is still a click
 const EDGE_PX = 48; // chosen: about a finger; nearer to the edge than this the tree scrolls
 const SCROLL_PX = 10; // a frame
-const BORDER_SHARE = 0.28; // chosen: of a row's height, above and below, that means the place between rows
+const BORDER_SHARE = 0.28; // chosen: share of a row's height, above and below, that means the place between rows
 
 /**
- * The element held by a pointer; it is dragged once it has a ghost.
+ * The element held by a pointer; dragging has begun once it has a ghost.
  *
  * @typedef {{ pointer: number, x: number, y: number, source: HTMLElement, what: Dragged, ghost: HTMLElement | null,
  *   place: DropPlace | null }} Held
@@ -96,7 +96,7 @@ export class Drag {
   }
 
   /**
-   * Show its place if it were dropped now.
+   * Show the place that the element would get if dropped now.
    *
    * @param {Held} held
    * @param {HTMLElement} ghost

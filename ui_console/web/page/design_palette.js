@@ -5,7 +5,7 @@ import { keepingFocus, make, makeButton, query } from "./dom.js";
 
 /** @import { PaletteRow } from "./design_messages.d.ts" */
 
-/** `add(label)` adds a part to the chosen element, `learn(type)` looks its class up. */
+/** `add(label)` adds a part to the chosen element, `learn(type)` looks up its class. */
 export class Palette {
   /**
    * @param {{ root: HTMLElement, filter: HTMLInputElement, add: (label: string) => void,

@@ -1,4 +1,4 @@
-// Panes of the designer: beside each other if there is room, else one at a time.
+// Panes of the designer: side by side if there is room, else one at a time.
 
 import { around, find, queryAll, stepped } from "./dom.js";
 

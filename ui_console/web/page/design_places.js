@@ -6,7 +6,7 @@ import { isWithin, numberOf, pathOf } from "./design_tree.js";
 /** @import { Tree } from "./design_tree.js" */
 /** @import { Change, Dragged, DropPlace, Path, RowPart } from "./design_types.d.ts" */
 
-const AT_THE_MISSION = ["behavior", "resource", "world", "type"]; // the server puts these into their sections by itself
+const AT_THE_MISSION = ["behavior", "resource", "world", "type"]; // the server puts these elements into their sections
 
 export class Places {
   /** @param {{ tree: Tree, view: Partial<DesignView>, change: Change }} given */
@@ -17,7 +17,7 @@ export class Places {
   }
 
   /**
-   * The dragged thing of an element of the page; null: none is known.
+   * The dragged object of an element of the page; null: unknown.
    *
    * @param {HTMLElement} source
    * @returns {Dragged | null}
@@ -55,7 +55,7 @@ export class Places {
   }
 
   /**
-   * May an element hold one of this tag?
+   * Whether an element may contain an element of this tag.
    *
    * @param {Path} path
    * @param {string} tag

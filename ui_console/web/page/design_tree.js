@@ -5,7 +5,7 @@ import { around, make, query, queryAll } from "./dom.js";
 /** @import { ElementRow } from "./design_messages.d.ts" */
 /** @import { Path } from "./design_types.d.ts" */
 
-const FOLDED_AT_FIRST = ["core", "types"]; // the same in most missions, and filled by additions elsewhere
+const FOLDED_AT_FIRST = ["core", "types"]; // elements that are the same in most missions, or that additions fill
 
 /** @param {Path} path */
 export const keyOf = (path) => path.join("/");
@@ -158,7 +158,7 @@ export class Tree {
     }
   }
 
-  /** The rows outside of folded ones. */
+  /** The rows that are not hidden by a folded element. */
   shown() {
     const shown = [];
     /** @type {Path | null} */

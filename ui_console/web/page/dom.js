@@ -1,7 +1,7 @@
-// Elements of the page, with their kinds.
+// Functions that find and create elements of the page, with their types.
 
 /**
- * Returns the element of this id, which is on the page for sure.
+ * Returns the element with this id, which must be on the page.
  *
  * @template {HTMLElement} [T=HTMLElement]
  * @param {string} id
@@ -30,7 +30,7 @@ export function make(tag, className = "", text = "") {
 }
 
 /**
- * Makes a button that does this; with a key it keeps the focus when it is drawn anew, see `keepingFocus`.
+ * Makes a button with this action; with a key it keeps the focus when it is redrawn, see `keepingFocus`.
  *
  * @param {string} label
  * @param {() => void} press
@@ -45,7 +45,7 @@ export function makeButton(label, press, key = "") {
 }
 
 /**
- * Returns the first element in `root` that a selector finds; null: there is none, or it is of another kind.
+ * Returns the first element in `root` that matches a selector; null: there is none, or it has another type.
  *
  * @template {Element} T
  * @param {ParentNode} root
@@ -59,7 +59,7 @@ export function query(root, selector, kind) {
 }
 
 /**
- * Returns all elements of a kind in `root` that a selector finds.
+ * Returns all elements of a type in `root` that match a selector.
  *
  * @template {Element} T
  * @param {ParentNode} root
@@ -72,7 +72,7 @@ export function queryAll(root, selector, kind) {
 }
 
 /**
- * Returns the nearest element of a selector around what an event happened to; null: there is none.
+ * Returns the nearest element around an event's target that matches a selector; null: there is none.
  *
  * @param {Event} event
  * @param {string} selector
@@ -100,7 +100,7 @@ export function makeNotice(kind, text) {
 const STEPS = { ArrowLeft: -1, ArrowRight: 1 };
 
 /**
- * Returns the one to which an arrow goes, around the ends too; null: the key is no such arrow, or nothing is chosen.
+ * Returns the item to which an arrow key leads, also around the ends; null: another key, or no item is chosen.
  *
  * @template T
  * @param {string} key
@@ -114,7 +114,7 @@ export function stepped(key, all, chosen) {
 }
 
 /**
- * Draws the content of `root` anew; the focus stays on the element with the same `data-key`.
+ * Redraws the content of `root`; the focus stays on the element with the same `data-key`.
  *
  * @param {HTMLElement} root
  * @param {() => void} draw

@@ -1,4 +1,4 @@
-// Controls: pad, keys and gamepad become one stick, which is sent repeatedly while it is held, and never otherwise.
+// Controls: combines pad, keys and gamepad into one stick, which is sent repeatedly while it is held, and only then.
 
 import { DRIVES } from "./keys.js";
 
@@ -7,15 +7,15 @@ import { DRIVES } from "./keys.js";
 const SAY_EVERY_MS = 50; // chosen: six times within the 300 ms after which the server stops the wheels
 const SHOULDERS = [4, 5]; // Gamepad API, standard mapping
 /** @type {Record<string, string>} */
-const BUTTONS = { 0: "jump", 1: "stop_mine", 3: "stop_all", 8: "release", 9: "take" }; // as the terminal has them
-const DEAD_ZONE = 0.12; // chosen: worn sticks rest within it
+const BUTTONS = { 0: "jump", 1: "stop_mine", 3: "stop_all", 8: "release", 9: "take" }; // as in the terminal
+const DEAD_ZONE = 0.12; // chosen: worn sticks rest within this range
 
 /**
  * Sends the stick's position while a control is held, and one stop after it.
  *
- * `does` is called with the action of a gamepad's button; `hint` is shown while a held control counts no more. A
- * control that is held when `letGo` is called counts no more, until it was let go and is held anew: a key pressed, a
- * finger put down, the gamepad's shoulder button pressed again.
+ * `does` is called with the action of a gamepad's button; `hint` is shown while a held control is ignored. A control
+ * that is held when `letGo` is called is ignored until it is released and pressed again: a key, a finger, or the
+ * gamepad's shoulder button.
  */
 export class Driving {
   /**
@@ -63,7 +63,7 @@ export class Driving {
   }
 
   /**
-   * Whether there is a robot to drive; controls count only from then on.
+   * Set whether there is a robot to drive; without one, controls are ignored.
    *
    * @param {boolean} isOn
    */
@@ -75,7 +75,7 @@ export class Driving {
   }
 
   /**
-   * The wish now: [forward, right], or null if no control is held.
+   * The present wish: [forward, right], or null if no control is held.
    *
    * @returns {Stick | null}
    */
@@ -131,7 +131,7 @@ export class Driving {
     this.update();
   }
 
-  /** Count no control as held; send a stop if one was held, or if it has to be sent. */
+  /** Treat all controls as released; send a stop if one was held, or if a stop is required. */
   letGo(always = false) {
     const wasHeld = this.timer !== 0;
     if (wasHeld) this.hint.hidden = false;
@@ -177,7 +177,7 @@ export class Driving {
 
   send() {
     const wanted = this.wanted();
-    if (wanted === null || this.isClogged()) return; // a message that cannot leave now must not arrive late
+    if (wanted === null || this.isClogged()) return; // a message that cannot be sent now must not arrive late
     const [forward, right] = wanted;
     this.say({ do: "drive", moment: this.pressedAt, forward, right, speed: this.speed() });
   }
@@ -190,19 +190,19 @@ export class Gamepad {
     this.does = does;
     /** @type {Stick | null} */
     this.stick = null;
-    this.isSpent = true; // a shoulder button that is held from the beginning was not pressed for this page
+    this.isSpent = true; // a shoulder button held from the beginning was not pressed for this page
     /** @type {string[] | null} */
     this.pressed = null;
   }
 
-  /** Held buttons count no more. */
+  /** Ignore held buttons. */
   spend() {
     this.stick = null;
     this.isSpent = true;
   }
 
   /**
-   * Take in its state; undefined: it is away, or another window has it.
+   * Process its state; undefined: it is disconnected, or another window uses it.
    *
    * @param {{ buttons: readonly { pressed: boolean }[], axes: readonly number[] } | undefined} device
    */

@@ -1,8 +1,8 @@
 // Largest possible age of the page's content. Pure: times are milliseconds of the caller's clock.
 
 /**
- * Each beat goes to the server and comes back with its next message. The content is at most as old as the newest beat
- * that came back: that holds for any delay on the way, at the server, or in a page that slept.
+ * Each beat goes to the server and returns with its next message. The content is at most as old as the newest returned
+ * beat, whatever the delay in the network, at the server, or in a page that slept.
  */
 export class Freshness {
   constructor() {
@@ -52,8 +52,8 @@ export class Freshness {
 }
 
 /**
- * Returns a clock, in milliseconds, that a device cannot hold up: one of its own stops while it sleeps, the other may
- * be set back; this one goes as the faster of both.
+ * Returns a clock, in milliseconds, that no device stops: one of the device's clocks stops during sleep, the other may
+ * be set back; this clock follows the faster one.
  */
 export function makeClock(steady = () => performance.now(), wall = () => Date.now()) {
   let [steadyAt, wallAt, total] = [steady(), wall(), 0];

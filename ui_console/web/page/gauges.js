@@ -1,4 +1,4 @@
-// What a robot reports: a bar for a value with a range, a lamp for a flag, words for all else.
+// Gauges of a robot: a bar for a value with a range, a lamp for a flag, text for other values.
 
 import { make } from "./dom.js";
 import { set } from "./text.js";
@@ -17,7 +17,7 @@ export function drawnAs({ share, flag }) {
 }
 
 /**
- * What a person is told who rests on a gauge: its range and its meaning. Pure.
+ * The tooltip of a gauge: its range and its meaning. Pure.
  *
  * @param {Pick<GaugeView, "span" | "doc">} gauge
  */
@@ -26,7 +26,7 @@ export function hintOf({ span, doc }) {
 }
 
 /**
- * The values that stand on the card in one line: those that are shares, such as a battery's charge. Pure.
+ * The values in the card's line: shares, such as a battery's charge. Pure.
  *
  * @param {Pick<GaugeView, "name" | "text" | "is_share">[]} gauges
  */
@@ -37,7 +37,7 @@ export function lineOf(gauges) {
     .join(", ");
 }
 
-/** All that a robot reports, behind a fold; a row for each value stays where it is while the value changes. */
+/** All values that a robot reports, foldable; the row of a value keeps its place while the value changes. */
 export class Gauges {
   /** @param {string} robot */
   constructor(robot) {

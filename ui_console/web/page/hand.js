@@ -1,4 +1,4 @@
-// This operator's own part: the robot held, the robot lost, the questions of others.
+// This operator's own part: the held robot, the lost robot, the questions of other operators.
 
 import { find } from "./dom.js";
 import { remembered } from "./memory.js";
@@ -24,7 +24,7 @@ export class Hand {
     /** @type {ArcAbilities | null} */
     this.abilities = null;
     this.now_s = 0;
-    this.ordered = ""; // the robot whose order the stick takes back
+    this.ordered = ""; // the robot that the stick can take back from its order
     this.memory = new Memory();
     find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
     find("release").addEventListener("click", () => act("release"));
@@ -55,12 +55,12 @@ export class Hand {
     return this.own?.is_held ? this.own.robot : "";
   }
 
-  /** The robot that the stick moves: it is held, or carries out an order that a touch of the stick ends. */
+  /** The robot that the stick moves: it is held, or carries out an order that a touch of the stick would end. */
   get stick() {
     return this.held || this.ordered;
   }
 
-  /** The newest moment that is shown: a press from an earlier one moves nothing. */
+  /** The newest shown moment; a press from an earlier moment moves nothing. */
   get moment() {
     return this.own?.moment ?? 0;
   }
@@ -87,7 +87,7 @@ export class Hand {
   }
 
   /**
-   * Offer the kinds of ARC for the robot in hand, the first of which has it.
+   * Offer the kinds of ARC for the held robot; the first kind is the present one.
    *
    * @param {KindChoice[]} kinds
    */
@@ -139,7 +139,7 @@ export class Hand {
     document.body.dataset.ordered = this.ordered;
     this.now_s = now_s;
     if (isOther(before, own))
-      this.driving.letGo(own.is_held); // a held control was meant for an earlier moment
+      this.driving.letGo(own.is_held); // a held control belongs to an earlier moment
     else if (own.moment !== before?.moment) this.driving.letGo();
     if (own.is_asked) this.memory.forget();
     set(find("own"), own.status);
@@ -196,7 +196,7 @@ export class Hand {
 }
 
 /**
- * Is this another robot, hold or stop than that, so that held controls have to be let go first?
+ * Whether robot, hold or stop have changed, so that held controls must be released first.
  *
  * @param {OwnView | null} before
  * @param {OwnView} own

@@ -1,9 +1,10 @@
-// A button that acts only when it was held for a second, by pointer or by Enter: a double press never lifts a stop.
+// A button that acts only after it was held for a second, by pointer or Enter, so that a double press never lifts a
+// stop.
 
 export const HOLD_MS = 1000; // chosen: longer than any double press, short enough for a person who means it
 
 /**
- * Call `act` once the button was held; any other event lets it go. Space never holds: it stops.
+ * Call `act` when the button has been held; any other event releases it. Space never holds, because it stops robots.
  *
  * @param {HTMLButtonElement} button
  * @param {() => void} act

@@ -1,4 +1,4 @@
-// The keys on the bus as a table: who says what, how often, and how much.
+// The keys on the bus as a table: message, sender, rate and size.
 
 import { keepingFocus, make, makeButton } from "./dom.js";
 import { table } from "./table.js";
@@ -9,7 +9,7 @@ import { set } from "./text.js";
 const HEADS = ["key", "message", "a second", "bytes a second", "bytes each"];
 
 /**
- * What names a row. Pure.
+ * The id of a row. Pure.
  *
  * @param {Pick<KeyRow, "key" | "source" | "schema">} row
  */
@@ -49,7 +49,7 @@ export function textsOf(row) {
 }
 
 /**
- * What is told above the list. Pure.
+ * The text above the list. Pure.
  *
  * @param {Pick<KeyList, "rows" | "matching" | "heard" | "dropped">} list
  */
@@ -61,7 +61,7 @@ export function toldOf({ rows, matching, heard, dropped }) {
   return `${heard} heard, ${shown}${few}`;
 }
 
-/** Draws the list; a row that stays is not made anew, so that a press on it is not lost. */
+/** Draws the list; an existing row is reused, so that a press on it is not lost. */
 export class KeyTable {
   /** @param {{ root: HTMLElement, chosen: (row: KeyRow) => void }} given */
   constructor({ root, chosen }) {

@@ -14,7 +14,7 @@ const MOST_PLOTS = 4; // chosen: more than fits beside the fields on a screen
 const HEADS = ["field", "value"];
 
 /**
- * What is told above the fields. Pure.
+ * The text above the fields. Pure.
  *
  * @param {Omit<MessageShown, "rows">} message
  */
@@ -25,7 +25,8 @@ export function headOf({ stamp_s, sequence, size_bytes, cause, trouble }) {
 }
 
 /**
- * The plots after a press on a field's button: it comes or goes, and the oldest makes room. Pure.
+ * The plots after a press on a field's button: its plot is added or removed; if there are too many, the oldest is
+ *     removed. Pure.
  *
  * @param {string[]} names
  * @param {string} pressed

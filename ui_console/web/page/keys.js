@@ -1,4 +1,4 @@
-// The meaning of a key at this moment. Pure: a key and its place go in, an act comes out.
+// The present meaning of a key. Pure: a key and its place go in, an action comes out.
 
 /** @type {Record<string, [number, number]>} */
 export const DRIVES = {
@@ -20,8 +20,8 @@ const NO_TEXT = ["range", "checkbox", "radio", "button", "submit", "reset", "col
 /**
  * Returns {act, isTaken}, or null: the key is left to the browser. If `isTaken`, the browser must ignore it.
  *
- * Stops work with any focus, in dialogs and in fields too. Drives work everywhere but where arrows and letters write,
- * and not while a dialog is open.
+ * Stops work with any focus, even in dialogs and fields. Drive keys do not work where arrows and letters are input, or
+ * while a dialog is open.
  *
  * @typedef {{ key: string, code: string, isRepeat: boolean, hasModifier: boolean }} Key Of the event.
  * @typedef {{ isText: boolean, isRed: boolean, isDialog: boolean, isHeld: boolean }} Place A text is written there; a
@@ -41,7 +41,7 @@ export function meaningOf(key, at) {
 }
 
 /**
- * A letter that stops is not written; a blank is, and closes no button's press unless a robot is driven meanwhile.
+ * A stop letter is not written. A blank is written, and presses a focused button unless a robot is driven meanwhile.
  *
  * @param {string} key
  * @param {Place} at
@@ -103,7 +103,7 @@ export class Keys {
 }
 
 /**
- * Write the letter that stops otherwise.
+ * Write the letter that otherwise stops robots.
  *
  * @param {KeyboardEvent} event
  */

@@ -1,16 +1,16 @@
-// The connection to the server: authenticates, reconnects by itself, passes messages on, knows their age.
+// The connection to the server: authenticates, reconnects, passes messages on, measures their age.
 
 import { Freshness, makeClock } from "./freshness.js";
 
 /** @import { BeatRequest } from "./messages.d.ts" */
 /** @import { LinkChange, LinkState, Picture } from "./types.d.ts" */
 
-const AGAIN_FIRST_MS = 500; // chosen: a server that was restarted is back soon
-const AGAIN_MOST_MS = 5000; // chosen: a person waits no longer before looking
-const BEAT_EVERY_MS = 250; // chosen: the age of the content is known to a quarter of a second
+const AGAIN_FIRST_MS = 500; // chosen: a restarted server is back soon
+const AGAIN_MOST_MS = 5000; // chosen: a person waits no longer than this
+const BEAT_EVERY_MS = 250; // chosen: resolution of the content's age
 const LOOK_EVERY_MS = 100;
-const OLD_MS = 800; // chosen: with the looks between, the warning comes before the content is a second old
-const SILENT_MS = 2000; // chosen: eight beats that did not come back; no browser reports that a network is gone
+const OLD_MS = 800; // chosen: with the checks in between, the warning appears before the content is a second old
+const SILENT_MS = 2000; // chosen: eight beats without return; browsers do not report the loss of a network
 const NOT_LET_IN = 1008;
 
 /**
@@ -110,7 +110,7 @@ export class Link {
     if (this.isUp) this.say({ do: "beat", number: this.freshness.beat(this.now()) });
   }
 
-  /** Find out the age of the content; not in a hidden page, where no person needs it. */
+  /** Update the age of the content; not in a hidden page, because no person needs it there. */
   look() {
     if (!this.isUp || document.hidden) return;
     const now = this.now(),
@@ -120,7 +120,7 @@ export class Link {
     else this.become("fresh", "");
   }
 
-  /** End the connection: its further messages would be too old. */
+  /** End the connection, because its further messages would be too old. */
   giveUp() {
     const silent = this.socket;
     this.socket = null;
@@ -146,7 +146,7 @@ export class Link {
   }
 
   /**
-   * Send a message if it can leave now: none is kept for later, least of all a drive.
+   * Send a message if it can be sent now; no message is kept for later, above all no drive command.
    *
    * @param {Said | BeatRequest} message
    */
@@ -156,7 +156,7 @@ export class Link {
     return true;
   }
 
-  /** Do messages still wait to leave this device? */
+  /** Whether messages still wait on this device. */
   get isClogged() {
     return this.socket !== null && this.socket.bufferedAmount > 1024;
   }

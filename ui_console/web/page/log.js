@@ -26,7 +26,7 @@ export class Found {
   }
 
   /**
-   * Take in a part; returns whether it is the next one of this search.
+   * Add a part; returns whether it is the next one of this search.
    *
    * @param {LogFound} part
    */
@@ -87,7 +87,7 @@ export class Log {
   }
 
   /**
-   * Take in the robots and people of the view, which a search can name.
+   * Update the robots and people that a search can name.
    *
    * @param {Partial<View>} view
    */
@@ -123,7 +123,7 @@ export class Log {
     this.redraw();
   }
 
-  /** The connection ended: open questions get no answer any more. */
+  /** Handle the end of the connection: open questions get no answer any more. */
   cut() {
     if (this.underway === null && !this.isExporting) return;
     this.underway = null;
@@ -132,7 +132,7 @@ export class Log {
   }
 
   /**
-   * Take in the server's answer.
+   * Handle the server's answer.
    *
    * @param {LogFound | LogRefused} answer
    */
@@ -212,7 +212,7 @@ function cells(row) {
 }
 
 /**
- * Make a list offer these words after its first ones; returns whether that changed it.
+ * Set the words that a list offers after its fixed ones; returns whether they changed.
  *
  * @param {HTMLElement} list
  * @param {string[]} words

@@ -1,4 +1,4 @@
-// The page: joins the connection, the cards, the controls and the tables.
+// The page: connects the socket, the cards, the controls and the tables.
 
 import { Blindness } from "./blind.js";
 import { BusKeys } from "./bus.js";
@@ -206,7 +206,7 @@ const words = {
   parameters: (name) => ({ do: "parameters", name }),
   set: (name, { parameter = "", value }) => ({ do: "set", name, parameter, value }),
 };
-const LET_GO = ["take", "release", "lift", "consent", "order"]; // a held control was not meant for the outcome of these
+const LET_GO = ["take", "release", "lift", "consent", "order"]; // a held control must not act after these
 
 /** @type {Act} */
 function act(what, name = "", more = {}) {
@@ -244,13 +244,13 @@ function act(what, name = "", more = {}) {
   if (!say(words[what](name, more))) notice(`NOT CONNECTED: ${what.replace("_", " ")} was not sent.`);
 }
 
-/** The robot that a stop of one is for. */
+/** The robot that a single stop concerns. */
 function meant() {
   return hand.stick || cards.meant;
 }
 
 /**
- * Send the robots that are meant to the place on the floor that a point of a robot's picture shows.
+ * Send the selected robots to the place on the floor at a point of a robot's picture.
  *
  * @param {string} robot
  * @param {Tap} tap
@@ -264,7 +264,7 @@ function goInPicture(robot, tap) {
   }
 }
 
-/** A dialog covers every red button but its own. */
+/** An open dialog covers all red buttons except its own. */
 function nameStop() {
   set(find("reading-stop"), `Stop ${meant()}`);
 }

@@ -59,7 +59,7 @@ export class RobotMap {
     addEventListener("resize", () => this.fit());
   }
 
-  /** The robots that an order is for. */
+  /** The robots that an order concerns. */
   get meant() {
     return meantBy(this.selected, this.inHand());
   }
@@ -137,7 +137,7 @@ export class RobotMap {
     this.drawButtons();
   }
 
-  /** One button for each robot, for those who tap none on the map; each says what the map shows of it. */
+  /** One button for each robot, for people who do not tap on the map; its text describes the robot on the map. */
   drawChips() {
     const robots = this.bodies.filter((body) => body.is_robot);
     const shown = [...this.chips.querySelectorAll("button")].map((chip) => chip.dataset.body);

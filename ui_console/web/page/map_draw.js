@@ -7,13 +7,13 @@ import { drawn } from "./svg.js";
 /** @import { Plan } from "./map_plan.js" */
 /** @import { Point } from "./types.d.ts" */
 
-const BODY_PX = 9; // half the length of a robot's arrow: seen from afar, whatever the robot's size
-const SIGHT_M = 1.5; // chosen: how far the wedge of what a robot sees is drawn
+const BODY_PX = 9; // half the length of a robot's arrow, visible at any scale, whatever the robot's size
+const SIGHT_M = 1.5; // chosen: length of the wedge that shows a robot's field of view
 const GRID_M = 1;
 const DEGREES = 180 / Math.PI;
 
 /**
- * Everything of the floor that stands still.
+ * The parts of the floor that do not move.
  *
  * @param {FloorView} floor
  * @param {Plan} plan
@@ -78,7 +78,7 @@ export function age(body) {
 }
 
 /**
- * The place that a robot is sent to, and the way there as the crow flies.
+ * The goal of a robot, and the straight line to it.
  *
  * @param {OrderView} order
  * @param {BodyView | undefined} body

@@ -1,9 +1,9 @@
-// Where things of the floor are on the screen, and what a point of the screen means. Pure.
+// Conversion between places on the floor and points of the screen. Pure.
 
 /** @import { BodyView, FloorView } from "./messages.d.ts" */
 /** @import { Point } from "./types.d.ts" */
 
-export const REACH_PX = 22; // half of 44 px: what a finger hits
+export const REACH_PX = 22; // half of 44 px, the size of a touch target
 const LEAST_M = 0.5; // chosen: a floor is never drawn as smaller than that
 
 /** The floor on the screen: x to the right, y upwards, a pixel everywhere as large. */
@@ -33,7 +33,8 @@ export class Plan {
   }
 
   /**
-   * The place on the floor, in whole centimeters, that a point shows; a point beside the floor means the nearest edge.
+   * The place on the floor at a point, in whole centimeters; for a point beside the floor, the nearest place on its
+   *     edge.
    *
    * @param {Point} point
    * @returns {Point}
@@ -45,7 +46,7 @@ export class Plan {
   }
 
   /**
-   * The robot that a finger at this point means; null: none, the floor is meant.
+   * The robot that a touch at this point selects; null: the touch is on the floor.
    *
    * @param {Point} point
    * @param {BodyView[]} bodies
@@ -84,7 +85,7 @@ function distance([left, top], [otherLeft, otherTop]) {
 const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /**
- * Where the cross goes by a key; null: the key does not move it.
+ * The cross's place after a key; null: the key does not move it.
  *
  * @param {Point} from
  * @param {string} key
@@ -117,7 +118,7 @@ export function pixelAt([left, top], [boxWidth, boxHeight], [width, height]) {
 }
 
 /**
- * The robots that an order is for: those that are selected, else the one in hand.
+ * The robots that an order concerns: the selected ones, or else the held one.
  *
  * @param {Iterable<string>} selected
  * @param {string} inHand Empty: none.

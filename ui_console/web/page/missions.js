@@ -4,7 +4,7 @@ import { find, make } from "./dom.js";
 
 /** @import { Welcomed } from "./messages.d.ts" */
 
-/** What follows "Stop scout1" for ears, where several missions have robots; red buttons show it by their style. */
+/** Text after "Stop scout1" for screen readers if there are several missions; red buttons show it by their style. */
 export function ofMission() {
   const { mission } = document.body.dataset;
   return mission ? ` of ${mission}` : "";
@@ -20,7 +20,7 @@ export function linksTo(missions) {
 }
 
 /**
- * Show whose robots these are, if the server has several missions, and lead to the others.
+ * If the server has several missions, show the mission of this page, and links to the others.
  *
  * @param {Welcomed} welcome
  */

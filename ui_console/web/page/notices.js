@@ -24,7 +24,7 @@ export function showAlarm(alarms, act) {
   if (!first) {
     bar.replaceChildren("no alarm");
     return;
-  } // its place is kept: nothing moves under a finger
+  } // keeps its place, so that nothing moves under a finger
   const line = make("span");
   line.textContent = `${first.severity}: ${first.line}${first.remedy ? ` — ${first.remedy}` : ""}`;
   const why = makeButton("Why?", () => act("why", first.subject));
@@ -46,7 +46,7 @@ export function showHealth(health) {
 }
 
 /**
- * Show a notice that covers no button, least of all Stop.
+ * Show a notice that covers no button, above all not Stop.
  *
  * @param {string} text
  */

@@ -1,4 +1,4 @@
-// The orders of this operator's robots, in words, each with the button that takes it back.
+// The orders of this operator's robots, as text, each with a button that ends it.
 
 import { keepingFocus, make, makeButton } from "./dom.js";
 
@@ -38,7 +38,7 @@ export class Orders {
 }
 
 /**
- * Is nothing more to come of the order?
+ * Whether the order is over.
  *
  * @param {OrderView} order
  */
@@ -47,7 +47,7 @@ export function isOver(order) {
 }
 
 /**
- * The robot whose order the stick takes back; empty: none.
+ * The robot that the stick can take back from its order; empty: none.
  *
  * @param {OrderView[]} orders
  * @param {string} robot The one that the stick is at.

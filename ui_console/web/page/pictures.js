@@ -36,7 +36,7 @@ export class Screen {
   }
 
   /**
-   * Take in a picture: the newest one replaces an older one that is not drawn yet.
+   * Receive a picture: the newest one replaces an older one that is not drawn yet.
    *
    * @param {Picture} picture
    */
@@ -87,7 +87,7 @@ export class Screen {
   }
 
   /**
-   * Show the picture's age, from the lens on; returns whether it is too old to drive by.
+   * Show the picture's age since capture; returns whether it is too old for driving.
    *
    * @param {number} now
    */

@@ -1,15 +1,15 @@
-// A number over time: the last minute of it, as a line.
+// Plot of a number over the last minute, as a line.
 
 import { drawn } from "./svg.js";
 import { shortened } from "./text.js";
 
 const SPAN_S = 60; // chosen: as the timeline of the resources
-const LEAST_SPAN_S = 5; // chosen: the first points do not fly across the plot
+const LEAST_SPAN_S = 5; // chosen: so that the first points do not move fast across the plot
 const MOST_POINTS = 600; // chosen: ten in each second of the span, as many as the server sends
 const [WIDTH, HEIGHT, EDGE] = [400, 100, 18];
 
 /**
- * Append a point; what is older than the span goes. Time that goes back, in a recording, begins anew.
+ * Append a point and remove points older than the span. If time goes back, in a recording, begin again.
  *
  * @param {[number, number][]} points Time and value, in the order of time.
  * @param {[number, number]} next
@@ -41,7 +41,7 @@ export function lineOf(points) {
 }
 
 /**
- * A number, as short as a person reads it. Pure.
+ * A number in short form for people. Pure.
  *
  * @param {number} value
  */

@@ -1,4 +1,4 @@
-// What the behaviors see: the debug views of one behavior, and the pictures of one of them.
+// Debug views: the views of one behavior, and the pictures of one view.
 
 import { make } from "./dom.js";
 import { Screen } from "./pictures.js";
@@ -24,7 +24,7 @@ export function behaviorsOf(components) {
 }
 
 /**
- * The name to choose: the one that is chosen while it is there, else the first; empty: there is none. Pure.
+ * The name to choose: the chosen one while it exists, else the first; empty: there is none. Pure.
  *
  * @param {string[]} names
  * @param {string} chosen
@@ -43,7 +43,7 @@ export function picturesOf(views) {
 }
 
 /**
- * What is told instead of a picture; empty: there is one to choose. Pure.
+ * The text in place of a picture; empty: there is a picture to choose. Pure.
  *
  * @param {Pick<SeenViews, "behavior" | "views" | "trouble">} seen
  */
@@ -94,13 +94,13 @@ export class Seen {
     this.look();
   }
 
-  /** The connection is new: the server does not know yet what is looked at. */
+  /** The connection is new, so the server does not know yet what this page watches. */
   again() {
     this.asked = "/";
     this.look();
   }
 
-  /** Ask for what is chosen, if that is something else than before, and draw what is known of it. */
+  /** If the choice has changed, request it, and draw its known data. */
   look() {
     const behavior = this.panel.open ? this.behavior.value : "";
     const isKnown = behavior !== "" && this.seen.behavior === behavior;
@@ -118,7 +118,7 @@ export class Seen {
   }
 
   /**
-   * Put a new screen up, so that no picture of another view stands under this one's name.
+   * Create a new screen, so that no picture of another view appears under this view's name.
    *
    * @param {string} behavior
    * @param {string} view
@@ -153,7 +153,7 @@ export class Seen {
 }
 
 /**
- * Offer these names; the chosen one stays while it is there.
+ * Offer these names; the chosen one stays while it exists.
  *
  * @param {HTMLSelectElement} select
  * @param {string[]} names

@@ -1,11 +1,11 @@
-// Emergency stops: sent at once, and shown as certain only after the robot's own confirmation.
+// Emergency stops: sent at once, and shown as confirmed only after the robot's own confirmation.
 
 import { set } from "./text.js";
 
 /** @import { RobotView, StopAllRequest, StopRequest } from "./messages.d.ts" */
 /** @import { Say } from "./types.d.ts" */
 
-const CONFIRMED_WITHIN_MS = 1000; // chosen: wheels stand within 0.7 s wherever the link is there
+const CONFIRMED_WITHIN_MS = 1000; // chosen: with a working link, wheels stand within 0.7 s
 
 /** Stops one robot or all, and shows in `shown` the robots whose stop is not confirmed. */
 export class Stopping {
@@ -46,7 +46,7 @@ export class Stopping {
   }
 
   /**
-   * Take in the state of the robots.
+   * Update the state of the robots.
    *
    * @param {RobotView[]} robots
    */

@@ -1,9 +1,10 @@
-// Rows become a table.
+// Makes a table of rows.
 
 import { make } from "./dom.js";
 
 /**
- * Each cell has its head, so that a narrow screen can show rows as lists; the roles keep it a table for screen readers.
+ * Each cell knows its column head, so that a narrow screen can show rows as lists; ARIA roles keep it a table for
+ *     screen readers.
  *
  * @param {(string | HTMLElement)[]} heads
  * @param {(string | HTMLElement)[][]} rows

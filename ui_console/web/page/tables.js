@@ -1,4 +1,4 @@
-// Tables of the mission. The console model has decided their content; here it only becomes rows.
+// Tables of the mission. The console model decides their content; this file only makes rows of it.
 
 import { keepingFocus, make, makeButton, stepped } from "./dom.js";
 import { table } from "./table.js";
@@ -42,7 +42,7 @@ export class Tables {
   }
 
   /**
-   * Arrows go from table to table, unless they drive.
+   * Arrow keys switch tables, unless they drive.
    *
    * @param {KeyboardEvent} event
    */
@@ -113,7 +113,7 @@ export class Tables {
   draw() {
     const isPressed = this.panel.querySelector("input:focus, button:active") !== null;
     const isHeld = isPressed && this.chosen !== "log"; // a press in the log leads to another table
-    this.panel.classList.toggle("is-held", isHeld); // while a person types or presses here the table stands still
+    this.panel.classList.toggle("is-held", isHeld); // while a person types or presses here, the table is not redrawn
     const content = isHeld ? [] : this.content();
     if (content.length === 0) return;
     keepingFocus(this.panel, () => this.panel.replaceChildren(...content));

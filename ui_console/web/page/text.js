@@ -1,7 +1,7 @@
 // Words and numbers for people.
 
 /**
- * Change the text only if it differs: screen readers read changes aloud.
+ * Change the text only if it differs, because screen readers read changes aloud.
  *
  * @param {Element} element
  * @param {string} text
@@ -30,7 +30,7 @@ export function lasting(age_s) {
 }
 
 /**
- * A name shortened to the room: names differ at their ends, so the ends are kept.
+ * A name shortened to the available space; its end is kept, because names differ at their ends.
  *
  * @param {string} name
  * @param {number} room

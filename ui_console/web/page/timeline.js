@@ -1,4 +1,4 @@
-// Past, present and predicted holders of each resource: drawn as large as it is shown, so that its words can be read.
+// Past, present and predicted holders of each resource; drawn in the shown size, so that its text is readable.
 
 import { drawn } from "./svg.js";
 import { seconds, shortened } from "./text.js";
@@ -12,7 +12,7 @@ const ROW_PX = 28,
   FOOT_PX = 20;
 
 /**
- * Returns the picture of a timeline, so many pixels wide; wider if that is too narrow to be read.
+ * Returns the picture of a timeline with this width in pixels; wider if that is too narrow to be readable.
  *
  * @param {TimelineView} view
  * @param {number} widthPx
