@@ -26,7 +26,7 @@ DEVICES = ("/dev/dri/*", "/dev/nvidia*", "/dev/dxg")  # of Mesa, of NVIDIA, of W
 CHOOSERS = ("CUDA_", "EGL_", "GALLIUM_", "LIBGL_", "MESA_", "MUJOCO_EGL_", "__EGL_", "__GL")
 
 
-class Trial(msgspec.Struct, frozen=True):
+class GlTrial(msgspec.Struct, frozen=True):
     """A trial that drew a picture.
 
     Attributes:
@@ -67,7 +67,7 @@ def recall() -> KnownRenderer | None:
     return known if known == _as_of_now(known.backend, known.renderer, known.files) else None
 
 
-def keep(backend: OpenGl, trial: Trial) -> None:
+def keep(backend: OpenGl, trial: GlTrial) -> None:
     """Save the renderer of a successful trial; if the file cannot be written, the next mission makes a trial again."""
     with contextlib.suppress(OSError, RuntimeError):
         path = _path()

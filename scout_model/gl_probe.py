@@ -21,7 +21,7 @@ import msgspec
 
 from scout_model import gl_known
 from scout_model.errors import RenderingUnavailable
-from scout_model.gl_known import OpenGl, Trial
+from scout_model.gl_known import GlTrial, OpenGl
 
 log = logging.getLogger(__name__)
 
@@ -135,7 +135,7 @@ def _environment(backend: Backend) -> dict[str, str]:
     }
 
 
-def _try(backend: OpenGl, trial_time_s: float) -> Trial | None:
+def _try(backend: OpenGl, trial_time_s: float) -> GlTrial | None:
     """Return the trial of this backend; None if it drew no picture."""
     environment = {**os.environ, **_environment(backend)}
     environment.pop("PYOPENGL_PLATFORM", None)  # mujoco sets it; a child process would inherit the wrong value
@@ -152,5 +152,5 @@ def _try(backend: OpenGl, trial_time_s: float) -> Trial | None:
         return None
     for line in trial.stdout.splitlines() if trial.returncode == 0 else ():
         with contextlib.suppress(msgspec.DecodeError):  # a driver may print its own lines
-            return msgspec.json.decode(line, type=Trial)
+            return msgspec.json.decode(line, type=GlTrial)
     return None

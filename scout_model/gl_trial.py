@@ -13,7 +13,7 @@ import msgspec
 import mujoco
 from OpenGL.GL import GL_RENDERER, glGetString  # type: ignore[import-untyped]
 
-from scout_model.gl_known import Trial
+from scout_model.gl_known import GlTrial
 
 _BALL = "<mujoco><worldbody><light/><geom size='.1' rgba='1 1 1 1'/></worldbody></mujoco>"
 
@@ -34,7 +34,7 @@ def main() -> int:
         renderer.update_scene(data)
         is_drawn = bool(renderer.render().any())
         name = glGetString(GL_RENDERER).decode("utf-8", "replace")
-        sys.stdout.buffer.write(msgspec.json.encode(Trial(name, loaded_libraries())) + b"\n")
+        sys.stdout.buffer.write(msgspec.json.encode(GlTrial(name, loaded_libraries())) + b"\n")
     finally:
         renderer.close()
     return 0 if is_drawn else 1

@@ -14,7 +14,7 @@ import pytest
 from full_disk import disk_full_at
 
 from scout_model import gl_known, gl_probe
-from scout_model.gl_known import Trial
+from scout_model.gl_known import GlTrial
 from scout_model.gl_probe import FOUND_FILE, GlSupport, forget, probe, probe_once
 
 
@@ -123,7 +123,7 @@ def test_nothing_is_known_before_the_first_trial(library: Path) -> None:
 
 @pytest.mark.parametrize("change", ["upgraded", "removed", "touched"])
 def test_a_library_that_changes_ends_the_belief(library: Path, change: str) -> None:
-    gl_known.keep("egl", Trial("a renderer", [str(library)]))
+    gl_known.keep("egl", GlTrial("a renderer", [str(library)]))
     assert known(library) == "a renderer"
     match change:
         case "upgraded":
@@ -139,10 +139,10 @@ def test_a_device_that_comes_or_is_forbidden_ends_the_belief(
     library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(gl_known, "DEVICES", (f"{tmp_path}/renderD*",))
-    gl_known.keep("egl", Trial("a renderer", [str(library)]))
+    gl_known.keep("egl", GlTrial("a renderer", [str(library)]))
     (tmp_path / "renderD128").touch()
     assert known(library) is None
-    gl_known.keep("egl", Trial("a renderer", [str(library)]))
+    gl_known.keep("egl", GlTrial("a renderer", [str(library)]))
     assert known(library) == "a renderer"
     monkeypatch.setattr(os, "access", lambda _path, _mode: False)
     assert known(library) is None
@@ -150,7 +150,7 @@ def test_a_device_that_comes_or_is_forbidden_ends_the_belief(
 
 @pytest.mark.parametrize("name", ["GALLIUM_DRIVER", "__EGL_VENDOR_LIBRARY_FILENAMES", "MUJOCO_EGL_DEVICE_ID"])
 def test_another_choice_of_driver_ends_the_belief(library: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    gl_known.keep("osmesa", Trial("a renderer", [str(library)]))
+    gl_known.keep("osmesa", GlTrial("a renderer", [str(library)]))
     monkeypatch.setenv(name, "other")
     assert known(library) is None
     monkeypatch.delenv(name)
@@ -158,7 +158,7 @@ def test_another_choice_of_driver_ends_the_belief(library: Path, monkeypatch: py
 
 
 def test_another_installation_of_python_tries_for_itself(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    gl_known.keep("egl", Trial("a renderer", [str(library)]))
+    gl_known.keep("egl", GlTrial("a renderer", [str(library)]))
     monkeypatch.setattr(sys, "prefix", "/another/environment")
     assert known(library) is None
 
@@ -168,18 +168,18 @@ def test_a_file_that_is_not_what_was_kept_is_nothing(cache: Path, library: Path,
     cache.parent.mkdir(parents=True)
     cache.write_bytes(content)
     assert known(library) is None
-    gl_known.keep("egl", Trial("a renderer", [str(library)]))
+    gl_known.keep("egl", GlTrial("a renderer", [str(library)]))
     assert known(library) == "a renderer"
 
 
 def test_an_account_that_cannot_keep_anything_tries_each_time(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for place in (str(library), "/proc/nowhere"):  # a file instead of a folder, a file system without files
         monkeypatch.setenv("XDG_CACHE_HOME", place)
-        gl_known.keep("egl", Trial("a renderer", [str(library)]))
+        gl_known.keep("egl", GlTrial("a renderer", [str(library)]))
         assert known(library) is None
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr(Path, "home", homeless)
-    gl_known.keep("egl", Trial("a renderer", [str(library)]))
+    gl_known.keep("egl", GlTrial("a renderer", [str(library)]))
     assert known(library) is None
 
 
@@ -188,7 +188,7 @@ def homeless() -> Path:
 
 
 def test_a_belief_that_was_wrong_is_forgotten(cache: Path, library: Path, tmp_path: Path) -> None:
-    gl_known.keep("egl", Trial("a renderer", [str(library)]))
+    gl_known.keep("egl", GlTrial("a renderer", [str(library)]))
     assert probe_once(tmp_path) == GlSupport("egl", "a renderer", "")
     forget(tmp_path)
     assert not cache.exists()
