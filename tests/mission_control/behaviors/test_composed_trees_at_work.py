@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from fake_resource_pool import FakePlacer
+from fake_resource_pool import FakePlacer, Run
 from trees_of_components import (
     ARC,
     FAILURE,
     SUCCESS,
-    Run,
     ended,
     granted,
     is_running,

@@ -57,7 +57,7 @@ def test_what_only_keeps_nonsense_away_is_no_range() -> None:
     values = {"left_wheel_m": 12.3, "closed": 0.25, "is_holding": True, "unheard_of": 1.5}
     shown = {gauge.name: gauge for gauge in gauges(Readings("rover1", 1.0, values), field_forms(RoverReport))}
     assert (shown["left wheel"].text, shown["left wheel"].share, shown["left wheel"].span) == ("12.3 m", -1.0, "")
-    assert shown["left wheel"].doc.startswith("Way of its left wheel")
+    assert shown["left wheel"].doc.startswith("Way of the left wheel")
     assert (shown["closed"].share, shown["closed"].span, shown["closed"].is_share) == (0.25, "0 to 1", False)
     assert (shown["is holding"].text, shown["is holding"].flag) == ("on", True)
     assert (shown["unheard of"].text, shown["unheard of"].doc) == ("1.5", "")
