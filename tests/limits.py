@@ -29,8 +29,8 @@ from backbone.bus import clock
 VIRTUAL_LIMIT_S = 1_000.0  # chosen: four times the longest mission of a test without the marker
 GRACE_S = 60.0  # chosen: a test that was interrupted may stop its mission
 LOCKS = (Path(__file__).with_name("conftest.py"), Path(__file__))  # files that are there anyway
-TRIALS = ("backbone.mission.class_probe", "scout_model.gl_trial", "def get_version(library_handle)")
-"""Parts of commands that try whether something can be loaded: two of the product, one of glfw, which MuJoCo loads."""
+TRIALS = ("backbone.mission.class_probe", "scout_model.gl_trial", "def get_version(library_handle)", "fc-list")
+"""Parts of commands that look what is there: two of the product, one of glfw, which MuJoCo loads, one of matplotlib."""
 STARTS_A_PROCESS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn"})
 
 
