@@ -45,7 +45,8 @@ async def test_the_list_names_every_command_and_one_without_fields_is_given_by_e
     async with ConsoleApp(session).run_test(size=SIZE, notifications=True) as pilot:
         listed = await shown_after(pilot, "o")
         assert "which command for scout1?" in listed
-        assert all(line in listed for line in ("jump  Wind the spring foot and kick", "shine  Set the lamp's brightness"))
+        assert "jump  Wind the spring foot and kick" in listed
+        assert "shine  Set the lamp's brightness" in listed
         await shown_after(pilot, "enter")
         assert session.wanted == [GiveWish("jump", {}, "scout")]
 
