@@ -70,6 +70,7 @@ async def test_each_of_many_listeners_gets_what_it_listens_to(pair: Pair) -> Non
         for one in listeners:
             listener.subscribe(pattern, SAID, News, one, lossless=True)
     await until_streams(sender, 120)
+    await until(lambda: len(sender.lossless.to(f"{SERVER}/part", SAID)) == 40, "streams of the part")
     sender.publish(SERVER, SAID, News(1))
     sender.publish(f"{SERVER}/part", SAID, News(2))
     for pattern, numbers in {SERVER: [1], "*/*": [1], "backbone/*": [1], "*/*/*": [2]}.items():
