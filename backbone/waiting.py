@@ -52,11 +52,13 @@ async def end_tasks(*tasks: asyncio.Future[Any]) -> None:
 
 
 def bug_of(task: asyncio.Task[Any]) -> BaseException | None:
-    """Return the bug that ended a task; a ``CancelledError`` is one if nobody cancelled it."""
+    """Return the bug that ended a task; a ``CancelledError`` is a bug if no caller cancelled the task."""
     if not task.cancelled():
         return task.exception()
     return (
-        None if task.cancelling() else RuntimeError(f"{task.get_name()} raised CancelledError, and nobody cancelled it")
+        None
+        if task.cancelling()
+        else RuntimeError(f"{task.get_name()} raised CancelledError, and no caller cancelled it")
     )
 
 

@@ -261,7 +261,7 @@ def listen(directory: Path, name: str) -> socket.socket:
 
 
 def accept(listening: socket.socket) -> socket.socket:
-    """Return the next connection, whoever is at its other end. Never waits.
+    """Return the next connection without waiting. The caller checks the user of its peer.
 
     Raises:
         OSError: There is none (``BlockingIOError``), or the system refuses it.

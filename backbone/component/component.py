@@ -34,7 +34,7 @@ from backbone.component.messages import (
     WrongParameter,
 )
 from backbone.component.name_claim import claim_name
-from backbone.component.story import StoryBook, complaint
+from backbone.component.story import StoryBook, feedback_of
 from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
@@ -261,7 +261,7 @@ class Component(Generic[P_co]):
         """End because of a bug; ``run`` raises it."""
         if self._bug is None:
             self._bug = bug
-            self.feedback = complaint(bug)
+            self.feedback = feedback_of(bug)
             self.story.note(self.name, f"failed: {self.feedback}")
             is_refusal = isinstance(bug, BackboneError)  # its detail is clearer than a traceback
             log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_refusal else bug)
@@ -296,7 +296,7 @@ class Component(Generic[P_co]):
             LinkError: No nameserver answered within ``REGISTER_WITHIN_S``.
             BaseException: The bug that ended the component.
         """
-        self.bus.on_bug, self.bus.on_unreadable = self.fail, UnreadableKeys(self).tell
+        self.bus.on_bug, self.bus.on_unreadable = self.fail, UnreadableKeys(self).log
         try:
             if await self._unless_ended(self._claim_name(), "claim"):
                 await self._live_and_report_end()
@@ -315,7 +315,7 @@ class Component(Generic[P_co]):
         except Exception as bug:
             self.fail(bug)
         if self._bug is not None:
-            self.feedback = complaint(self._bug)  # draining may have reported something else
+            self.feedback = feedback_of(self._bug)  # draining may have reported something else
         self._enter(LifeState.FAILED if self._bug is not None else LifeState.STOPPED)
         if self._token is not None:
             self._token.close()

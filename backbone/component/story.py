@@ -67,6 +67,6 @@ def _spoken_of(name: str) -> re.Pattern[str]:
     return re.compile(rf"(?<![\w-]){re.escape(name)}(?![\w-])")
 
 
-def complaint(bug: BaseException) -> str:
-    """Return a bug as one line for people."""
+def feedback_of(bug: BaseException) -> str:
+    """Return a bug as one line of a component's feedback."""
     return f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]

@@ -1,4 +1,4 @@
-"""Keys whose publications a component cannot read: told once each, because it waits for them without a word."""
+"""Keys whose publications a component cannot decode: it logs each key once, because its own work only stands still."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Protocol
 from backbone.component.log_level import LogLevel
 from backbone.errors import Refusal
 
-MOST_TOLD = 16  # chosen: more than an honest mission ever has; garbage on thousands of keys fills no log
+MOST_LOGGED = 16  # chosen: more than a correct mission has; garbage on thousands of keys does not fill the log
 
 
-class Teller(Protocol):
-    """A component, as far as this module needs it."""
+class Logging(Protocol):
+    """The part of a component that this module needs."""
 
     @property
     def name(self) -> str:
@@ -22,19 +22,19 @@ class Teller(Protocol):
 
 
 class UnreadableKeys:
-    """Tells each key at its first publication that cannot be read.
+    """Publishes one warning for each key, at the first publication that the component cannot decode.
 
     Args:
-        component: Whose story has it.
+        component: The component, whose story gets the warnings.
     """
 
-    def __init__(self, component: Teller) -> None:
+    def __init__(self, component: Logging) -> None:
         self._component = component
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
 
-    def tell(self, key: str, refusal: Refusal) -> None:
-        """Tell why, unless the key was told."""
-        if key not in self._told and len(self._told) < MOST_TOLD:
-            self._told.add(key)
-            told = f"cannot read {key}: {refusal.detail} (remedy: {refusal.remedy})"
-            self._component.publish_event(self._component.name, told, LogLevel.WARNING)
+    def log(self, key: str, refusal: Refusal) -> None:
+        """Publish the warning, unless the key has had one or ``MOST_LOGGED`` keys have."""
+        if key not in self._logged and len(self._logged) < MOST_LOGGED:
+            self._logged.add(key)
+            warning = f"cannot read {key}: {refusal.detail} (remedy: {refusal.remedy})"
+            self._component.publish_event(self._component.name, warning, LogLevel.WARNING)
