@@ -89,7 +89,7 @@ def test_each_host_records_all_that_its_components_say_and_nothing_else(night: N
         }
         lacks = sorted(elsewhere - recorded)
         assert not lacks
-        assert len(elsewhere) > 100
+        assert elsewhere, "there is something to compare"
 
 
 def test_pictures_are_recorded_by_their_own_host(night: Night) -> None:
