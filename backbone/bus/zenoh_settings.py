@@ -1,6 +1,6 @@
 """Settings of a Zenoh session, as plain data: of a client and of a hub. Pure.
 
-Measured settings: clients of one hub, no scouting, lease 2 s, but 8 s if no link leaves the host
+Measured settings: clients of one hub, no scouting, lease 2 s, but 24 s if no link leaves the host
 (docs/decisions/0003-zenoh-settings.md).
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from backbone.authentication import SOCKET, USER
 
 LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses its own link
-HOST_LEASE_MS = 8000  # chosen: a unix socket cannot be cut, and a creator replaces a hung process after 3 s
+HOST_LEASE_MS = 24_000  # chosen: a unix socket cannot be cut, and a creator replaces a hung process after 3 s
 KEEP_ALIVES = 4  # chosen: in each lease, so that three may be late
 RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
 OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine listens within this time
