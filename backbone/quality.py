@@ -67,7 +67,9 @@ QUALITY: dict[Conversation, Quality] = {
     # Sent once: each message must arrive. Only questions and answers are express, because a single small message gains
     # nothing from a batch. Without batches a queue holds two messages and dropped up to 360 of a burst of 1000.
     Conversation.ASK: Quality(reliable=True, express=True),
-    Conversation.COMMAND: Quality(reliable=True, urgency=Urgency.URGENT, most_bytes=FEW_BYTES),
+    Conversation.COMMAND: Quality(
+        reliable=True, urgency=Urgency.URGENT, most_bytes=FEW_BYTES, most_bytes_on_host=FEW_BYTES
+    ),
     Conversation.LEASES: Quality(reliable=True, urgency=Urgency.URGENT),
     Conversation.STATUS: Quality(reliable=True),
     Conversation.EVENTS: Quality(reliable=True, most_bytes=SOME_BYTES),
@@ -97,10 +99,12 @@ QUALITY: dict[Conversation, Quality] = {
 
 NEVER_DROPPED = frozenset(one for one, quality in QUALITY.items() if quality.reliable) - {Conversation.ASK}
 """Conversations whose publications must arrive: a subscriber that does not read them blocks senders."""
-LARGE = frozenset(one for one, quality in QUALITY.items() if quality.most_bytes_on_host)
-"""Conversations of large values: listeners on the sender's host read them on its blackboard."""
-OF_ANY_SIZE = frozenset({Conversation.BODIES})
-"""Large conversations whose small values use the blackboard too: few senders repeat them many times a second."""
+EACH_ON_HOST = frozenset({Conversation.COMMAND})
+"""Conversations whose listeners on the sender's host get each message from its blackboard, in order."""
+LARGE = frozenset(one for one, quality in QUALITY.items() if quality.most_bytes_on_host) - EACH_ON_HOST
+"""Conversations of large values: listeners on the sender's host read the newest one on its blackboard."""
+OF_ANY_SIZE = frozenset({Conversation.BODIES}) | EACH_ON_HOST
+"""Conversations whose small values use the blackboard too: few senders repeat them many times a second."""
 
 
 class OutputQuality(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -1,4 +1,4 @@
-"""The writer of a board: it never waits for a reader, and each reader finds the newest whole value.
+"""The writer of a board: it never waits for a reader, and each reader finds the newest whole value, or each one.
 
 A reader makes a pair of sockets and passes two descriptors to the writer: the end to send values to, and a second
 handle of the reader's own end. With this handle the writer removes a value that the reader has not received yet, so
@@ -72,13 +72,19 @@ class _ConnectedReader:
     way: socket.socket | None = None
     undelivered: socket.socket | None = None
 
-    def send(self, newest: _Outgoing) -> None:
+    def send(self, newest: _Outgoing, *, each: bool) -> None:
         """Replace the undelivered value by this one; until then the reader can still receive the former value.
 
+        Args:
+            each: True: send it after the undelivered values, not in their place.
+
         Raises:
-            OSError: It cannot be sent.
+            OSError: It cannot be sent; ``BlockingIOError``: the socket is full.
         """
         if self.way is None or self.undelivered is None:
+            return
+        if each:
+            newest.send(self.way)
             return
         is_behind = bool(sealed_memory.peek(self.undelivered, 1))
         try:
@@ -107,6 +113,8 @@ class BlackboardWriter:
         name: A legal name.
         most_bytes: Longest value.
         keeps: False: without a reader nothing is kept, so a newcomer never gets an old value.
+        each: True: a reader gets each value put after its coming, in order; a value that its full socket does not admit
+            is lost.
 
     Raises:
         WriterStands: Another writer of this name lives.
@@ -115,10 +123,18 @@ class BlackboardWriter:
         OSError: The system refuses the files.
     """
 
-    def __init__(self, directory: Path, name: str, *, most_bytes: int = MOST_VALUE_BYTES, keeps: bool = True) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        name: str,
+        *,
+        most_bytes: int = MOST_VALUE_BYTES,
+        keeps: bool = True,
+        each: bool = False,
+    ) -> None:
         if not sealed_memory.IS_POSSIBLE:
             raise NoBlackboard("sealed memory files need Linux")
-        self._directory, self._most = directory, most_bytes
+        self._directory, self._name, self._most, self._each = directory, name, most_bytes, each
         self.keeps = keeps
         """False: without a reader nothing is kept; settable."""
         self._socket_name, self._lock_name = files_of(name)
@@ -139,6 +155,8 @@ class BlackboardWriter:
         self._is_open, self._is_served, self._accept_again_s = True, False, math.inf
         self.number = 0
         """Number of the newest value; 0: none yet."""
+        self.lost = 0
+        """Values that did not fit into a reader's socket; only with ``each``."""
 
     @property
     def has_readers(self) -> bool:
@@ -146,7 +164,7 @@ class BlackboardWriter:
         return any(reader.way is not None for reader in self._readers.values())
 
     def put(self, value: bytes | memoryview) -> int:
-        """Send this value to all readers, in place of values that they have not received yet; return its number.
+        """Send this value to all readers, in place of values that they have not received; return its number.
 
         Never waits for a reader. The bytes are copied once.
 
@@ -167,6 +185,8 @@ class BlackboardWriter:
             self._newest = sent
             for descriptor in tuple(self._readers):
                 self._send_to(descriptor, sent)
+            if self._each:
+                self._forget()
         return self.number
 
     def serve(self) -> None:
@@ -262,9 +282,11 @@ class BlackboardWriter:
 
     def _send_to(self, descriptor: int, sent: _Outgoing) -> None:
         try:
-            self._readers[descriptor].send(sent)
-        except BlockingIOError:
-            pass  # its socket is smaller than a packet
+            self._readers[descriptor].send(sent, each=self._each)
+        except BlockingIOError:  # its socket is full, or smaller than a packet
+            if self._each:
+                log.log(logging.DEBUG if self.lost else logging.WARNING, "a reader of %s does not read", self._name)
+                self.lost += 1
         except OSError:
             self._let_go(descriptor)
 

@@ -1,4 +1,4 @@
-"""Boards of one bus: large values reach listeners of the same host over a blackboard, never over the network.
+"""Boards of one bus: values reach listeners of the same host over a blackboard, never over the network.
 
 A board is named after its key and its sender, so several senders of one key do not disturb each other.
 """
@@ -37,9 +37,13 @@ class HostBoards:
         self._directory, self._loop = directory / FOLDER, asyncio.get_running_loop()
         self.neighbors = neighbors
 
-    def board(self, key: str, source: str, least_bytes: int = LARGE_BYTES) -> SentBoard:
-        """Return the board of a sender for a key; the first value of at least ``least_bytes`` opens it."""
-        return SentBoard(self._directory, _name(key, source), self._loop, least_bytes)
+    def board(self, key: str, source: str, least_bytes: int = LARGE_BYTES, *, each: bool = False) -> SentBoard:
+        """Return the board of a sender for a key; the first value of at least ``least_bytes`` opens it.
+
+        Args:
+            each: True: its readers get each value, not only the newest.
+        """
+        return SentBoard(self._directory, _name(key, source), self._loop, least_bytes, each=each)
 
     def look(self, key: str, source: str) -> BlackboardReader | None:
         """Return a new reader of a sender's board; None: it has none on this host."""
@@ -51,10 +55,13 @@ class HostBoards:
 
 
 class SentBoard:
-    """The board of one sender for one key, which opens with the first large value."""
+    """The board of one sender for one key, which opens with the first value that is long enough."""
 
-    def __init__(self, directory: Path, name: str, loop: asyncio.AbstractEventLoop, least_bytes: int) -> None:
+    def __init__(
+        self, directory: Path, name: str, loop: asyncio.AbstractEventLoop, least_bytes: int, *, each: bool
+    ) -> None:
         self._directory, self._name, self._loop, self._least_bytes = directory, name, loop, least_bytes
+        self._each = each
         self._writer: BlackboardWriter | None = None
         self._try_again_s = 0.0
 
@@ -93,7 +100,7 @@ class SentBoard:
             return False
         try:
             self._writer = BlackboardWriter(
-                self._directory, self._name, most_bytes=MAX_LARGE_MESSAGE_BYTES, keeps=False
+                self._directory, self._name, most_bytes=MAX_LARGE_MESSAGE_BYTES, keeps=False, each=self._each
             )
         except (WriterStands, ForeignFolder, OSError) as refusal:
             log.info("no board on this host: %s", refusal)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
@@ -102,6 +103,27 @@ class Receiving(Protocol):
         """Messages that came for it and were not handed over."""
 
 
+class _Waiting:
+    """Bytes that wait for the event loop, and number of messages without room. Used from several threads."""
+
+    def __init__(self, most_bytes: int) -> None:
+        self._most, self._bytes, self._guard = most_bytes, 0, threading.Lock()
+        self.dropped = 0
+
+    def admits(self, length: int) -> bool:
+        """Count a message of this length, or return False if too many bytes wait."""
+        with self._guard:
+            has_room = self._bytes + length <= self._most
+            self._bytes += length if has_room else 0
+            self.dropped += not has_room
+            return has_room
+
+    def ends(self, length: int) -> None:
+        """Record that a message of this length waits no longer."""
+        with self._guard:
+            self._bytes -= length
+
+
 class EachSample:
     """Receives every sample of a subscriber, in order, as long as no more than ``MOST_WAITING_BYTES`` wait.
 
@@ -119,25 +141,20 @@ class EachSample:
         most_bytes: int = MAX_MESSAGE_BYTES,
     ) -> None:
         self._bus, self.of, self._reader, self._listener, self._most = bus, of, reader, listener, most_bytes
-        self._came = self._went = 0  # bytes; each is written by one thread only
-        self._dropped = 0
+        self._waiting = _Waiting(MOST_WAITING_BYTES)
 
     @property
     def dropped(self) -> int:
         """Samples that came and were not handed over, because others waited or newer ones came."""
-        return self._dropped
+        return self._waiting.dropped
 
     def __call__(self, sample: Sample) -> None:
-        """Take a sample in; called from another thread."""
-        length = len(sample.payload)
-        if self._came - self._went + length > MOST_WAITING_BYTES:
-            self._dropped += 1
-            return
-        self._came += length
-        self._bus.push(self._hand_over_one, sample)
+        """Take a sample in; called from any thread."""
+        if self._waiting.admits(len(sample.payload)):
+            self._bus.push(self._hand_over_one, sample)
 
     def _hand_over_one(self, sample: Sample) -> None:
-        self._went += len(sample.payload)
+        self._waiting.ends(len(sample.payload))
         self.hand_over(str(sample.key_expr), sample.payload)
 
     def hand_over(self, key: str, payload: Payload) -> None:
@@ -164,27 +181,22 @@ class OverheardSamples:
     """Receives every sample of a subscriber, in order, as long as no more than ``most_waiting_bytes`` wait."""
 
     def __init__(self, bus: InboxBus, listener: Overhearer, most_waiting_bytes: int) -> None:
-        self._bus, self._listener, self._most = bus, listener, most_waiting_bytes
-        self._came = self._went = 0  # bytes; each is written by one thread only
-        self._dropped = 0
+        self._bus, self._listener = bus, listener
+        self._waiting = _Waiting(most_waiting_bytes)
         self.declared: Subscription | None = None
 
     @property
     def dropped(self) -> int:
         """Number of samples that came while too many waited."""
-        return self._dropped
+        return self._waiting.dropped
 
     def __call__(self, sample: Sample) -> None:
-        """Take a sample in; called from another thread."""
-        length = len(sample.payload)
-        if self._came - self._went + length > self._most:
-            self._dropped += 1
-            return
-        self._came += length
-        self._bus.gather(self._hand_over_one, sample)
+        """Take a sample in; called from any thread."""
+        if self._waiting.admits(len(sample.payload)):
+            self._bus.gather(self._hand_over_one, sample)
 
     def _hand_over_one(self, sample: Sample) -> None:
-        self._went += len(sample.payload)
+        self._waiting.ends(len(sample.payload))
         self.hand_over(str(sample.key_expr), sample.payload)
 
     def hand_over(self, key: str, payload: Payload) -> None:
@@ -201,7 +213,7 @@ class OverheardSamples:
 class LatestSample(EachSample):
     """Receives only the newest undelivered sample of each key.
 
-    Two threads share a dictionary and a flag, in atomic steps. Their order makes this safe: zenoh's thread stores
+    Threads share a dictionary and a flag, in atomic steps. Their order makes this safe: another thread stores
     before it reads the flag, and the loop clears the flag before it takes samples out.
     """
 
@@ -218,9 +230,9 @@ class LatestSample(EachSample):
         self._pushed = False
 
     def __call__(self, sample: Sample) -> None:
-        """Take a sample in; called from another thread."""
+        """Take a sample in; called from any thread."""
         name = str(sample.key_expr)
-        self._dropped += name in self._newest
+        self._waiting.dropped += name in self._newest
         self._newest[name] = sample
         if not self._pushed:
             self._pushed = True

@@ -1,6 +1,6 @@
-"""A subscription to the newest large value of one key: from blackboards of this host if possible, else by network.
+"""A subscription to the values of one key: from blackboards of this host if possible, else by network.
 
-It begins with a subscription on the network. Each sender of a large conversation declares a token. When every sender
+It begins with a subscription on the network. Each sender that uses blackboards declares a token. When every sender
 with a token for the key has put a value on its board, the network's subscription is withdrawn. If a board ends, or
 another sender declares a token, the network's subscription is declared again at once. So no sender is missed for longer
 than a declaration takes.
@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol
 from backbone.blackboard.reader import BlackboardReader
 from backbone.blackboard.values import NoWriter
 from backbone.bus.host_boards import LOOK_EACH_S, HostBoards
-from backbone.bus.inbox import InboxBus, LatestSample, Sample
+from backbone.bus.inbox import EachSample, InboxBus, LatestSample, Sample
 from backbone.bus.interface import Listener
 from backbone.errors import Refusal
 from backbone.wire import MAX_LARGE_MESSAGE_BYTES, Envelope, Message, Reader
@@ -97,7 +97,7 @@ class NewestOnly:
 
 
 class NearListening(LatestSample):
-    """A subscription to one key; it is called with each sample from the network.
+    """A subscription to the newest value of one key; it is called with each sample from the network.
 
     Args:
         key: Key of the publications.
@@ -223,3 +223,11 @@ class NearListening(LatestSample):
         elif not self._senders.need_network and self._network is not None:
             self._network.undeclare()
             self._network = None
+
+
+class EachNear(NearListening):
+    """A subscription to each value of one key, on boards that keep each value for their readers."""
+
+    def __call__(self, sample: Sample) -> None:
+        """Take a sample in; called from any thread."""
+        EachSample.__call__(self, sample)

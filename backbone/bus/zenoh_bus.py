@@ -2,7 +2,7 @@
 
 Zenoh's threads never run component code: they put arrivals into an inbox and wake the event loop once for a whole
 burst. Callbacks of ``get`` are direct, because zenoh would start a thread for each indirect one. Callbacks of tokens
-are direct, too. Other subscribers and queryables keep their one indirect thread.
+and, outside the hub, of subscribers are direct, too. Inboxes and queryables keep their one indirect thread.
 
 Measured: ``express`` on questions and replies only, blocking for messages that are sent once, dropping for repeated
 messages (docs/decisions/0003-zenoh-settings.md).
@@ -41,7 +41,7 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.bus.lossless_streams import LosslessOverhearing, LosslessSamples, LosslessStreams
-from backbone.bus.near_listening import NearListening
+from backbone.bus.near_listening import EachNear, NearListening
 from backbone.bus.zenoh_far_copies import FarCopies, copiers, send_copies
 from backbone.bus.zenoh_life import LifeBus
 from backbone.bus.zenoh_outlets import Outlet, Outlets, Receiver
@@ -58,7 +58,7 @@ from backbone.bus.zenoh_sessions import (
 from backbone.bus.zenoh_subscribers import Subscribers
 from backbone.errors import Refusal
 from backbone.keys import Conversation, key, key_of_all, key_of_senders, sender_of
-from backbone.quality import LARGE, NEVER_DROPPED, QUALITY
+from backbone.quality import EACH_ON_HOST, LARGE, NEVER_DROPPED, QUALITY
 from backbone.wire import (
     Accepts,
     Envelope,
@@ -105,7 +105,7 @@ class ZenohBus(LifeBus):
         """Copies for the recorder of the mission, if no socket leads to it; settable."""
         self.boards: HostBoards | None = None
         """Boards for large values to and from this host; settable before the first message."""
-        self.subscribers = Subscribers(session)
+        self.subscribers = Subscribers(session, is_hub=is_hub)
         """Settable: one for all buses of a session."""
         self._shared = shared
         self._links = None if shared else watch_links(session)
@@ -302,8 +302,9 @@ class ZenohBus(LifeBus):
             each = EachSample(self, pattern, reader, listener, most_bytes)
             hearing = LosslessSamples(self, self._session, pattern, each.hand_over)
             return self._declare(hearing, hearing)
-        if latest and self.boards is not None and conversation in LARGE and "*" not in address:
-            near = self._listen_near(self.boards, pattern, reader, listener)
+        is_near = conversation in EACH_ON_HOST or (latest and conversation in LARGE)
+        if is_near and self.boards is not None and "*" not in address:
+            near = self._listen_near(self.boards, pattern, reader, listener, NearListening if latest else EachNear)
             return self._declare(near, near)
         kind = LatestSample if latest else EachSample
         receive = kind(self, pattern, reader, listener, most_bytes)
@@ -317,13 +318,15 @@ class ZenohBus(LifeBus):
                 counts[one.receiver.of.split("/", 2)[2]] += one.receiver.dropped
         return dict(counts)
 
-    def _listen_near(self, boards: HostBoards, own: str, reader: Reader[Message], listener: Listener) -> NearListening:
+    def _listen_near(
+        self, boards: HostBoards, own: str, reader: Reader[Message], listener: Listener, kind: type[NearListening]
+    ) -> NearListening:
         """Listen to one key, from boards of this host if its senders have some."""
 
         def declare(receive: Callable[[zenoh.Sample], None]) -> Any:
             return self.subscribers.declare(own, receive)
 
-        near = NearListening(self, reader, listener, boards, own, declare)
+        near = kind(self, reader, listener, boards, own, declare)
 
         def changed(sample: zenoh.Sample) -> None:
             near.sender_changed(sender_of(own, str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)

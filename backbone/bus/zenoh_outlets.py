@@ -10,7 +10,7 @@ import zenoh
 
 from backbone.bus.host_boards import LARGE_BYTES, HostBoards, SentBoard
 from backbone.keys import Conversation, key, key_of_sender
-from backbone.quality import OF_ANY_SIZE, Quality, Urgency
+from backbone.quality import EACH_ON_HOST, OF_ANY_SIZE, Quality, Urgency
 from backbone.wire import Envelope, Message, refuse_oversized, write
 
 MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
@@ -192,7 +192,9 @@ class Outlets:
         publisher = self._session.declare_publisher(name, allowed_destination=self._destination, **on_the_wire(quality))
         is_large = quality.most_bytes_on_host > 0
         from_bytes = 0 if conversation in OF_ANY_SIZE else LARGE_BYTES
-        board = boards.board(name, self._source, from_bytes) if boards is not None and is_large else None
+        board = None
+        if boards is not None and is_large:
+            board = boards.board(name, self._source, from_bytes, each=conversation in EACH_ON_HOST)
 
         def declare_token() -> zenoh.LivelinessToken:
             return self._session.liveliness().declare_token(key_of_sender(name, self._source))

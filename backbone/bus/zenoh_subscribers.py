@@ -1,7 +1,8 @@
 """The subscribers of one session: one zenoh subscriber for each pattern of keys, for all listeners of the process.
 
-Each subscriber of zenoh has a thread. The members of a shared process listen to the same keys, such as the leases, so
-one thread wakes for all of them.
+The members of a shared process listen to the same keys, such as the leases, and each message reaches the process once.
+In a client's process, zenoh's receiving thread calls the listeners. In the hub's process each subscriber has a thread,
+because a hub that routes must not wait for Python.
 """
 
 from __future__ import annotations
@@ -15,10 +16,14 @@ Receive = Callable[[zenoh.Sample], None]
 
 
 class Subscribers:
-    """Declares subscribers on a session. Used in the event loop; receivers are called in threads of zenoh."""
+    """Declares subscribers on a session. Used in the event loop; receivers are called in threads of zenoh.
 
-    def __init__(self, session: zenoh.Session) -> None:
-        self._session = session
+    Args:
+        is_hub: True if the session is the hub itself.
+    """
+
+    def __init__(self, session: zenoh.Session, *, is_hub: bool = False) -> None:
+        self._session, self._is_hub = session, is_hub
         self._fans: dict[str, _Fan] = {}
 
     def declare(self, pattern: str, receive: Receive) -> Subscribed:
@@ -26,7 +31,8 @@ class Subscribers:
         fan = self._fans.get(pattern)
         if fan is None:
             fan = self._fans[pattern] = _Fan()
-            fan.entity = self._session.declare_subscriber(pattern, fan)
+            each = zenoh.handlers.Callback(fan, indirect=self._is_hub)
+            fan.entity = self._session.declare_subscriber(pattern, each)
         fan.receivers = (*fan.receivers, receive)
         return Subscribed(lambda: self._withdraw(pattern, receive))
 

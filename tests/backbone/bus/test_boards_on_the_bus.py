@@ -94,10 +94,11 @@ async def test_pictures_leave_the_network_and_are_neither_old_nor_doubled(folder
         (Conversation.OUTPUTS, LARGE_BYTES, True),
         (Conversation.OUTPUTS, LARGE_BYTES // 2, False),
         (Conversation.BODIES, 10, True),
+        (Conversation.COMMAND, 10, True),
         (Conversation.EVENTS, LARGE_BYTES, False),
     ],
 )
-async def test_only_large_values_of_large_conversations_and_all_bodies_have_a_board(
+async def test_only_large_values_of_large_conversations_and_all_bodies_and_commands_have_a_board(
     folder: Path, conversation: Conversation, size: int, is_near: bool
 ) -> None:
     async with host(folder) as near:
