@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 
 from backbone.bus.interface import Bus
@@ -34,6 +34,30 @@ def opening_port(host: str, port: int) -> Iterator[None]:
         raise PortUnusable(f"cannot listen at {host}:{port}: {error}", host=host, port=port) from error
 
 
+@contextmanager
+def watching_end(bus: Bus, ended: Callable[[str], None]) -> Iterator[None]:
+    """Call a function with a line for people if, before the block's end, the mission's hub was away for long.
+
+    Long is ``GONE_AFTER_S``.
+    """
+    loop = asyncio.get_running_loop()
+    line = f"{bus.mission} has ended, or its hub cannot be reached"
+    timer = loop.call_later(GONE_AFTER_S, ended, line)  # the hub may have left just now, and then no news comes
+
+    def link_changed(is_up: bool) -> None:
+        nonlocal timer
+        timer.cancel()
+        if not is_up:
+            timer = loop.call_later(GONE_AFTER_S, ended, line)
+
+    watching = bus.watch_link(link_changed)
+    try:
+        yield
+    finally:
+        watching.close()
+        timer.cancel()
+
+
 @asynccontextmanager
 async def until_ended(bus: Bus, for_s: float | None = None) -> AsyncIterator[asyncio.Event]:
     """Yield an event that is set by a signal, by a bug, or once the mission's hub was away for ``GONE_AFTER_S``.
@@ -52,27 +76,19 @@ async def until_ended(bus: Bus, for_s: float | None = None) -> AsyncIterator[asy
         bugs.append(bug)
         ended.set()
 
-    def gone() -> None:
-        say(f"{bus.mission} has ended, or its hub cannot be reached")
+    def gone(line: str) -> None:
+        say(line)
         ended.set()
 
-    timers = {"gone": loop.call_later(GONE_AFTER_S, gone)}  # the hub may have left just now, and then no news comes
-    if for_s is not None:
-        timers["for"] = loop.call_later(for_s, ended.set)
-
-    def link_changed(is_up: bool) -> None:
-        timers["gone"].cancel()
-        if not is_up:
-            timers["gone"] = loop.call_later(GONE_AFTER_S, gone)
-
+    timer = loop.call_later(for_s, ended.set) if for_s is not None else None
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
-    bus.on_bug, watching = failed, bus.watch_link(link_changed)
+    bus.on_bug = failed
     try:
-        yield ended
+        with watching_end(bus, gone):
+            yield ended
     finally:
-        watching.close()
-        for timer in timers.values():
+        if timer is not None:
             timer.cancel()
     if bugs:
         raise bugs[0]

@@ -298,6 +298,8 @@ def replay(
 
     given = dict(named_value(value) for value in values or [])
     allowed = dict(_tolerance(one) for one in tolerances or [])
+    if without == "":
+        raise typer.BadParameter("--without needs the name of a component")
     if without == "rc_manager":
         run(lambda: replaying.decide_anew(file, since_s or 0.0, given, as_json=as_json))
     if without:

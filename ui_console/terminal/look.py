@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from backbone.bus.interface import Bus, Clock
 from backbone.command_line.connection import connected
+from backbone.command_line.listening import watching_end
 from backbone.command_line.where import Where
 from backbone.debug_views import UnknownView, ViewEntry, ViewKind, ViewPicture, ViewValue
 from backbone.errors import LinkError, Refusal
@@ -55,7 +56,7 @@ class LookOptions:
     Attributes:
         as_json: JSON lines instead of a screen.
         save: File for one picture; None: none.
-        for_s: Machine seconds after which the command ends; 0: it ends at Ctrl-C.
+        for_s: Machine seconds after which the command ends; 0: it ends at Ctrl-C, or with its mission.
     """
 
     as_json: bool = False
@@ -89,13 +90,21 @@ async def look_into(where: Where, name: str, view: str, options: LookOptions) ->
                 f"{name} has no view {view!r}{did_you_mean(view, names)}; it has: {', '.join(names) or 'none yet'}"
             )
         looked = _Looked(bus, clock, behavior, meant)
-        if options.save is not None:
-            return await _save(looked, options.save, options.for_s)
-        if options.as_json or meant.kind is ViewKind.VALUE:
-            return await looked.until_end(_printer(as_json=options.as_json), options.for_s)
-        if not (sys.stdin.isatty() and sys.stdout.isatty()):
-            raise NoTerminal(f"the picture {view} needs a terminal")
-        return await _live(looked, options.for_s)
+        with watching_end(bus, looked.mission_ended):
+            code = await _shown(looked, options)
+        if looked.farewell:
+            say(looked.farewell)
+        return code
+
+
+async def _shown(looked: _Looked, options: LookOptions) -> ExitCode:
+    if options.save is not None:
+        return await _save(looked, options.save, options.for_s)
+    if options.as_json or looked.entry.kind is ViewKind.VALUE:
+        return await looked.until_end(_printer(as_json=options.as_json), options.for_s)
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise NoTerminal(f"the picture {looked.entry.view} needs a terminal")
+    return await _live(looked, options.for_s)
 
 
 def listed_lines(name: str, entries: list[ViewEntry]) -> list[str]:
@@ -134,6 +143,7 @@ class _Looked:
 
     Attributes:
         ended: Set when the command must end.
+        farewell: Line to print at the end; empty: none.
     """
 
     bus: Bus
@@ -141,6 +151,12 @@ class _Looked:
     behavior: str
     entry: ViewEntry
     ended: asyncio.Event = field(default_factory=asyncio.Event)
+    farewell: str = ""
+
+    def mission_ended(self, line: str) -> None:
+        """End, because the mission has ended."""
+        self.farewell = line
+        self.ended.set()
 
     async def until_end(
         self,
@@ -192,7 +208,8 @@ async def _save(looked: _Looked, file: Path, for_s: float) -> ExitCode:
     if not found:
         if ended is ExitCode.INTERRUPTED:
             return ended
-        raise NothingShown(f"no picture of {looked.entry.view} came within {for_s:g} s")
+        when = f"before {looked.farewell}" if looked.farewell else f"within {for_s:g} s"
+        raise NothingShown(f"no picture of {looked.entry.view} came {when}")
     await asyncio.to_thread(file.write_bytes, png(pixels_of(found[0])))
     say(f"{file}: {looked.entry.view} at {found[0].at_s:.2f} s")
     return ExitCode.DONE

@@ -56,6 +56,22 @@ def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
     assert hub_endpoint(right) == right
 
 
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--without", ""], "--without needs the name of a component"),
+        (["--set", "gain=2"], "are for --without NAME"),
+        (["--json"], "are for --without NAME"),
+    ],
+)
+def test_options_of_a_replay_that_mean_nothing_are_wrong_usage(tmp_path: Path, options: list[str], told: str) -> None:
+    recording = tmp_path / "night.mcap"
+    recording.touch()
+    done = CliRunner().invoke(app, ["replay", str(recording), *options])
+    assert done.exit_code == 2
+    assert told in " ".join(done.output.replace("│", " ").split())
+
+
 @pytest.mark.thorough
 def test_a_hub_that_is_not_there_is_one_sentence_without_anything_inner() -> None:
     words = ["status", "--mission", "m", "--connect", "unixsock-stream//nowhere/hub"]

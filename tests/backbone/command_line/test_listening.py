@@ -15,9 +15,11 @@ from backbone.command_line import watching
 from backbone.command_line.listening import GONE_AFTER_S, until_ended
 from backbone.command_line.watching import Watched
 from backbone.command_line.where import Where
+from backbone.debug_views import LookAt, LookedAt, ViewEntry, ViewKind, Views
 from backbone.launcher.endings import ExitCode
+from ui_console.terminal import look
 
-SELF = "ui_console/cli-1"
+SELF, BEHAVIOR = "ui_console/cli-1", "mission_control/watch"
 ANY = Where(None, None, None)
 UP, DOWN = True, False
 FOR_HOURS_S = 10_000.0
@@ -104,3 +106,33 @@ def test_who_watches_a_mission_ends_with_it(
     monkeypatch.setattr(watching, "connected", connected)
     assert run_virtual(play()) == pytest.approx(20.0 + GONE_AFTER_S, abs=1.0)
     assert "night has ended" in capsys.readouterr().err
+
+
+def test_who_looks_into_a_behavior_ends_with_its_mission(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @asynccontextmanager
+    async def connected(_where: Where) -> AsyncIterator[tuple[LocalBus, VirtualClock]]:
+        bus = LinkedBus([(0.0, UP), (20.0, DOWN)])
+        LocalBus(bus.network, BEHAVIOR, VirtualClock()).serve(BEHAVIOR, LookAt, answer)
+        yield bus, VirtualClock()
+
+    async def answer(_asked: object) -> LookedAt:
+        return LookedAt("threshold", ViewKind.VALUE, FOR_HOURS_S)
+
+    async def found(_bus: object, _name: str) -> str:
+        return BEHAVIOR
+
+    async def views(_bus: object, _behavior: str) -> Views:
+        return Views([ViewEntry("threshold", ViewKind.VALUE, 28.0)])
+
+    async def play() -> float:
+        async with asyncio.timeout(FOR_HOURS_S):
+            assert await look.look_into(ANY, "watch", "threshold", look.LookOptions()) is ExitCode.DONE
+        return VirtualClock().now_s()
+
+    monkeypatch.setattr(look, "connected", connected)
+    monkeypatch.setattr(look, "find_behavior", found)
+    monkeypatch.setattr(look, "views_of", views)
+    assert run_virtual(play()) == pytest.approx(20.0 + GONE_AFTER_S)
+    assert capsys.readouterr().err.endswith("night has ended, or its hub cannot be reached\n")
