@@ -19,7 +19,7 @@ import pytest
 from running_mission import RunningMission, mission_up
 
 from backbone.bus.zenoh_bus import ZenohBus
-from backbone.component.messages import AskStatistics, Statistics
+from backbone.component.messages import MESSAGES_DROPPED, AskStatistics, Statistics
 from backbone.errors import Refusal
 from backbone.exchange import SwapModule, Swapped
 from backbone.keys import Conversation
@@ -123,9 +123,10 @@ class Talk:
         return numbers[-1] - numbers[0] + 1 - len(numbers)
 
     async def overwritten(self) -> int:
-        """Return how many numbers the unit replaced by newer ones before it took them, as its process waited."""
+        """Return how many numbers newer ones replaced, in the unit or on the bus, before the unit took them."""
         told = await self.bus.ask(UNIT, AskStatistics(), Statistics, within_s=WITHIN_S)
-        return int(told.values.get("overwritten_asked", 0))
+        counts = ("overwritten_asked", f"{MESSAGES_DROPPED}{TESTER}/{Conversation.EVENTS}")
+        return int(sum(told.values.get(name, 0) for name in counts))
 
 
 @asynccontextmanager
