@@ -21,7 +21,7 @@ from backbone.operating_system.processes import processor_times_s
 
 log = logging.getLogger(__name__)
 
-BEAT_EVERY_S = 0.25  # chosen: a hung process is seen within 1 s, at four wake-ups of the event loop a second
+BEAT_EVERY_S = 1 / 3  # chosen: a hung process is seen within 1 s, at three wake-ups of the event loop a second
 DOING_BYTES = 160  # chosen: a line for people
 _ONE_BEAT_NS = 1_000_000_000  # chosen: every file system keeps whole seconds
 _LATEST_NS = 1_000_000_000 * _ONE_BEAT_NS  # 2001: the stamp of a file before its first beat is later

@@ -14,7 +14,7 @@ import importlib
 import math
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -61,7 +61,8 @@ class SimulatedFramegrabber:
         self._world: Subscription | None = None
         self._frequency = ""
         self._deliver: Callable[[Picture], None] | None = None
-        self._is_drawing = self._is_new = self._is_closed = False
+        self._drawing: Future[tuple[Picture, float]] | None = None
+        self._is_new = self._is_closed = False
         self._taking: set[asyncio.Task[None]] = set()
         self._next_s = -math.inf
         self._pace = PicturePace(site.parameters.frame_rate_hz)
@@ -127,15 +128,16 @@ class SimulatedFramegrabber:
 
     def _world_moved(self, envelope: Envelope[WorldState]) -> None:
         state = envelope.body
-        if self._deliver is None or self._is_drawing or state.at_s < self._next_s - EARLY_S:
+        is_drawing = self._drawing is not None and not self._drawing.done()
+        if self._deliver is None or is_drawing or state.at_s < self._next_s - EARLY_S:
             return
         pause_s = 1.0 / self._pace.allowed_hz
         in_time = state.at_s < self._next_s + pause_s
         self._next_s = (self._next_s if in_time else state.at_s) + pause_s
-        self._is_drawing = True
         tuned = _Tuned(self._frequency, self._deliver, self._is_new)
         self._is_new = False
-        taking = asyncio.create_task(self._take(state, tuned), name="take picture")
+        self._drawing = self._draw(state, tuned)
+        taking = asyncio.create_task(self._take(state.at_s, tuned, self._drawing), name="take picture")
         self._taking.add(taking)
         taking.add_done_callback(self._taken)
 
@@ -144,19 +146,27 @@ class SimulatedFramegrabber:
         if not taking.cancelled() and (bug := taking.exception()) is not None:
             self._site.fail(bug)
 
-    async def _take(self, state: WorldState, tuned: _Tuned) -> None:
-        assert self._studio is not None  # noqa: S101  open before the first state can arrive
-        run, clock = asyncio.get_running_loop().run_in_executor, self._site.clock
-        began_s = clock.now_s()
-        try:
-            picture, took_s = await run(self._thread, self._studio.take, state, tuned.frequency, tuned.is_new)
-        finally:
-            self._is_drawing = False
-        due_s = state.at_s + self._delay_s
+    async def _take(self, at_s: float, tuned: _Tuned, drawing: Future[tuple[Picture, float]]) -> None:
+        clock = self._site.clock
+        began_s, due_s = clock.now_s(), at_s + self._delay_s
         await clock.sleep_until_s(due_s)
+        picture, took_s = drawing.result() if drawing.done() else await asyncio.wrap_future(drawing)
         if self._deliver is tuned.deliver:
             self._keep_pace(max(due_s, began_s + took_s * clock.rate))
             tuned.deliver(picture)
+
+    def _draw(self, state: WorldState, tuned: _Tuned) -> Future[tuple[Picture, float]]:
+        """Draw in the thread, which does not wake the event loop when it is ready; on a virtual clock, draw at once."""
+        assert self._studio is not None  # noqa: S101  open before the first state can arrive
+        draw = functools.partial(self._studio.take, state, tuned.frequency, tuned.is_new)
+        if not isinstance(asyncio.get_running_loop(), VirtualLoop):
+            return self._thread.submit(draw)
+        drawn: Future[tuple[Picture, float]] = Future()
+        try:
+            drawn.set_result(draw())
+        except Exception as bug:
+            drawn.set_exception(bug)
+        return drawn
 
     def _keep_pace(self, due_s: float) -> None:
         """Compare the time of a delivery with the earliest possible one: frame due, and drawn without a wait."""
