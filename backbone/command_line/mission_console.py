@@ -31,6 +31,7 @@ from backbone.picture.screen import live_screen
 from backbone.picture.words import absence_line
 from backbone.printable import printable_all
 from backbone.printable_text import printable_lines
+from backbone.rc_manager.messages import AskSchedule, TraceLine
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
@@ -38,6 +39,8 @@ from backbone.wire import Envelope
 
 EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
 PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start takes less
+REPLY_TIME_S = 2.0  # chosen: the RC manager answers in milliseconds
+SWITCH_S = 0.1  # chosen: the decisions of one switch become one line; a person sees no delay
 REDRAW_EVERY_S = 0.5  # chosen: slices of seconds stay visible; a faster picture takes a core that the mission needs
 
 
@@ -98,8 +101,7 @@ class ConsoleObserver:
         if self._live:
             await self._show_live(bus, clock)
         else:
-            bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard_schedule, latest=True)
-            await asyncio.Event().wait()
+            await self._tell_holders(bus, clock)
 
     async def _show_live(self, bus: Bus, clock: Clock) -> None:
         console, picture = self._console, self._picture
@@ -139,8 +141,21 @@ class ConsoleObserver:
             [event] = self._picture.log.newest(1)
             self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")
 
-    def _heard_schedule(self, envelope: Envelope[Schedule]) -> None:
-        schedule = envelope.body
+    async def _tell_holders(self, bus: Bus, clock: Clock) -> None:
+        """Print the holders whenever they have changed, until cancelled.
+
+        The published schedule is not subscribed to, because it is worked out twice a second as long as it is heard.
+        """
+        decided = asyncio.Event()
+        bus.subscribe(RC_MANAGER, Conversation.EVENTS, TraceLine, lambda _line: decided.set())
+        while True:
+            decided.clear()
+            with contextlib.suppress(LinkError):  # of the next RC manager there are events, too
+                self._tell_changed(await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S))
+            await decided.wait()
+            await clock.sleep_s(SWITCH_S * clock.rate)
+
+    def _tell_changed(self, schedule: Schedule) -> None:
         if any(request.state in (RequestState.CONNECTING, RequestState.REVOKING) for request in schedule.requests):
             return
         line = self._picture.people.named(holders_line(schedule))
