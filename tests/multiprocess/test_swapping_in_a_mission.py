@@ -188,10 +188,11 @@ async def test_a_person_exchanges_a_module_and_a_new_start_has_the_new_class(
         pid = mission.component("answering")["pid"]
         os.kill(pid, signal.SIGSTOP)
         done = await command(mission, *words[:3])
-        with contextlib.suppress(ProcessLookupError):  # a busy machine takes so long that its creator has replaced it
+        with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGCONT)
-        assert done.returncode == 5
-        assert "answering does not answer" in done.stderr
+        if mission.component("answering")["pid"] == pid:  # on a busy machine its creator may have replaced it already
+            assert done.returncode == 5
+            assert "answering does not answer" in done.stderr
 
         talk.answered.clear()
         with contextlib.suppress(ProcessLookupError):
