@@ -25,11 +25,11 @@ class Conversation(StrEnum):
     FAR = "far"  # copies of all but pictures, from processes without a socket to the mission's recorder
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
-    COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
+    COMMAND = "command"  # commands without an answer: packets on the simulated air, at the address of their receiver
     TELEMETRY = "telemetry"  # states of RCs and hosts
     BODIES = "bodies"  # states of all bodies of a simulated world, once a frame
     MOTIONS = "motions"  # commands that a robot's RC has applied, and its halts without a command
-    REPLIES = "replies"  # replies of robots, as bytes: on the simulated air, and from a radio to the robots' RCs
+    REPLIES = "replies"  # replies of robots, as bytes, from a radio to the robots' RCs
     READINGS = "readings"  # measurements of the hardware, by name
     POSES = "poses"  # believed places of robots, from a localizer
     SIGHTINGS = "sightings"  # landmarks that behaviors see in robots' pictures

@@ -16,6 +16,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.world_messages import (
     AskWorld,
@@ -98,7 +99,7 @@ class SimulatedWorld(Component[WorldParameters]):
             self._publish(frame, due_s)
             for reply in self._replies.arrived(due_s):
                 on_air = ReplyOnAir(reply.radio, reply.network_id, reply.payload, reply.number)
-                self.bus.publish(self.address, Conversation.REPLIES, on_air)
+                self.bus.publish(address(Subsystem.RESOURCE_POOL, reply.radio), Conversation.COMMAND, on_air)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``AskWorld`` and the questions to localizers."""

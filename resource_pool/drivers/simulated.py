@@ -107,7 +107,8 @@ class SimulatedRadio:
         """Ask this robot for a reply every ``REPLY_EVERY_S``; a reply that has not arrived by then is lost."""
         self._hearing[network_id] = heard
         if self._replies is None:
-            self._replies = self._site.bus.subscribe(self._world, Conversation.REPLIES, ReplyOnAir, self._heard)
+            own = address(Subsystem.RESOURCE_POOL, self._site.resource)
+            self._replies = self._site.bus.subscribe(own, Conversation.COMMAND, ReplyOnAir, self._heard)
 
     async def close(self) -> None:
         """Stop receiving replies."""
@@ -123,7 +124,7 @@ class SimulatedRadio:
     def _heard(self, envelope: Envelope[ReplyOnAir]) -> None:
         reply = envelope.body
         heard = self._hearing.get(reply.network_id)
-        if heard is None or reply.radio != self._site.resource or not reply.payload:
+        if heard is None or not reply.payload:
             return
         self._turns.heard(reply.network_id)
         self._reply_bits[reply.network_id] = radio_link.packet_bits(reply.payload)

@@ -13,6 +13,7 @@ from backbone.ranges import (
     Instant,
     Mention,
     Meters,
+    Name,
     Number,
     Payload,
     Share,
@@ -37,7 +38,7 @@ class RadioPacket(Message, frozen=True, tag="RadioPacket/2"):
         asks: True: the packet asks the robot for a reply.
     """
 
-    radio: Mention
+    radio: Name
     network_id: Count
     payload: Payload
     arc: Mention = ""
@@ -49,7 +50,7 @@ class RadioPacket(Message, frozen=True, tag="RadioPacket/2"):
 
 
 class ReplyOnAir(Message, frozen=True):
-    """A robot's reply on the air: published under the world's address when it has arrived at the base.
+    """A robot's reply on the air: published under the radio's address as a command when it has arrived at the base.
 
     Attributes:
         radio: The radio that asked.
@@ -58,7 +59,7 @@ class ReplyOnAir(Message, frozen=True):
         number: Number of the packet that asked.
     """
 
-    radio: Mention
+    radio: Name
     network_id: Count
     payload: Payload
     number: Count
