@@ -82,7 +82,7 @@ def _worked(work: Callable[[Order], Result], order: Order) -> Result:
     What was imported by then and is kept it never looks through again, and it looks for garbage less often.
     """
     result = work(order)
-    if not gc.get_freeze_count():
+    if gc.get_threshold()[0] != OBJECTS_AT_ONCE:  # asking how many objects are frozen would count them all
         gc.collect()
         gc.freeze()
         gc.set_threshold(OBJECTS_AT_ONCE)
