@@ -278,6 +278,10 @@ class LocalBus(Neighbor):
         """Return whether a component hears this conversation at this bus's own address."""
         return self.is_overheard_by_neighbors(conversation)
 
+    def is_unheard(self, conversation: Conversation) -> bool:
+        """Return whether no component hears this conversation; see ``Bus.is_unheard``."""
+        return not self.is_overheard_by_neighbors(conversation)
+
     def declare_alive(self, address: str) -> NeighborDeclaration:
         """Declare a liveliness token; see ``Bus.declare_alive``."""
         self.require_open()
