@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scout_model.dimensions import DARKNESS, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
 from scout_model.painter import Painter
-from scout_model.world import STATE
+from scout_model.world import STATE, model_of
 
 MEMO_PICTURES = 256  # chosen: 20 MB; the views of a standing robot while nothing or little moves
 
@@ -81,7 +81,7 @@ class Camera:
     """
 
     def __init__(self, mjcf: str, backend: Literal["gl", "paint"], memo_pictures: int = MEMO_PICTURES) -> None:
-        self._model = mujoco.MjModel.from_xml_string(mjcf)
+        self._model = model_of(mjcf)
         self._data = mujoco.MjData(self._model)
         self._cameras = {
             self._model.camera(camera).name.rpartition("/")[0]: camera for camera in range(self._model.ncam)

@@ -108,7 +108,7 @@ class _Dice:
     """Random numbers drawn for every frame, whether an effect is on or off; effects draw further ones themselves."""
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self._top, self._left = rng.integers(0, _BANK_MARGIN_PX, 2)
+        self._top, self._left = int(rng.integers(0, _BANK_MARGIN_PX)), int(rng.integers(0, _BANK_MARGIN_PX))
         self.partial = rng.random()
         self._rng = rng
 
@@ -204,7 +204,7 @@ class Receiver:
 
     def _random(self, effect: _Effect, frame: int) -> np.random.Generator:
         words = [*self._words, *words_of(frame), effect]
-        return np.random.default_rng(np.array(words, np.uint32))
+        return np.random.Generator(np.random.PCG64(np.array(words, np.uint32)))  # NumPy's default, made sooner
 
     def _fade(self, robot: str, away_m: float, frame: int) -> tuple[float, float]:
         """Return the signal's power as a share of its mean, and the depth of the fade, 0 to 1."""
@@ -296,10 +296,13 @@ def _bank(level_db: int) -> Grain:
 
 def _with_ghost(picture: Picture, strength: float) -> Picture:
     """Return the picture with its echo; the brightness stays the same."""
-    ghosted = picture.copy()
+    ghosted = np.empty_like(picture)
     share = strength / (1.0 + strength)
-    late, early = picture[:, GHOST_SHIFT_PX:], picture[:, :-GHOST_SHIFT_PX]
-    cv2.addWeighted(late, 1.0 - share, early, share, 0.0, dst=ghosted[:, GHOST_SHIFT_PX:])
+    # All rows as one, which OpenCV adds without a stop at each row's end; the left edge, before the echo, follows.
+    row, ghosted_row = picture.reshape(1, -1), ghosted.reshape(1, -1)
+    late, early = row[:, GHOST_SHIFT_PX:], row[:, :-GHOST_SHIFT_PX]
+    cv2.addWeighted(late, 1.0 - share, early, share, 0.0, dst=ghosted_row[:, GHOST_SHIFT_PX:])
+    ghosted[:, :GHOST_SHIFT_PX] = picture[:, :GHOST_SHIFT_PX]
     return ghosted
 
 

@@ -9,6 +9,8 @@ body touches it or an actuator gets a control other than 0.
 
 from __future__ import annotations
 
+import copy
+import functools
 import math
 from dataclasses import dataclass, field
 
@@ -30,11 +32,22 @@ from scout_model.targets import Route, TargetState, part_poses, parts
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """The part of MuJoCo's state that determines a picture."""
 
+_MODELS_KEPT = 2  # chosen: one experiment or two by turns; some 100 kB each
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 _POSITIONS = {_FREE: 7, _BALL: 4, _SLIDE: 1, _HINGE: 1}
 _VELOCITIES = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
+
+
+def model_of(mjcf: str) -> mujoco.MjModel:
+    """Return MuJoCo's model of this text, which is the caller's own."""
+    return copy.copy(_compiled(mjcf))
+
+
+@functools.lru_cache(maxsize=_MODELS_KEPT)
+def _compiled(mjcf: str) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(mjcf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +86,7 @@ class World:
         self.mjcf = compose(description)
         """The world's model, from which ``Camera`` builds an identical one."""
         # From the text, not from the composed model, so that the world steps exactly the model that viewers draw.
-        self._model = mujoco.MjModel.from_xml_string(self.mjcf)
+        self._model = model_of(self.mjcf)
         self._data = mujoco.MjData(self._model)
         # MuJoCo's arrays stay where they are; each look-up of one in its data makes a new array of it.
         self._velocities, self._controls = self._data.qvel, self._data.ctrl
@@ -150,7 +163,8 @@ class World:
 
     def step_frame(self) -> None:
         """Advance by one frame, a thirtieth of a second."""
-        driven = [self._drive(robot) for robot in self._robots.values()]
+        now_s = self.time_s
+        driven = [self._drive(robot, now_s) for robot in self._robots.values()]
         if not any(driven) and not self._carried and self._is_all_asleep():
             # No robot moves: one step is enough to detect robots that a target touches, and to wake them.
             self._step += STEPS_PER_FRAME
@@ -308,9 +322,9 @@ class World:
     def _is_all_asleep(self) -> bool:
         return min(self._tree_asleep.tolist(), default=0) >= 0 and not np.count_nonzero(self._velocities)
 
-    def _drive(self, robot: _Body) -> bool:
+    def _drive(self, robot: _Body, now_s: float) -> bool:
         """Apply the robot program's outputs to the actuators; return whether any is not 0, which wakes the body."""
-        controls = robot.program.controls(self.time_s)
+        controls = robot.program.controls(now_s)
         if controls != robot.controls:
             for actuator, control in controls.items():
                 number = robot.actuators.get(actuator)

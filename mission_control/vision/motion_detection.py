@@ -142,7 +142,10 @@ def torn_rows(changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         >>> torn_rows(np.array([[True, True, True], [True, False, False]]))
         array([ True, False])
     """
-    return np.asarray(changed.sum(axis=1) / changed.shape[1] > ROW_SHARE, np.bool_)
+    width = changed.shape[1]
+    if np.count_nonzero(changed) <= ROW_SHARE * width:  # fewer than one whole row needs, as in most pictures
+        return np.zeros(len(changed), np.bool_)
+    return np.asarray(changed.sum(axis=1) / width > ROW_SHARE, np.bool_)
 
 
 def edges_moved(average: NDArray[np.float32], picture: NDArray[np.float32]) -> float:
@@ -228,7 +231,9 @@ def judge(picture: NDArray[np.float32], average: NDArray[np.float32], *, filters
     changed = np.asarray(difference > bar, np.bool_)
     torn = torn_rows(changed) if filters_rows else np.zeros(len(changed), np.bool_)
     stages = Stages(picture, average, difference, bar, changed, np.zeros_like(changed))
-    if torn.mean() > ROWS_SHARE or (filters_rows and edges_moved(average, picture) > EDGES_SHARE):
+    if np.count_nonzero(torn) > ROWS_SHARE * len(torn) or (
+        filters_rows and edges_moved(average, picture) > EDGES_SHARE
+    ):
         return Judged(stages, None, None)
     sound = np.repeat(~torn[:, np.newaxis], picture.shape[1], axis=1)
     stages = replace(stages, kept=changed & sound)
