@@ -96,6 +96,7 @@ class World:
         self.frame = 0
         """Frames stepped so far."""
         self._step = 0
+        self._stands = False  # True: the last step found nothing that moves, and would find the same again
         self._robots = {place.name: self._body(place) for place in description.robots}
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.robots}
         self._trips = trips(description)
@@ -166,21 +167,26 @@ class World:
         now_s = self.time_s
         driven = [self._drive(robot, now_s) for robot in self._robots.values()]
         if not any(driven) and not self._carried and self._is_all_asleep():
-            # No robot moves: one step is enough to detect robots that a target touches, and to wake them.
             self._step += STEPS_PER_FRAME
-            self._place_targets()
-            self._senses.step()
+            if self._place_targets() or not self._stands:
+                # No robot moves: one step is enough to detect robots that a target touches, and to wake them.
+                self._senses.step()
+            self._stands = True
         else:
-            for step in range(1, STEPS_PER_FRAME + 1):
-                if step < STEPS_PER_FRAME:
-                    mujoco.mj_step(self._model, self._data)
-                else:
-                    self._senses.step()
-                self._step += 1
-                self._place_targets()
-                self._hold_carried()
+            self._step_bodies()
+            self._stands = False
         self.frame += 1
         self._senses.update(self.time_s)
+
+    def _step_bodies(self) -> None:
+        for step in range(1, STEPS_PER_FRAME + 1):
+            if step < STEPS_PER_FRAME:
+                mujoco.mj_step(self._model, self._data)
+            else:
+                self._senses.step()
+            self._step += 1
+            self._place_targets()
+            self._hold_carried()
 
     def transmitting(self) -> dict[str, str]:
         """Return robot → video frequency, for robots whose transmitter is on."""
@@ -351,18 +357,20 @@ class World:
         quaternion: NDArray[np.float64] = self._data.mocap_quat[self._mocap[body]]
         return quaternion
 
-    def _place_targets(self) -> None:
-        time_s = self._step * STEP_S
+    def _place_targets(self) -> bool:
+        """Place the targets where they are by now; return whether one of them moved."""
+        time_s, moved = self._step * STEP_S, False
         for name, target in self._targets.items():
             pose = self._whereabouts[name](time_s)
             placed = self._placed.get(name)
             if pose is placed or pose == placed:
                 continue
-            self._placed[name] = pose
+            self._placed[name], moved = pose, True
             for part in parts(target, pose):
                 mocap = self._mocap[part.body]
                 self._mocap_positions[mocap] = part.position_m
                 self._mocap_quaternions[mocap] = part.quaternion
+        return moved
 
     def _hold_carried(self) -> None:
         if not self._carried:
