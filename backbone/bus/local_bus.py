@@ -193,6 +193,8 @@ class Neighbor(Declaring):
     def is_overheard_by_neighbors(self, conversation: Conversation) -> bool:
         """Return whether a component in this process hears this conversation at this bus's own address."""
         network = self.network
+        if not network.overhearers and not network.listeners[conversation]:  # as for most questions
+            return False
         return any(overheard.hears(self.source, conversation) for overheard in network.overhearers) or any(
             matches(listening.pattern, self.source) for listening in network.listeners[conversation]
         )
