@@ -126,6 +126,10 @@ class GatedBus:
         if self.is_open:
             self.bus.publish(address, conversation, message)
 
+    def is_unheard(self, conversation: Conversation) -> bool:
+        """Return whether no component hears this conversation; see ``Bus.is_unheard``."""
+        return self.bus.is_unheard(conversation)
+
     def declare_publisher(self, address: str, conversation: Conversation) -> None:
         """Declare the publisher of a key; see ``Bus.declare_publisher``."""
         self.bus.declare_publisher(address, conversation)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Annotated, Any
 
 import msgspec
 
 from backbone.component.launch import Launch
+
+KINDS_KEPT = 64  # chosen: more than the kinds of RCs in one process
 
 
 class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -32,7 +35,7 @@ class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 def sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:
     """Return the launch, with every parameter that is not the RC's own moved into the driver's options."""
-    own = {field.encode_name for field in msgspec.structs.fields(parameters_type)}
+    own = _names(parameters_type)
     given = launch.parameters
     options = {name: value for name, value in given.items() if name not in own}
     if not options:
@@ -40,3 +43,8 @@ def sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> L
     rest = {name: value for name, value in given.items() if name in own}
     rest["options"] = {**rest.get("options", {}), **options}
     return msgspec.structs.replace(launch, parameters=rest)
+
+
+@functools.lru_cache(maxsize=KINDS_KEPT)
+def _names(parameters_type: type[msgspec.Struct]) -> frozenset[str]:
+    return frozenset(field.encode_name for field in msgspec.structs.fields(parameters_type))

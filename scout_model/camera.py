@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scout_model.dimensions import DARKNESS, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
 from scout_model.painter import Painter
-from scout_model.world import STATE
+from scout_model.world import STATE, model_of
 
 MEMO_PICTURES = 256  # chosen: 20 MB; the views of a standing robot while nothing or little moves
 
@@ -81,7 +81,7 @@ class Camera:
     """
 
     def __init__(self, mjcf: str, backend: Literal["gl", "paint"], memo_pictures: int = MEMO_PICTURES) -> None:
-        self._model = mujoco.MjModel.from_xml_string(mjcf)
+        self._model = model_of(mjcf)
         self._data = mujoco.MjData(self._model)
         self._cameras = {
             self._model.camera(camera).name.rpartition("/")[0]: camera for camera in range(self._model.ncam)
@@ -129,7 +129,7 @@ class Camera:
         if state.shape != (self._length,):
             raise StateMismatch(f"a state of shape {state.shape}, this world's have {self._length} numbers")
         # Adding zero turns a negative zero into a positive one, because their bits differ.
-        rounded = np.round(state, _STATE_DECIMALS) + 0.0
+        rounded = state.round(_STATE_DECIMALS) + 0.0
         if (shown := rounded.tobytes()) == self._shown:
             return
         self._shown = shown
@@ -196,28 +196,19 @@ class _Movers:
         self._bodies = np.array([body for body in range(model.nbody) if len(geoms[body])], np.intp)
         self._roots = model.body_rootid[self._bodies]
         self._middles_m = np.array([model.geom_pos[geoms[body]].mean(axis=0) for body in self._bodies]).reshape(-1, 3)
-        self._radii_m = np.array(
-            [
-                (np.linalg.norm(model.geom_pos[geoms[body]] - middle_m, axis=1) + model.geom_rbound[geoms[body]]).max()
-                for body, middle_m in zip(self._bodies, self._middles_m, strict=True)
-            ]
-        )
-        down_rad = np.radians(model.cam_fovy) / 2
-        self._down_rad = down_rad
-        self._across_rad = np.arctan(np.tan(down_rad) * PICTURE_WIDTH_PX / PICTURE_HEIGHT_PX)
+        radii_m = [
+            (np.linalg.norm(model.geom_pos[geoms[body]] - middle_m, axis=1) + model.geom_rbound[geoms[body]]).max()
+            for body, middle_m in zip(self._bodies, self._middles_m, strict=True)
+        ]
+        self._reach_m = np.array(radii_m).reshape(-1, 1) + _MARGIN_M
+        self._outwards = [_outwards(math.radians(fovy_deg) / 2) for fovy_deg in model.cam_fovy.tolist()]
 
     def seen(self, data: mujoco.MjData, camera: int, is_dark: NDArray[np.bool_]) -> bytes:
         """Return a cache key: equal exactly if this camera and the moving bodies in its view have the same poses."""
         bodies, eye_m, axes = self._bodies, data.cam_xpos[camera], data.cam_xmat[camera].reshape(3, 3)
         middles_m = np.einsum("nij,nj->ni", data.xmat[bodies].reshape(-1, 3, 3), self._middles_m) + data.xpos[bodies]
-        right, up, back = ((middles_m - eye_m) @ axes).T
-        reach_m = self._radii_m + _MARGIN_M
-        across_rad, down_rad = float(self._across_rad[camera]), float(self._down_rad[camera])
-        in_view = (
-            (back < reach_m)
-            & (np.abs(right) * math.cos(across_rad) + back * math.sin(across_rad) < reach_m)
-            & (np.abs(up) * math.cos(down_rad) + back * math.sin(down_rad) < reach_m)
-        )
+        outside_m = (middles_m - eye_m) @ (axes @ self._outwards[camera])
+        in_view = (outside_m < self._reach_m).all(axis=1)
         shown = bodies[in_view]
         return b"".join(
             (
@@ -230,6 +221,18 @@ class _Movers:
                 is_dark[self._roots[in_view]].tobytes(),
             )
         )
+
+
+def _outwards(down_rad: float) -> NDArray[np.float64]:
+    """Return the normals of the planes around a camera's view, in its frame: right, left, top, bottom and behind.
+
+    Args:
+        down_rad: Half of its vertical view.
+    """
+    across_rad = math.atan(math.tan(down_rad) * PICTURE_WIDTH_PX / PICTURE_HEIGHT_PX)
+    across, up = math.cos(across_rad), math.cos(down_rad)
+    behind = [math.sin(across_rad), math.sin(across_rad), math.sin(down_rad), math.sin(down_rad), 1.0]
+    return np.array([[across, -across, 0.0, 0.0, 0.0], [0.0, 0.0, up, -up, 0.0], behind])
 
 
 class _Shade:

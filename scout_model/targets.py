@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 from scout_model.description import Target
 from scout_model.dimensions import PERSON_HIP_M, PERSON_HIP_WIDTH_M, PERSON_STRIDE_M, PERSON_SWING_RAD
@@ -14,8 +14,7 @@ SHAPES = ("pioneer", "person", CARRIER)
 LEGS = ("left_leg", "right_leg")
 
 
-@dataclass(frozen=True, slots=True)
-class TargetState:
+class TargetState(NamedTuple):
     """The state of a target at one time.
 
     Attributes:
@@ -31,8 +30,7 @@ class TargetState:
     walked_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class PartPose:
+class PartPose(NamedTuple):
     """The pose of one of the bodies that form a target.
 
     Attributes:
@@ -59,12 +57,15 @@ class Route:
         self._there = _Path(target.path)
         self._back = _Path(target.path[::-1])
         self._lap_s = self._there.length_m / target.speed_m_s + target.rest_s
-        self._path, self._pose = self._there, self._there.along(0.0)  # of the last question; a resting target repeats
+        self._first = self._there.along(0.0)
+        self._path, self._pose = self._there, self._first  # of the last question; a resting target repeats
 
     def where(self, time_s: float) -> TargetState:
         """Return the target's pose at this world time; see ``where``."""
         target = self._target
-        lap, lap_elapsed_s = divmod(max(0.0, time_s - target.begin_s), self._lap_s)
+        if time_s <= target.begin_s:
+            return self._first
+        lap, lap_elapsed_s = divmod(time_s - target.begin_s, self._lap_s)
         path = self._back if target.there_and_back and lap % 2 == 1 else self._there
         walked_m = min(path.length_m, lap_elapsed_s * target.speed_m_s)
         if path is not self._path or walked_m != self._pose.walked_m:

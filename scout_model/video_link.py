@@ -38,6 +38,7 @@ PARTIAL = 0.01  # chosen: share of frames the framegrabber leaves incomplete whi
 PARTIAL_IN_FADE = 0.5  # chosen: RAM 2002 attributes partial images to signals that are "bad enough"
 
 _BANK_MARGIN_PX = 128  # chosen: 16 384 different windows into the noise, drawn once instead of every frame
+_DICE_KEPT = 1024  # chosen: those of a trial, which other trials of the same seed throw again; 200 kB
 _GARBAGE_SHIFT_PX = 60  # chosen: rows tear by up to a fifth of the picture's width
 _SLIP_PX = (2.0, 10.0)  # chosen: shift of a row against the row above, at the edge and in the depth of a fade
 _OFF_LEVELS = (60.0, 120.0)  # chosen: error of black in a fade; RAM 2002: whole rows look "drastically different"
@@ -104,24 +105,28 @@ class _Effect(IntEnum):
     ECHO = 7
 
 
+@dataclass(frozen=True, slots=True)
 class _Dice:
-    """Random numbers drawn for every frame, whether an effect is on or off; effects draw further ones themselves."""
+    """Random numbers of a frame, drawn whether an effect is on or off; effects draw further ones themselves.
 
-    def __init__(self, rng: np.random.Generator) -> None:
-        self._top, self._left = rng.integers(0, _BANK_MARGIN_PX, 2)
-        self.partial = rng.random()
-        self._rng = rng
+    Attributes:
+        top: Place of the frame's window into the bank of noise.
+        left: The same.
+        partial: Whether the frame is incomplete: below the share of such frames.
+        tears: Number of torn lines.
+    """
+
+    top: int
+    left: int
+    partial: float
+    tears: int
 
     def window(self, levels: float) -> Grain:
         """Return noise of about this standard deviation, in steps of 1 dB: few banks serve all strengths."""
         bank = _bank(round(20 * math.log10(max(levels, FAINTEST_LEVELS))))
-        rows = slice(self._top, self._top + PICTURE_HEIGHT_PX)
-        columns = slice(self._left, self._left + PICTURE_WIDTH_PX)
+        rows = slice(self.top, self.top + PICTURE_HEIGHT_PX)
+        columns = slice(self.left, self.left + PICTURE_WIDTH_PX)
         return Grain(bank.brighter[rows, columns], bank.darker[rows, columns])
-
-    def tears(self, expected: float) -> int:
-        """Return the number of torn lines; call it once, as the last random number of the frame."""
-        return int(self._rng.poisson(expected))
 
 
 class Receiver:
@@ -162,7 +167,7 @@ class Receiver:
             _check(signal)
         if self._tuned_frame is None:
             self._tuned_frame = frame
-        dice = _Dice(self._random(_Effect.WHETHER, frame))
+        dice = self._dice(signals, frame)
         if not signals:
             reception = Reception(self._snow(dice), 0, FrameKind.SNOW)
         elif len(signals) == 1 or self._air.interference == 0:
@@ -188,8 +193,8 @@ class Receiver:
             picture = np.asarray(cv2.convertScaleAbs(picture, None, contrast, 128.0 * (1.0 - contrast)), np.uint8)
         power, depth = self._fade(signal.robot, away_m, frame)
         picture = self._with_noise(picture, strength_db + 10 * math.log10(power), dice)
-        if tears := dice.tears(air.noise * air.tears * (STRAY_TEARS + TEARS * signal.motors)):
-            picture, kind = _with_tears(picture, tears, self._random(_Effect.TEARS, frame)), FrameKind.TORN
+        if dice.tears:
+            picture, kind = _with_tears(picture, dice.tears, self._random(_Effect.TEARS, frame)), FrameKind.TORN
         if depth > 0:
             picture, kind = _slipping(picture, depth, self._random(_Effect.SLIP, frame)), FrameKind.FADED
         if dice.partial < air.noise * air.partial_frames * (PARTIAL_IN_FADE if depth > 0 else PARTIAL):
@@ -202,9 +207,13 @@ class Receiver:
             picture = picture.copy()
         return picture, kind
 
+    def _dice(self, signals: Sequence[Signal], frame: int) -> _Dice:
+        nearest = min(signals, key=lambda signal: signal.distance_m, default=None)
+        tears = 0.0 if nearest is None else STRAY_TEARS + TEARS * nearest.motors
+        return _throw((*self._words, *words_of(frame), _Effect.WHETHER), self._air.noise * self._air.tears * tears)
+
     def _random(self, effect: _Effect, frame: int) -> np.random.Generator:
-        words = [*self._words, *words_of(frame), effect]
-        return np.random.default_rng(np.array(words, np.uint32))
+        return _generator((*self._words, *words_of(frame), effect))
 
     def _fade(self, robot: str, away_m: float, frame: int) -> tuple[float, float]:
         """Return the signal's power as a share of its mean, and the depth of the fade, 0 to 1."""
@@ -279,6 +288,18 @@ def _check(signal: Signal) -> None:
         raise ValueError(f"motors must be within 0 to 1, not {signal.motors}")
 
 
+def _generator(words: Sequence[int]) -> np.random.Generator:
+    return np.random.Generator(np.random.PCG64(np.array(words, np.uint32)))  # NumPy's default, made sooner
+
+
+@functools.lru_cache(_DICE_KEPT)
+def _throw(words: Sequence[int], tears: float) -> _Dice:
+    """Return the random numbers of the frame with these words, and so many torn lines on average."""
+    rng = _generator(words)
+    top, left, partial = int(rng.integers(0, _BANK_MARGIN_PX)), int(rng.integers(0, _BANK_MARGIN_PX)), rng.random()
+    return _Dice(top, left, partial, int(rng.poisson(tears)))
+
+
 @functools.cache
 def _grain() -> NDArray[np.float32]:
     """Return noise of standard deviation 1, larger than a picture; the same in every run."""
@@ -296,10 +317,13 @@ def _bank(level_db: int) -> Grain:
 
 def _with_ghost(picture: Picture, strength: float) -> Picture:
     """Return the picture with its echo; the brightness stays the same."""
-    ghosted = picture.copy()
+    ghosted = np.empty_like(picture)
     share = strength / (1.0 + strength)
-    late, early = picture[:, GHOST_SHIFT_PX:], picture[:, :-GHOST_SHIFT_PX]
-    cv2.addWeighted(late, 1.0 - share, early, share, 0.0, dst=ghosted[:, GHOST_SHIFT_PX:])
+    # All rows as one, which OpenCV adds without a stop at each row's end; the left edge, before the echo, follows.
+    row, ghosted_row = picture.reshape(1, -1), ghosted.reshape(1, -1)
+    late, early = row[:, GHOST_SHIFT_PX:], row[:, :-GHOST_SHIFT_PX]
+    cv2.addWeighted(late, 1.0 - share, early, share, 0.0, dst=ghosted_row[:, GHOST_SHIFT_PX:])
+    ghosted[:, :GHOST_SHIFT_PX] = picture[:, :GHOST_SHIFT_PX]
     return ghosted
 
 

@@ -9,6 +9,8 @@ body touches it or an actuator gets a control other than 0.
 
 from __future__ import annotations
 
+import copy
+import functools
 import math
 from dataclasses import dataclass, field
 
@@ -30,11 +32,22 @@ from scout_model.targets import Route, TargetState, part_poses, parts
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """The part of MuJoCo's state that determines a picture."""
 
+_MODELS_KEPT = 2  # chosen: one experiment or two by turns; some 100 kB each
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 _POSITIONS = {_FREE: 7, _BALL: 4, _SLIDE: 1, _HINGE: 1}
 _VELOCITIES = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
+
+
+def model_of(mjcf: str) -> mujoco.MjModel:
+    """Return MuJoCo's model of this text, which is the caller's own."""
+    return copy.copy(_compiled(mjcf))
+
+
+@functools.lru_cache(maxsize=_MODELS_KEPT)
+def _compiled(mjcf: str) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(mjcf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +86,7 @@ class World:
         self.mjcf = compose(description)
         """The world's model, from which ``Camera`` builds an identical one."""
         # From the text, not from the composed model, so that the world steps exactly the model that viewers draw.
-        self._model = mujoco.MjModel.from_xml_string(self.mjcf)
+        self._model = model_of(self.mjcf)
         self._data = mujoco.MjData(self._model)
         # MuJoCo's arrays stay where they are; each look-up of one in its data makes a new array of it.
         self._velocities, self._controls = self._data.qvel, self._data.ctrl
@@ -83,6 +96,7 @@ class World:
         self.frame = 0
         """Frames stepped so far."""
         self._step = 0
+        self._stands = False  # True: the last step found nothing that moves, and would find the same again
         self._robots = {place.name: self._body(place) for place in description.robots}
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.robots}
         self._trips = trips(description)
@@ -150,23 +164,29 @@ class World:
 
     def step_frame(self) -> None:
         """Advance by one frame, a thirtieth of a second."""
-        driven = [self._drive(robot) for robot in self._robots.values()]
+        now_s = self.time_s
+        driven = [self._drive(robot, now_s) for robot in self._robots.values()]
         if not any(driven) and not self._carried and self._is_all_asleep():
-            # No robot moves: one step is enough to detect robots that a target touches, and to wake them.
             self._step += STEPS_PER_FRAME
-            self._place_targets()
-            self._senses.step()
+            if self._place_targets() or not self._stands:
+                # No robot moves: one step is enough to detect robots that a target touches, and to wake them.
+                self._senses.step()
+            self._stands = True
         else:
-            for step in range(1, STEPS_PER_FRAME + 1):
-                if step < STEPS_PER_FRAME:
-                    mujoco.mj_step(self._model, self._data)
-                else:
-                    self._senses.step()
-                self._step += 1
-                self._place_targets()
-                self._hold_carried()
+            self._step_bodies()
+            self._stands = False
         self.frame += 1
         self._senses.update(self.time_s)
+
+    def _step_bodies(self) -> None:
+        for step in range(1, STEPS_PER_FRAME + 1):
+            if step < STEPS_PER_FRAME:
+                mujoco.mj_step(self._model, self._data)
+            else:
+                self._senses.step()
+            self._step += 1
+            self._place_targets()
+            self._hold_carried()
 
     def transmitting(self) -> dict[str, str]:
         """Return robot → video frequency, for robots whose transmitter is on."""
@@ -308,9 +328,9 @@ class World:
     def _is_all_asleep(self) -> bool:
         return min(self._tree_asleep.tolist(), default=0) >= 0 and not np.count_nonzero(self._velocities)
 
-    def _drive(self, robot: _Body) -> bool:
+    def _drive(self, robot: _Body, now_s: float) -> bool:
         """Apply the robot program's outputs to the actuators; return whether any is not 0, which wakes the body."""
-        controls = robot.program.controls(self.time_s)
+        controls = robot.program.controls(now_s)
         if controls != robot.controls:
             for actuator, control in controls.items():
                 number = robot.actuators.get(actuator)
@@ -337,18 +357,20 @@ class World:
         quaternion: NDArray[np.float64] = self._data.mocap_quat[self._mocap[body]]
         return quaternion
 
-    def _place_targets(self) -> None:
-        time_s = self._step * STEP_S
+    def _place_targets(self) -> bool:
+        """Place the targets where they are by now; return whether one of them moved."""
+        time_s, moved = self._step * STEP_S, False
         for name, target in self._targets.items():
             pose = self._whereabouts[name](time_s)
             placed = self._placed.get(name)
             if pose is placed or pose == placed:
                 continue
-            self._placed[name] = pose
+            self._placed[name], moved = pose, True
             for part in parts(target, pose):
                 mocap = self._mocap[part.body]
                 self._mocap_positions[mocap] = part.position_m
                 self._mocap_quaternions[mocap] = part.quaternion
+        return moved
 
     def _hold_carried(self) -> None:
         if not self._carried:

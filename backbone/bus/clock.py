@@ -76,6 +76,9 @@ class PunctualClock(MissionClock):
 class VirtualClock:
     """Mission time that is the time of the running event loop, which a ``VirtualLoop`` makes virtual."""
 
+    def __init__(self) -> None:
+        self._loop: asyncio.AbstractEventLoop | None = None
+
     @property
     def rate(self) -> float:
         """Always 1, because time-outs and mission time are the same."""
@@ -83,7 +86,10 @@ class VirtualClock:
 
     def now_s(self) -> float:
         """Return the loop's time in seconds."""
-        return asyncio.get_running_loop().time()
+        loop = self._loop
+        if loop is None or not loop.is_running():  # Python asks the system for the process before it tells the loop
+            loop = self._loop = asyncio.get_running_loop()
+        return loop.time()
 
     async def sleep_s(self, duration_s: float) -> None:
         """Return after this many seconds of the loop; at least yields once."""
@@ -91,7 +97,7 @@ class VirtualClock:
 
     async def sleep_until_s(self, at_s: float) -> None:
         """Return at this time, at once if it has passed."""
-        await self.sleep_s(at_s - self.now_s())
+        await asyncio.sleep(max(0.0, at_s - self.now_s()))
 
 
 class NothingLeftToHappen(BackboneError):
@@ -102,6 +108,7 @@ class EndOfVirtualTime(BackboneError):
     """Virtual time has reached the end of its exact range."""
 
 
+OWN_SOCKETS = 1  # asyncio's selector loops: the socket by which other threads wake the loop
 RESOLUTION_S = time.get_clock_info("monotonic").resolution
 LAST_VIRTUAL_S = 2.0**23  # 97 days; later, steps of a float are coarser than the loop's 1 ns and timers never expire
 
@@ -111,12 +118,15 @@ class _JumpingSelector(selectors.BaseSelector):
 
     def __init__(self) -> None:
         self._real = selectors.DefaultSelector()
+        self._registered = 0
         self.now_s = 0.0
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         if timeout == 0:  # callbacks are ready; sockets are looked at before time goes on
             return []
-        if ready := self._real.select(0):
+        # The loop's own socket only ends a wait in the system, and no time is spent there.
+        has_sockets = self._registered > OWN_SOCKETS
+        if (has_sockets or timeout is None) and (ready := self._real.select(0)):
             return ready
         if timeout is None:
             raise NothingLeftToHappen(f"all tasks wait for ever at t={self.now_s:.6f} s")
@@ -126,10 +136,14 @@ class _JumpingSelector(selectors.BaseSelector):
         return []
 
     def register(self, fileobj: FileDescriptorLike, events: int, data: object = None) -> selectors.SelectorKey:
-        return self._real.register(fileobj, events, data)
+        key = self._real.register(fileobj, events, data)
+        self._registered += 1
+        return key
 
     def unregister(self, fileobj: FileDescriptorLike) -> selectors.SelectorKey:
-        return self._real.unregister(fileobj)
+        key = self._real.unregister(fileobj)
+        self._registered -= 1
+        return key
 
     def modify(self, fileobj: FileDescriptorLike, events: int, data: object = None) -> selectors.SelectorKey:
         return self._real.modify(fileobj, events, data)

@@ -113,6 +113,12 @@ class Bus(Protocol):
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Send the message to all present subscribers. Never waits, and needs no subscriber."""
 
+    def is_unheard(self, conversation: Conversation) -> bool:
+        """Return whether certainly no component gets what this bus publishes in this conversation at its own address.
+
+        For messages that are costly to make and soon followed by the next one.
+        """
+
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender, unchanged, to all present subscribers: for replays."""
 

@@ -193,6 +193,8 @@ class Neighbor(Declaring):
     def is_overheard_by_neighbors(self, conversation: Conversation) -> bool:
         """Return whether a component in this process hears this conversation at this bus's own address."""
         network = self.network
+        if not network.overhearers and not network.listeners[conversation]:  # as for most questions
+            return False
         return any(overheard.hears(self.source, conversation) for overheard in network.overhearers) or any(
             matches(listening.pattern, self.source) for listening in network.listeners[conversation]
         )
@@ -277,6 +279,10 @@ class LocalBus(Neighbor):
     def is_overheard(self, conversation: Conversation) -> bool:
         """Return whether a component hears this conversation at this bus's own address."""
         return self.is_overheard_by_neighbors(conversation)
+
+    def is_unheard(self, conversation: Conversation) -> bool:
+        """Return whether no component hears this conversation; see ``Bus.is_unheard``."""
+        return not self.is_overheard_by_neighbors(conversation)
 
     def declare_alive(self, address: str) -> NeighborDeclaration:
         """Declare a liveliness token; see ``Bus.declare_alive``."""

@@ -79,6 +79,7 @@ from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import (
     LEASE_S,
     Lease,
+    RequestState,
     Scheduled,
     SchedulingRequest,
     UnknownRequest,
@@ -374,17 +375,18 @@ class RcManager(Component[RcManagerParameters]):
         return max(CALM_S, CALM_EACH_S * self._lines_published)
 
     def publish_news(self) -> None:
-        """Publish the schedule, and, if it has changed, the number of ARCs that run."""
-        schedule = self.answers.schedule(self.clock.now_s())
-        self._lines_published = len(schedule.requests)
-        running = sum(1 for request in schedule.requests if request.state == "running")
-        feedback = f"{running} of {len(schedule.requests)} ARCs run"
+        """Publish the schedule, if a component may hear it, and, if it has changed, the number of ARCs that run."""
+        arcs = self.manager.master_schedule.state.arcs
+        self._lines_published = len(arcs)
+        running = sum(1 for arc in arcs.values() if arc.state is RequestState.RUNNING)
+        feedback = f"{running} of {len(arcs)} ARCs run"
         if self._log.why_no_trace:
             feedback += f"; {self._log.why_no_trace}"
         if feedback != self.feedback:
             self.feedback = feedback
             super().publish_news()
-        self.bus.publish(self.address, Conversation.SCHEDULE, schedule)
+        if not self.bus.is_unheard(Conversation.SCHEDULE):
+            self.bus.publish(self.address, Conversation.SCHEDULE, self.answers.schedule(self.clock.now_s()))
 
 
 def _has_lines(trace: Path) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import multiprocessing
 import os
+import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -63,11 +64,24 @@ def results_of(
         return
     # Spawned, not forked: a fork of a process with threads of its own may hang.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, initializer=_keep_to_one_core) as pool:
+    with ProcessPoolExecutor(jobs, context, initializer=_begin) as pool:
         try:
             yield from pool.map(partial(_worked, work), orders, chunksize=chunk)
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _begin() -> None:
+    _keep_to_one_core()
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End at once when the process that gives the orders has ended, even if it was killed."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _keep_to_one_core() -> None:
@@ -82,7 +96,7 @@ def _worked(work: Callable[[Order], Result], order: Order) -> Result:
     What was imported by then and is kept it never looks through again, and it looks for garbage less often.
     """
     result = work(order)
-    if not gc.get_freeze_count():
+    if gc.get_threshold()[0] != OBJECTS_AT_ONCE:  # asking how many objects are frozen would count them all
         gc.collect()
         gc.freeze()
         gc.set_threshold(OBJECTS_AT_ONCE)

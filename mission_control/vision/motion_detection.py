@@ -142,6 +142,8 @@ def torn_rows(changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         >>> torn_rows(np.array([[True, True, True], [True, False, False]]))
         array([ True, False])
     """
+    if np.count_nonzero(changed) <= ROW_SHARE * changed.shape[1]:  # too few for one row, as in most pictures
+        return np.zeros(len(changed), np.bool_)
     return np.asarray(changed.sum(axis=1) / changed.shape[1] > ROW_SHARE, np.bool_)
 
 
@@ -157,12 +159,20 @@ def edges_moved(average: NDArray[np.float32], picture: NDArray[np.float32]) -> f
         >>> edges_moved(post, np.roll(post, 3, axis=1)), edges_moved(0 * post, post)
         (1.0, 0.0)
     """
+    return _edges_moved(average, [picture])[0]
+
+
+def _like(average: NDArray[np.float32], pictures: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
+    """Return the pictures in which few of the average's edges have moved."""
+    return [one for one, share in zip(pictures, _edges_moved(average, pictures), strict=True) if share <= EDGES_SHARE]
+
+
+def _edges_moved(average: NDArray[np.float32], pictures: Sequence[NDArray[np.float32]]) -> list[float]:
     edges = cv2.absdiff(average[:, 1:], average[:, :-1]) > EDGE_LEVELS
-    count = int(np.count_nonzero(edges))
-    if count < LEAST_EDGES_PX:
-        return 0.0
-    differs = cv2.absdiff(picture, average) > EDGE_LEVELS
-    return float(np.count_nonzero(edges & (differs[:, 1:] | differs[:, :-1])) / count)
+    if (count := int(np.count_nonzero(edges))) < LEAST_EDGES_PX:
+        return [0.0] * len(pictures)
+    differ = [cv2.absdiff(picture, average) > EDGE_LEVELS for picture in pictures]
+    return [float(np.count_nonzero(edges & (one[:, 1:] | one[:, :-1])) / count) for one in differ]
 
 
 def largest_blob(changed: NDArray[np.bool_], *, drop_streaks: bool = True) -> Blob | None:
@@ -316,11 +326,10 @@ class Background:
         if len(self._fresh) < FAST_FRAMES:
             return
         old = self._average
-        same = [] if old is None else [fresh for fresh in self._fresh if edges_moved(old, fresh) <= EDGES_SHARE]
+        same = [] if old is None else _like(old, self._fresh)
         counted = same if len(same) >= LEAST_SAME else self._fresh
         median = median_of(counted)
-        alike = sum(edges_moved(median, fresh) <= EDGES_SHARE for fresh in counted)
-        if 2 * alike <= len(counted):
+        if 2 * len(_like(median, counted)) <= len(counted):
             del self._fresh[0]
             return
         if old is not None and counted is same:

@@ -1,6 +1,7 @@
 """A robot that stands still costs nothing and stays the same, bit for bit."""
 
 import numpy as np
+import pytest
 from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -95,3 +96,34 @@ def test_the_same_packets_at_the_same_frames_give_the_same_state(heard: list[tup
             world.step_frame()
         states.append(world.state().tobytes())
     assert states[0] == states[1]
+
+
+@given(st.lists(st.tuples(st.integers(0, 150), st.integers(1, 4), packets), max_size=3), st.floats(0.0, 6.0))
+@settings(max_examples=share(10))
+def test_a_frame_in_which_nothing_moves_is_as_if_it_were_stepped(
+    heard: list[tuple[int, int, bytes]], begin_s: float
+) -> None:
+    """A target passes robots closely, walks into one of them, and rests."""
+    target = Target("pioneer", "pioneer", [(1.0, 2.6), (3.4, 2.6), (3.0, 1.0)], 1.0, begin_s=begin_s, rest_s=60.0)
+    place_targets = World.__dict__["_place_targets"]
+
+    def and_forget(world: World) -> bool:
+        vars(world)["_stands"] = False
+        return bool(place_targets(world))
+
+    def course() -> list[tuple[bytes, list[bytes]]]:
+        world = World(WorldDescription(9.0, 6.0, 1, robots=PLACES, targets=[target]))
+        after = []
+        for pause, network_id, payload in [*heard, (360, 1, radio_link.encode_halt())]:
+            for frame in range(pause):
+                if frame % 30 == 20:  # a robot answers who has sent it something
+                    world.hear(1 + frame // 30 % len(PLACES), radio_link.encode_transmitter_on("video1"))
+                world.step_frame()
+                after.append((world.state().tobytes(), [world.reply(place.network_id) for place in PLACES]))
+            world.hear(network_id, payload)
+        return after
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(World, "_place_targets", and_forget)
+        stepped = course()
+    assert course() == stepped

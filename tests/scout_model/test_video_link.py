@@ -111,6 +111,16 @@ def test_a_ghost_is_the_same_picture_a_little_to_the_right() -> None:
         assert changed.size == 0 or (changed.min() >= 160 and changed.max() < 170)
 
 
+def test_a_ghost_stays_in_its_row() -> None:
+    one = np.random.default_rng(1).integers(0, 256, (240, 320)).astype(np.uint8)
+    other = one.copy()
+    other[100] = 255 - other[100]
+    air = only("ghosts", 5.0)
+    for first, second in zip(received(air, 30, Signal(one)), received(air, 30, Signal(other)), strict=True):
+        assert np.array_equal(first[:, :9], one[:, :9])
+        assert np.flatnonzero((first != second).any(axis=1)).tolist() == [100]
+
+
 def test_ghosts_come_and_go() -> None:
     found = Counter(kinds(only("ghosts", 3.0), 900, Signal(STRIPES)))
     assert 0.2 < found[FrameKind.GHOST] / 900 < 0.8

@@ -12,7 +12,7 @@ from scout_model import dimensions, radio_link
 from scout_model.description import CLEAN_AIR, Furniture, RobotPlace, Target, WorldDescription
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.scout import Spring
-from scout_model.world import World
+from scout_model.world import World, model_of
 
 NORTH = math.pi / 2
 EMPTY = WorldDescription(
@@ -260,3 +260,13 @@ def test_worlds_that_differ_in_air_and_later_departures_alone_have_one_model_and
     mjcf = World(described).mjcf
     assert World(other_air).mjcf == World(later).mjcf == mjcf
     assert len({mjcf, World(under_way).mjcf, World(msgspec.structs.replace(described, seed=1)).mjcf}) == 3
+
+
+def test_a_model_of_a_text_is_the_caller_s_own_and_the_same_for_all() -> None:
+    text = World(EMPTY).mjcf
+    one, fresh = model_of(text), mujoco.MjModel.from_xml_string(text)
+    one.geom_rgba[:], one.opt.disableflags, one.opt.timestep = 0.0, 1, 1.0
+    other = model_of(text)
+    assert (other.opt.disableflags, other.opt.timestep) == (fresh.opt.disableflags, fresh.opt.timestep)
+    for name in ("geom_rgba", "geom_pos", "body_mass", "dof_damping", "actuator_gainprm", "names", "qpos0"):
+        assert np.array_equal(np.array(getattr(other, name)), np.array(getattr(fresh, name)))

@@ -8,6 +8,8 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import closing
+from itertools import groupby
 from pathlib import Path
 
 import msgspec
@@ -17,7 +19,7 @@ from mission_control.laboratory.experiments.conditions import PUBLISHED, Conditi
 from mission_control.laboratory.experiments.intervals import standard_errors_apart, wilson
 from mission_control.laboratory.experiments.prediction import predicted
 from mission_control.laboratory.experiments.trial import Trial, run_trial
-from mission_control.laboratory.harness import Progress, run_all
+from mission_control.laboratory.harness import Progress, results_of
 
 TRIALS = 200
 """S105: number of trials of each condition, by default."""
@@ -34,6 +36,10 @@ class TrialOrder(msgspec.Struct, frozen=True):
     seed: int
     number: int
     trace: str = ""
+
+
+Piece = Sequence[TrialOrder] | Condition
+"""Work for one process at a time: trials of one room, which share its model and its pictures, or a prediction."""
 
 
 class ConditionRow(msgspec.Struct, frozen=True):
@@ -184,10 +190,22 @@ def run_surveillance(
         for number in range(trials)
     ]
     turns = sorted(range(len(orders)), key=lambda place: _room(orders[place]))
-    done = run_all(run_order, [orders[place] for place in turns], jobs=jobs, progress=progress)
+    rooms = [[orders[place] for place in room] for _, room in groupby(turns, lambda place: _room(orders[place]))]
+    pieces: list[Piece] = [*rooms, *conditions]  # predictions come last: they are short, so no process is alone long
+    done, rates = list[Trial](), list[float]()
+    with closing(results_of(run_piece, pieces, jobs=jobs)) as outcomes:
+        for outcome in outcomes:
+            if isinstance(outcome, float):
+                rates.append(outcome)
+                continue
+            for trial in outcome:
+                done.append(trial)
+                if progress is not None:
+                    progress(len(done), len(orders))
     results = [trial for _, trial in sorted(zip(turns, done, strict=True), key=lambda placed: placed[0])]
     rows = [
-        _row(condition, results[place * trials : (place + 1) * trials]) for place, condition in enumerate(conditions)
+        _row(condition, results[place * trials : (place + 1) * trials], rates[place])
+        for place, condition in enumerate(conditions)
     ]
     return SurveillanceOutcome(seed, rows, time.monotonic() - began_s)
 
@@ -197,18 +215,23 @@ def run_order(order: TrialOrder) -> Trial:
     return run_trial(order.condition, order.seed, order.number, trace=Path(order.trace) if order.trace else None)
 
 
+def run_piece(piece: Piece) -> list[Trial] | float:
+    """Run the trials, or return the predicted share of detections."""
+    return predicted(piece) if isinstance(piece, Condition) else [run_order(order) for order in piece]
+
+
 def _room(order: TrialOrder) -> tuple[int, int, int, str]:
-    """Return what is the same for trials with the same room: side by side, they share its model and its pictures."""
+    """Return what is the same for trials with the same room."""
     condition = order.condition
     return order.number, condition.active, condition.extra, condition.target
 
 
-def _row(condition: Condition, trials: Sequence[Trial]) -> ConditionRow:
+def _row(condition: Condition, trials: Sequence[Trial], rate: float) -> ConditionRow:
     return ConditionRow(
         condition=condition,
         trials=len(trials),
         detected=sum(trial.detected for trial in trials),
-        predicted=predicted(condition),
+        predicted=rate,
         false_alarms=sum(trial.false_alarms for trial in trials),
         switches=sum(trial.switches for trial in trials),
         disagreements=[f"trial {trial.number}: {said}" for trial in trials for said in trial.disagreements],

@@ -289,3 +289,16 @@ def test_who_overhears_without_loss_gets_all_of_a_burst_and_copies_too(on_bus: R
 class Picture(Message, frozen=True):
     number: int
     pixels: bytes
+
+
+def test_a_bus_never_says_that_nobody_hears_it_while_somebody_does(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, listener, recorder = net.join(SERVER), net.join(ASKER), net.join(THIRD)
+        heard = Heard()
+        subscribed = listener.subscribe(SERVER, Conversation.POSES, News, heard)
+        assert not source.is_unheard(Conversation.POSES)
+        subscribed.close()
+        recorder.overhear(Conversation.POSES, lambda _key, _raw: None, 1_000_000)
+        assert not source.is_unheard(Conversation.POSES)
+
+    on_bus(law)

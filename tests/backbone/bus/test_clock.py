@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import math
 import random
+import socket
+import threading
 import time
 from collections.abc import Coroutine
 from typing import Any
@@ -268,3 +270,41 @@ def test_a_punctual_clock_returns_in_time_although_the_system_wakes_it_late(wait
         with pytest.raises(StopIteration):
             waiting.send(None)
     assert 100.0 + wait_s - 1e-9 <= now_s[0] <= 100.0 + wait_s + 0.001
+
+
+def test_a_clock_shows_the_time_of_the_loop_that_runs_now() -> None:
+    clock = VirtualClock()
+
+    async def after(wait_s: float) -> float:
+        await clock.sleep_s(wait_s)
+        return clock.now_s()
+
+    assert [run_virtual(after(wait_s)) for wait_s in (5.0, 2.0)] == [5.0, 2.0]
+    with pytest.raises(RuntimeError):
+        clock.now_s()
+
+
+def test_a_socket_is_heard_before_time_goes_on() -> None:
+    async def main() -> tuple[bytes, float]:
+        here, there = socket.socketpair()
+        with here, there:
+            here.setblocking(False)
+            there.send(b"now")
+            heard = await asyncio.get_running_loop().sock_recv(here, 10)
+            waiting = asyncio.create_task(asyncio.get_running_loop().sock_recv(here, 10))
+            asyncio.get_running_loop().call_later(1.0, there.send, b"later")
+            await asyncio.sleep(1.5)
+            return heard + waiting.result(), VirtualClock().now_s()
+
+    assert run_virtual(main()) == (b"nowlater", 1.5)
+
+
+def test_a_deadlock_is_none_while_another_thread_may_wake_the_loop() -> None:
+    async def main() -> None:
+        loop, woken = asyncio.get_running_loop(), asyncio.Event()
+        thread = threading.Thread(target=loop.call_soon_threadsafe, args=(woken.set,))
+        thread.start()
+        thread.join()
+        await woken.wait()
+
+    run_virtual(main())

@@ -130,3 +130,20 @@ def test_a_message_that_is_too_long_to_be_overheard_reaches_its_listeners_all_th
         assert (len(overheard), ear.dropped) == (1, 1)
 
     run_virtual(scene())
+
+
+def test_inside_one_process_a_bus_knows_that_nobody_hears_it() -> None:
+    async def main() -> None:
+        network, clock = LocalNetwork(), VirtualClock()
+        source, listener = network.join("backbone/source", clock), network.join("backbone/listener", clock)
+        assert source.is_unheard(Conversation.POSES)
+        elsewhere = listener.subscribe("backbone/other", Conversation.POSES, Picture, lambda _: None)
+        assert source.is_unheard(Conversation.POSES)
+        subscribed = listener.subscribe("backbone/*", Conversation.POSES, Picture, lambda _: None)
+        assert not source.is_unheard(Conversation.POSES)
+        assert source.is_unheard(Conversation.EVENTS)
+        subscribed.close()
+        elsewhere.close()
+        assert source.is_unheard(Conversation.POSES)
+
+    run_virtual(main())

@@ -15,6 +15,7 @@ from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import (
+    RENEW_EVERY_S,
     AskSchedule,
     AskUtilization,
     AskWhy,
@@ -22,6 +23,7 @@ from backbone.rc_manager.messages import (
     SetPriority,
     Withdraw,
 )
+from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.requests import (
     CapacityExceeded,
     RcUse,
@@ -180,5 +182,33 @@ def test_a_trace_that_cannot_be_written_is_told_and_grants_go_on(local_mission: 
             assert "1 of 1 ARCs run; the trace of the schedule stopped: " in manager.feedback
             told = [event.what for event in manager.story.of("rc_manager")]
             assert sum("the trace of the schedule stopped" in what for what in told) == 1
+
+    run_virtual(main())
+
+
+def test_a_schedule_that_nobody_hears_is_not_worked_out_and_a_new_listener_soon_has_one(
+    pool: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    worked_out_s: list[float] = []
+    schedule = Answers.schedule
+
+    def counted(answers: Answers, now_s: float) -> Schedule:
+        worked_out_s.append(now_s)
+        return schedule(answers, now_s)
+
+    monkeypatch.setattr(Answers, "schedule", counted)
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()) as manager:
+            one = await here.arc("one")
+            await one.ask_for(request("one", "left", "radio"))
+            await here.clock.sleep_s(5.0)
+            assert worked_out_s == []
+            assert manager.feedback == "1 of 1 ARCs run"
+            heard: list[Schedule] = []
+            listener = here.network.join("ui_console/listener", here.clock)
+            listener.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, lambda said: heard.append(said.body))
+            await here.clock.sleep_s(RENEW_EVERY_S + 0.1)
+            assert [view.arc for view in heard[0].requests] == ["one"]
 
     run_virtual(main())

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import gc
 import os
+import subprocess
+import sys
+from pathlib import Path
 
+import psutil
 import pytest
 
 from mission_control.laboratory.harness import run_all
@@ -54,3 +58,33 @@ def test_progress_is_told_after_each_result() -> None:
 def test_the_first_failure_is_raised(jobs: int) -> None:
     with pytest.raises(ArithmeticError, match="seven"):
         run_all(picky, range(12), jobs=jobs)
+
+
+@pytest.mark.processes
+def test_other_processes_end_with_the_one_that_gives_the_orders_however_it_ends(tmp_path: Path) -> None:
+    program = tmp_path / "orders.py"
+    program.write_text(ORDERS)
+    with subprocess.Popen([sys.executable, program], stdout=subprocess.PIPE, text=True) as giver:
+        assert giver.stdout is not None
+        workers = [psutil.Process(int(pid)) for pid in giver.stdout.readline().split()]
+        giver.kill()
+    _ended, left = psutil.wait_procs(workers, timeout=10.0)
+    for worker in left:
+        worker.kill()
+    assert (len(workers), left) == (2, [])
+
+
+ORDERS = """
+import multiprocessing
+import time
+
+from mission_control.laboratory.harness import results_of
+
+def work(number):
+    time.sleep(0.2)
+    return number
+
+if __name__ == "__main__":
+    for _ in results_of(work, range(1000), jobs=2):
+        print(*(child.pid for child in multiprocessing.active_children()), flush=True)
+"""

@@ -8,6 +8,7 @@ import pytest
 from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from mission_control.vision.motion_detection import (
@@ -224,3 +225,13 @@ def test_a_new_shape_begins_anew_also_among_the_first_pictures(first: int) -> No
     lower = [room()[: HEIGHT_PX // 2]] * 30
     assert not any(look_at(lower, detector))
     assert any(look_at([with_block(lower[0], x, y_px=40) for x in range(0, 200, 10)], detector))
+
+
+@settings(max_examples=share(50))
+@given(
+    changed=arrays(np.bool_, st.tuples(st.integers(1, 6), st.integers(1, 12))),
+    whole=st.sets(st.integers(0, 5)),
+)
+def test_a_row_is_torn_if_more_than_a_share_of_it_changed(changed: NDArray[np.bool_], whole: set[int]) -> None:
+    changed[[row for row in whole if row < len(changed)]] = True
+    assert torn_rows(changed).tolist() == [bool(row.mean() > ROW_SHARE) for row in changed]

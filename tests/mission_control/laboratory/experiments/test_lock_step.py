@@ -12,6 +12,7 @@ from trace_checker import check
 
 from mission_control.laboratory.experiments.conditions import ALWAYS, EVERYTHING, PAPERS, PUBLISHED, QUARTER, Condition
 from mission_control.laboratory.experiments.intervals import wilson
+from mission_control.laboratory.experiments.prediction import predicted
 from mission_control.laboratory.experiments.surveillance import TrialOrder, digest_of, run_order, run_surveillance
 from mission_control.laboratory.experiments.trial import Trial, run_trial
 from mission_control.laboratory.harness import run_all
@@ -110,7 +111,17 @@ def test_a_small_table_is_what_its_trials_say() -> None:
         assert 0 <= row["interval95"][0] <= row["rate"] <= row["interval95"][1] <= 1
     json.dumps(plain)
     for row in outcome.rows:
+        assert row.predicted == predicted(row.condition)
         assert row.digest == digest_of([run_trial(row.condition, 1, number).digest for number in range(2)])
+
+
+@pytest.mark.thorough
+@pytest.mark.processes
+def test_two_processes_make_the_same_table_as_one() -> None:
+    conditions = [Condition(extra=1, noise=0.0), Condition(noise=0.0), Condition(extra=1, noise=0.0, policy="adaptive")]
+    one, two = (run_surveillance(conditions, trials=2, jobs=jobs) for jobs in (1, 2))
+    assert one.rows == two.rows
+    assert [row.condition for row in one.rows] == conditions
 
 
 GOALS = {
