@@ -1,4 +1,4 @@
-"""Grain: noise in whole grey levels, made once and added to many pictures."""
+"""Grain: noise in whole grey levels, added to a picture."""
 
 from __future__ import annotations
 
@@ -26,9 +26,11 @@ class Grain:
 
     @classmethod
     def of(cls, levels: NDArray[np.float64] | NDArray[np.float32]) -> Grain:
-        """Return it for these levels, of any size and sign; more than a picture's range has no further effect."""
-        whole = np.clip(np.rint(levels), -255, 255)
-        return cls(np.maximum(whole, 0).astype(np.uint8), np.maximum(-whole, 0).astype(np.uint8))
+        """Return it for these levels, within a thousand million; more than a picture's range has no further effect."""
+        # In one step OpenCV rounds as NumPy's rint does, limits to 0 to 255, and converts.
+        zero = np.zeros_like(levels)
+        brighter, darker = (cv2.subtract(*pair, dtype=cv2.CV_8U) for pair in ((levels, zero), (zero, levels)))
+        return cls(np.asarray(brighter, np.uint8), np.asarray(darker, np.uint8))
 
     def on(self, picture: Picture) -> Picture:
         """Return the picture with this noise, within 0 to 255."""

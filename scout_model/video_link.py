@@ -37,7 +37,7 @@ GHOST_SHIFT_PX = 9  # chosen: 1.5 microseconds: an echo with a detour of 250 m, 
 PARTIAL = 0.01  # chosen: share of frames the framegrabber leaves incomplete while the signal is good
 PARTIAL_IN_FADE = 0.5  # chosen: RAM 2002 attributes partial images to signals that are "bad enough"
 
-_BANK_MARGIN_PX = 128  # chosen: 16 384 different windows into the noise, drawn once instead of every frame
+_GRAIN_MARGIN_PX = 128  # chosen: 16 384 different windows into the noise, drawn once instead of every frame
 _GARBAGE_SHIFT_PX = 60  # chosen: rows tear by up to a fifth of the picture's width
 _SLIP_PX = (2.0, 10.0)  # chosen: shift of a row against the row above, at the edge and in the depth of a fade
 _OFF_LEVELS = (60.0, 120.0)  # chosen: error of black in a fade; RAM 2002: whole rows look "drastically different"
@@ -108,16 +108,16 @@ class _Dice:
     """Random numbers drawn for every frame, whether an effect is on or off; effects draw further ones themselves."""
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self._top, self._left = rng.integers(0, _BANK_MARGIN_PX, 2)
+        self._top, self._left = rng.integers(0, _GRAIN_MARGIN_PX, 2)
         self.partial = rng.random()
         self._rng = rng
 
     def window(self, levels: float) -> Grain:
-        """Return noise of about this standard deviation, in steps of 1 dB: few banks serve all strengths."""
-        bank = _bank(round(20 * math.log10(max(levels, FAINTEST_LEVELS))))
+        """Return noise of about this standard deviation, in steps of 1 dB."""
+        level_db = round(20 * math.log10(max(levels, FAINTEST_LEVELS)))
         rows = slice(self._top, self._top + PICTURE_HEIGHT_PX)
         columns = slice(self._left, self._left + PICTURE_WIDTH_PX)
-        return Grain(bank.brighter[rows, columns], bank.darker[rows, columns])
+        return Grain.of(math.pow(10, level_db / 20) * _grain()[rows, columns])
 
     def tears(self, expected: float) -> int:
         """Return the number of torn lines; call it once, as the last random number of the frame."""
@@ -282,16 +282,11 @@ def _check(signal: Signal) -> None:
 @functools.cache
 def _grain() -> NDArray[np.float32]:
     """Return noise of standard deviation 1, larger than a picture; the same in every run."""
-    shape = (PICTURE_HEIGHT_PX + _BANK_MARGIN_PX, PICTURE_WIDTH_PX + _BANK_MARGIN_PX)
+    shape = (PICTURE_HEIGHT_PX + _GRAIN_MARGIN_PX, PICTURE_WIDTH_PX + _GRAIN_MARGIN_PX)
     white = np.random.default_rng(0).standard_normal(shape, np.float32)
     # The bandwidth of a video amplifier is smaller than the column rate, so noise is smeared along the rows.
     smeared = np.asarray(cv2.GaussianBlur(white, (5, 1), 0), np.float32)
     return np.asarray(smeared / smeared.std(), np.float32)
-
-
-@functools.lru_cache(64)
-def _bank(level_db: int) -> Grain:
-    return Grain.of(math.pow(10, level_db / 20) * _grain())
 
 
 def _with_ghost(picture: Picture, strength: float) -> Picture:

@@ -33,7 +33,8 @@ from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.drivers.world_messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, forget, prepare, probe, probe_once
 
-CAMERAS_KEPT = 2  # chosen: enough for one experiment, or for two that alternate; 20 MB each
+CAMERAS_KEPT = 2  # chosen: enough for one experiment, or for two that alternate
+PICTURES_KEPT = 256  # chosen: 20 MB for each of these cameras; the worlds of an experiment pass the same states
 EARLY_S = 1 / 120  # chosen: a quarter of a frame, so that rounded frame times skip no frame
 
 
@@ -230,8 +231,8 @@ class _Studio:
             self._camera.close()
 
 
-def _new_camera(mjcf: str, backend: str) -> Any:
-    return importlib.import_module("scout_model.camera").Camera(mjcf, backend)
+def _new_camera(mjcf: str, backend: str, *memo_pictures: int) -> Any:
+    return importlib.import_module("scout_model.camera").Camera(mjcf, backend, *memo_pictures)
 
 
 @functools.lru_cache(maxsize=CAMERAS_KEPT)
@@ -241,7 +242,7 @@ def _lasting_camera(mjcf: str, backend: str) -> Any:
     One thread draws all worlds, and a picture depends only on the world's state. So pictures cached for one world are
     valid for the next.
     """
-    return _new_camera(mjcf, backend)
+    return _new_camera(mjcf, backend, PICTURES_KEPT)
 
 
 def _choose(wanted: str, folder: Path | None) -> tuple[GlSupport | None, str]:
