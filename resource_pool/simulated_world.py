@@ -16,6 +16,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.operating_system.library_pages import unmap_read_pages
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.world_messages import (
     AskWorld,
@@ -79,6 +80,8 @@ class SimulatedWorld(Component[WorldParameters]):
 
     async def serve(self) -> None:
         """Step one frame after the other, each at its time, and publish the state."""
+        if self.launch.run_directory:
+            unmap_read_pages()
         first_s = self.clock.now_s()
         frame = 0
         while True:

@@ -40,6 +40,7 @@ from backbone.component.shared_process import run_shared_process
 from backbone.creator import process_table
 from backbone.operating_system import own_process, processes
 from backbone.operating_system.heaps import share_heaps
+from backbone.operating_system.library_pages import unmap_read_pages
 from backbone.ranges import ExitCode, Pid, Signal, Text
 from backbone.run_files import ENDED
 from backbone.wire import Message
@@ -200,6 +201,7 @@ class _ZygoteProcess:
             self._preload(module)
         gc.collect()
         gc.freeze()  # the collector would write into pages that the components share
+        unmap_read_pages()
         self._channel.setblocking(False)
         self._selector.register(self._channel, selectors.EVENT_READ)
         self._selector.register(self._signals, selectors.EVENT_READ)

@@ -41,6 +41,7 @@ from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
+from backbone.operating_system.library_pages import unmap_read_pages
 from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
 from backbone.waiting import first_of
 from backbone.wire import Accepts, Envelope, Message
@@ -122,6 +123,7 @@ class Launcher(Component[NoParameters]):
             self.end(f"could not come up: {error}")
             return
         self.outcome.ready_after_s = time.monotonic() - self._began_s
+        unmap_read_pages()
         self.report(f"all ready; at the end: {self._last.name}" if self._last.name else "all ready")
         source = self._description.source
         publish_action(self.bus, self.clock, OperatorAction.START_MISSION, self._description.name, f"from {source}")

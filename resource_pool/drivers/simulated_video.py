@@ -25,6 +25,7 @@ import numpy as np
 from backbone.bus.clock import VirtualLoop
 from backbone.bus.interface import Subscription
 from backbone.keys import Conversation
+from backbone.operating_system.library_pages import unmap_read_pages
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
@@ -191,7 +192,10 @@ class _Studio:
     def take(self, state: WorldState, frequency: str, is_new: bool) -> tuple[Picture, float]:
         """Return the picture of this frequency's receiver for this state of the world, and its processor time."""
         began_s = time.thread_time()
-        return self._received(state, frequency, is_new), time.thread_time() - began_s
+        picture, took_s = self._received(state, frequency, is_new), time.thread_time() - began_s
+        if self._camera.drawn:
+            _unmap_what_made_the_renderer()
+        return picture, took_s
 
     def _received(self, state: WorldState, frequency: str, is_new: bool) -> Picture:
         receiver = self._receivers.get(frequency)
@@ -229,6 +233,12 @@ class _Studio:
     def close(self) -> None:
         if not self._camera_lasts:
             self._camera.close()
+
+
+@functools.cache
+def _unmap_what_made_the_renderer() -> None:
+    """Unmap the renderer's compiler, once in this process: after the first picture, all shaders are compiled."""
+    unmap_read_pages()
 
 
 def _new_camera(mjcf: str, backend: str, *memo_pictures: int) -> Any:
