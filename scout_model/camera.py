@@ -8,8 +8,8 @@ A picture that was drawn before comes from a cache. The cache's key is the poses
 in its view, so a robot elsewhere does not matter. States are rounded before drawing: a picture depends only on the
 rounded state, not on the first of the states that round to it.
 
-For ``gl``, this process must call ``scout_model.gl_probe.prepare`` before it imports mujoco or this module. A camera
-may be used only in the thread that created it.
+For ``gl``, this process must call ``scout_model.gl_probe.prepare`` first. A camera may be used only in the thread that
+created it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
 from scout_model.painter import Painter
 from scout_model.world import STATE, model_of
 
-MEMO_PICTURES = 256  # chosen: 20 MB; the views of a standing robot while nothing or little moves
+MEMO_PICTURES = 16  # chosen: 1.2 MB; a standing robot's view while nothing moves, for each of some robots
+MORE_GEOMS = 200  # chosen: tendons and rangefinders of a robot of one's own; MuJoCo's default of 10 000 takes 10 MB
 
 _STATE_DECIMALS = 5  # chosen: a hundredth of a millimetre, a fiftieth of a pixel at the nearest
 _MARGIN_M = 0.002  # chosen: a line is drawn up to a pixel wider than its true width
@@ -51,7 +52,8 @@ class _GlDrawing:
         if os.environ.get("MUJOCO_GL") not in ("egl", "osmesa"):
             raise RenderingUnavailable("MUJOCO_GL names no OpenGL that draws without a screen")
         try:
-            self._renderer = mujoco.Renderer(model, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX)
+            most = model.ngeom + model.nsite + MORE_GEOMS
+            self._renderer = mujoco.Renderer(model, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX, most)
         except (mujoco.FatalError, AttributeError, ImportError, RuntimeError) as error:
             raise RenderingUnavailable(f"MuJoCo has no OpenGL in this process: {error}") from error
         self._colors = np.empty((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX, 3), np.uint8)

@@ -60,4 +60,4 @@ class RenderingUnavailable(ScoutModelError, RuntimeError):
     """OpenGL cannot be used in this process."""
 
     code = "camera.no_gl"
-    remedy = "Call scout_model.gl_probe.prepare before anything imports mujoco, or use the paint backend."
+    remedy = "Call scout_model.gl_probe.prepare first, or use the paint backend."

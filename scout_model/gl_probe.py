@@ -1,14 +1,14 @@
 """Determine whether this machine can render, without importing mujoco in this process.
 
 If MUJOCO_GL names a backend that does not work, importing mujoco raises errors of many kinds or ends the process.
-Therefore each candidate is tried in a child process. Afterwards ``prepare`` sets this process up, before it imports
-mujoco.
+Therefore each candidate is tried in a child process. Afterwards ``prepare`` sets this process up.
 """
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
+import importlib
 import logging
 import os
 import subprocess
@@ -20,7 +20,6 @@ from typing import Literal
 import msgspec
 
 from scout_model import gl_known
-from scout_model.errors import RenderingUnavailable
 from scout_model.gl_known import GlTrial, OpenGl
 
 log = logging.getLogger(__name__)
@@ -33,6 +32,7 @@ TRIAL_TIME_S = 20.0  # chosen: a trial takes half a second; a hanging driver mus
 FOUND_FILE = "gl_support.json"
 
 _CANDIDATES: tuple[OpenGl, ...] = ("egl", "osmesa")  # OSMesa last: newer Mesa versions lack it
+_CHOOSER = "mujoco.rendering.classic.gl_context"  # at its import it chooses the OpenGL that MUJOCO_GL names
 _MUJOCO_GL: dict[Backend, str] = {"egl": "egl", "osmesa": "osmesa", "none": "disable"}
 
 
@@ -116,15 +116,14 @@ def forget(folder: Path | None) -> None:
 
 
 def prepare(backend: Backend) -> None:
-    """Set this process up to draw with this backend; call it before the first import of mujoco.
+    """Set this process up to draw with this backend.
 
-    Raises:
-        RenderingUnavailable: Mujoco is already imported in this process, with another backend.
+    Without a backend, mujoco loads no OpenGL when it is imported. The import of a backend raises errors of many kinds
+    if it does not work.
     """
-    wanted = _MUJOCO_GL[backend]
-    if "mujoco" in sys.modules and backend != "none" and os.environ.get("MUJOCO_GL") != wanted:
-        raise RenderingUnavailable(f"mujoco was imported before it was prepared for {backend}")
     os.environ.update(_environment(backend))
+    if backend != "none" and (chooser := sys.modules.get(_CHOOSER)) is not None:
+        importlib.reload(chooser)
 
 
 def _environment(backend: Backend) -> dict[str, str]:

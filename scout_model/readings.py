@@ -6,7 +6,8 @@ without a ``FeelingRobot``. A reading shows the moment before that step.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
 
 import mujoco
 import numpy as np
@@ -20,10 +21,12 @@ class Senses:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, programs: Mapping[str, Robot]) -> None:
         self._model, self._data, self._option = model, data, model.opt
-        feeling = [
-            _BodySenses(model, name, program) for name, program in programs.items() if isinstance(program, FeelingRobot)
+        sensors = parts_by_robot(model.sensor(sensor).name for sensor in range(model.nsensor))
+        self._bodies = [
+            _BodySenses(model, sensors[name], program)
+            for name, program in programs.items()
+            if isinstance(program, FeelingRobot) and name in sensors
         ]
-        self._bodies = [body for body in feeling if body.has_sensors]
         self._felt = b""
         self.update(0.0)
         self._on = int(self._option.disableflags)
@@ -52,19 +55,29 @@ class Senses:
             body.update(readings, now_s)
 
 
+def parts_by_robot(names: Iterable[str]) -> dict[str, dict[str, int]]:
+    """Return the numbers of the parts of each robot: robot → part → place of ``robot/part`` among the names.
+
+    Example:
+        >>> parts_by_robot(["a/left", "a/arm/tip", "clock", "b/left"])
+        {'a': {'left': 0, 'arm/tip': 1}, 'b': {'left': 3}}
+    """
+    parts: defaultdict[str, dict[str, int]] = defaultdict(dict)
+    for number, name in enumerate(names):
+        robot, slash, part = name.partition("/")
+        if slash:
+            parts[robot][part] = number
+    return dict(parts)
+
+
 class _BodySenses:
     """Places of one robot's readings in MuJoCo's array."""
 
-    def __init__(self, model: mujoco.MjModel, robot: str, program: FeelingRobot) -> None:
-        prefix = f"{robot}/"
-        own = {
-            sensor.name.removeprefix(prefix): (int(sensor.adr[0]), int(sensor.adr[0] + sensor.dim[0]))
-            for sensor in map(model.sensor, range(model.nsensor))
-            if sensor.name.startswith(prefix)
-        }
-        self.has_sensors = bool(own)
-        first = min((begin for begin, _ in own.values()), default=0)
-        self._part = slice(first, max((end for _, end in own.values()), default=0))
+    def __init__(self, model: mujoco.MjModel, sensors: Mapping[str, int], program: FeelingRobot) -> None:
+        begins, numbers = model.sensor_adr, model.sensor_dim
+        own = {name: (int(begins[sensor]), int(begins[sensor] + numbers[sensor])) for name, sensor in sensors.items()}
+        first = min(begin for begin, _ in own.values())
+        self._part = slice(first, max(end for _, end in own.values()))
         self._numbers = {name: slice(begin - first, end - first) for name, (begin, end) in own.items()}
         self._program = program
         self._felt = b""

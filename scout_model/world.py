@@ -24,7 +24,7 @@ from scout_model.composition import compose
 from scout_model.description import RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
-from scout_model.readings import Senses
+from scout_model.readings import Senses, parts_by_robot
 from scout_model.robot import AnsweringRobot, PoweredRobot, Robot, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
 from scout_model.targets import Route, TargetState, part_poses, parts
@@ -97,7 +97,11 @@ class World:
         """Frames stepped so far."""
         self._step = 0
         self._stands = False  # True: the last step found nothing that moves, and would find the same again
-        self._robots = {place.name: self._body(place) for place in description.robots}
+        actuators = parts_by_robot(self._model.actuator(actuator).name for actuator in range(self._model.nu))
+        roots = self._model.body_rootid[self._model.jnt_bodyid]
+        self._robots = {
+            place.name: self._body(place, actuators.get(place.name, {}), roots) for place in description.robots
+        }
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.robots}
         self._trips = trips(description)
         self._carried = {place.name: self._trips[place.carried_by] for place in description.robots if place.carried_by}
@@ -298,18 +302,17 @@ class World:
             raise UnknownBody(f"no Scout named {name!r}")
         return program
 
-    def _body(self, place: RobotPlace) -> _Body:
-        name, kind = place.name, place.kind
-        model, prefix = self._model, f"{name}/"
-        names = {actuator: model.actuator(actuator).name for actuator in range(model.nu)}
+    def _body(self, place: RobotPlace, actuators: dict[str, int], roots: NDArray[np.int32]) -> _Body:
+        """Return the robot at this place.
+
+        Args:
+            place: Its declaration.
+            actuators: Name → number.
+            roots: Root of the tree of bodies of each joint of the world.
+        """
+        name, kind, model = place.name, place.kind, self._model
         free = model.joint(f"{name}/free")
-        joints = model.jnt_bodyid
-        own = [
-            joint
-            for joint in range(model.njnt)
-            if model.body_rootid[joints[joint]] == model.body_rootid[joints[free.id]]
-        ]
-        last = own[-1]
+        last = np.flatnonzero(roots == roots[free.id])[-1]
         last_position = int(model.jnt_qposadr[last]) + _POSITIONS[int(model.jnt_type[last])]
         last_velocity = int(model.jnt_dofadr[last]) + _VELOCITIES[int(model.jnt_type[last])]
         program = robot_class(kind)()
@@ -319,7 +322,7 @@ class World:
             kind=kind,
             program=program,
             answers=program if isinstance(program, AnsweringRobot) else None,
-            actuators={full.removeprefix(prefix): number for number, full in names.items() if full.startswith(prefix)},
+            actuators=actuators,
             free=int(free.qposadr[0]),
             positions=slice(int(free.qposadr[0]), last_position),
             velocities=slice(int(free.dofadr[0]), last_velocity),

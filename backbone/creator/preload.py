@@ -1,11 +1,13 @@
 """Modules that a creator's zygote imports beforehand: components start sooner, and share the memory of these modules.
 
+A module that only one component uses is imported beforehand, too: an import after the fork writes into many pages that
+the component shares with its zygote, and repeats imports that other components make, too.
+
 Pure.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable
 
 from backbone.component_database.messages import ComponentType
@@ -15,28 +17,28 @@ SHIPPED = ("mission_control.", "resource_pool.")
 
 
 def preloaded_modules(types: Iterable[ComponentType], placed: Iterable[str] = ()) -> list[str]:
-    """Return the modules of the ARCs among these types, and of shipped types that are placed repeatedly, by name.
+    """Return the modules of the ARCs among these types, and of shipped types that are placed, by name.
 
     ARCs start while a person waits for a robot; all other components start with the mission.
 
     Args:
         types: Types of the mission.
-        placed: Type of each component that is placed.
+        placed: Types of the components that are placed.
 
     Example:
         >>> from backbone.naming import Subsystem
         >>> drive = ComponentType("drive", "lab.drive:Drive", Subsystem.RESOURCE_POOL, needs={"scout": "scout"})
         >>> watch = ComponentType("watch", "mission_control.watch:Watch", Subsystem.MISSION_CONTROL)
-        >>> preloaded_modules([drive, watch], ["watch", "watch"])
-        ['lab.drive', 'mission_control.watch']
         >>> preloaded_modules([drive, watch], ["watch"])
+        ['lab.drive', 'mission_control.watch']
+        >>> preloaded_modules([drive, watch])
         ['lab.drive']
     """
-    counts = Counter(placed)
+    expected = set(placed)
     return sorted(
         {
             one.class_path.partition(":")[0]
             for one in types
-            if one.needs or (counts[one.name] > 1 and one.class_path.startswith(SHIPPED))
+            if one.needs or (one.name in expected and one.class_path.startswith(SHIPPED))
         }
     )

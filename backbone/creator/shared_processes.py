@@ -263,15 +263,16 @@ class SharedProcesses:
 
     def observed(self, pid: int, silent_s: float, now_s: float) -> list[ProcessInstruction]:
         """Record the silence of this process: its deadlines count from the start of the silence."""
+        has_changed = False
         for one in self._all.values():
             if one.pid != pid:
                 continue
             if one.phase is _Phase.STARTING:
-                one.deadline_s = now_s - silent_s + SERVES_WITHIN_S
+                one.deadline_s, has_changed = now_s - silent_s + SERVES_WITHIN_S, True
             for member in one.members.values():
                 if member.place is _Place.ADMITTING:
-                    member.deadline_s = now_s - silent_s + ADMITS_WITHIN_S
-        return self._and_wake([])
+                    member.deadline_s, has_changed = now_s - silent_s + ADMITS_WITHIN_S, True
+        return self._and_wake([]) if has_changed else []
 
     def woken(self, now_s: float) -> list[ProcessInstruction]:
         """Return the instructions that are due by ``now_s``."""

@@ -245,11 +245,11 @@ class Supervision:
         instructions: list[Instruction] = (
             [ReportSilent(name, silent_s if is_silent else 0.0)] if was_silent != is_silent else []
         )
-        if silent_s >= one.policy.hung_after_s:
-            one.failure = f"hung: no sign of life for {silent_s:.1f} s"
-            one.end = _End(0.0, TERM_S, ordered=False, stage=EndedBy.SIGTERM)
-            instructions += _next_stage(one, one.end, now_s)
-        return self._and_wake(instructions)
+        if silent_s < one.policy.hung_after_s:
+            return instructions  # no deadline has changed; with hundreds of components their search takes long
+        one.failure = f"hung: no sign of life for {silent_s:.1f} s"
+        one.end = _End(0.0, TERM_S, ordered=False, stage=EndedBy.SIGTERM)
+        return self._and_wake([*instructions, *_next_stage(one, one.end, now_s)])
 
     def absences(self, now_s: float) -> list[Absence]:
         """Return the components that do not run or respond; times are seconds of the machine."""

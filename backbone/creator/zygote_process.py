@@ -195,6 +195,7 @@ class _ZygoteProcess:
         if self._settings.import_path:
             sys.path[:] = self._settings.import_path
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a process that forks must have one thread
+        os.environ.setdefault("MUJOCO_GL", "disable")  # the one component that draws loads its OpenGL itself
         for module in self._settings.preload:
             self._preload(module)
         gc.collect()

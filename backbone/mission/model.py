@@ -137,7 +137,8 @@ class MissionDescription(_Part):
         return next((dict(core.parameters) for core in self.core if core.type == service), {})
 
     def placed_types(self) -> Iterator[str]:
-        """Yield the type of each component, unit and behavior in the file, but not of resources and ARCs."""
+        """Yield the type of each component, resource, unit and behavior in the file, but not of ARCs."""
+        yield from (resource.type for resource in self.resources)
         yield from (one.type for one in (*self.components, *self.units))
         waiting = [*self.behaviors]
         while waiting:

@@ -1,9 +1,9 @@
 """Driver of the simulated receiver and framegrabber: renders the received pictures in the RC's process.
 
-It draws only the cameras of robots that transmit on the tuned frequency, and only while it is tuned. A thread of its
-own owns the renderer and draws; on a virtual clock the event loop draws, in no virtual time. In both cases the driver
-delivers the picture of a frame ``capture_delay_s`` after the frame's time, or as soon as it is drawn if that is later.
-If the processors are full, it draws fewer pictures; see ``picture_pace``.
+It draws only the cameras of robots that transmit on the tuned frequency, and only while it is tuned. A thread of their
+own draws for all framegrabbers of the process; on a virtual clock the event loop draws, in no virtual time. In both
+cases the driver delivers the picture of a frame ``capture_delay_s`` after the frame's time, or as soon as it is drawn
+if that is later. If the processors are full, it draws fewer pictures; see ``picture_pace``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import importlib
 import math
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -29,11 +29,11 @@ from backbone.waiting import end_tasks
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.picture_pace import PicturePace
+from resource_pool.drivers.shared_camera import SharedCamera
 from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.drivers.world_messages import WorldModel, WorldState
-from scout_model.gl_probe import GlSupport, forget, prepare, probe, probe_once
+from scout_model.gl_probe import Backend, GlSupport, forget, probe, probe_once
 
-CAMERAS_KEPT = 2  # chosen: enough for one experiment, or for two that alternate; 20 MB each
 EARLY_S = 1 / 120  # chosen: a quarter of a frame, so that rounded frame times skip no frame
 
 
@@ -56,7 +56,7 @@ class SimulatedFramegrabber:
 
     def __init__(self, site: DriverSite) -> None:
         self._site = site
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="camera")
+        self._camera: SharedCamera | None = None
         self._studio: _Studio | None = None
         self._world: Subscription | None = None
         self._frequency = ""
@@ -79,18 +79,15 @@ class SimulatedFramegrabber:
         return self._pace.allowed_hz
 
     async def open(self) -> None:
-        """Fetch the world's model and open the renderer, or the painter if OpenGL is missing."""
+        """Fetch the world's model, and open the renderer (the painter if OpenGL is missing) if no neighbor did."""
         run = asyncio.get_running_loop().run_in_executor
         choosing = run(None, _choose, self._site.parameters.camera, self._site.folder)
         world = await meet_world(self._site)
-        support, backend = await choosing
+        support, gl = await choosing
         lasts = isinstance(asyncio.get_running_loop(), VirtualLoop)
-
-        def make() -> None:  # also if nobody waits any more: ``close`` comes after it in the thread
-            self._studio = _Studio(world, support, backend, lasts)
-
+        camera = self._camera = SharedCamera.join(world.mjcf, gl, lasts=lasts)
         try:
-            await run(self._thread, make)
+            self._studio = await run(camera.thread, lambda: _Studio(world, camera.opened()))
         except Exception:  # mujoco's import raises errors of many kinds where OpenGL is missing
             forget(self._site.folder)
             raise
@@ -109,7 +106,7 @@ class SimulatedFramegrabber:
         self._frequency, self._deliver = "", None
 
     async def close(self) -> None:
-        """Stop drawing and close the renderer."""
+        """Stop drawing, and close the renderer unless a neighbor uses it."""
         self.stop()
         if self._world is not None:
             self._world.close()
@@ -117,14 +114,8 @@ class SimulatedFramegrabber:
         if self._is_closed:
             return
         self._is_closed = True
-        try:
-            await asyncio.get_running_loop().run_in_executor(self._thread, self._put_away)
-        finally:
-            self._thread.shutdown(wait=False)
-
-    def _put_away(self) -> None:
-        if self._studio is not None:
-            self._studio.close()
+        if self._camera is not None:
+            await self._camera.leave()
 
     def _world_moved(self, envelope: Envelope[WorldState]) -> None:
         state = envelope.body
@@ -157,10 +148,10 @@ class SimulatedFramegrabber:
 
     def _draw(self, state: WorldState, tuned: _Tuned) -> Future[tuple[Picture, float]]:
         """Draw in the thread, which does not wake the event loop when it is ready; on a virtual clock, draw at once."""
-        assert self._studio is not None  # noqa: S101  open before the first state can arrive
+        assert self._camera is not None and self._studio is not None  # noqa: S101, PT018  open before the first state
         draw = functools.partial(self._studio.take, state, tuned.frequency, tuned.is_new)
         if not isinstance(asyncio.get_running_loop(), VirtualLoop):
-            return self._thread.submit(draw)
+            return self._camera.thread.submit(draw)
         drawn: Future[tuple[Picture, float]] = Future()
         try:
             drawn.set_result(draw())
@@ -188,10 +179,8 @@ class _Tuned:
 class _Studio:
     """Cameras of all robots and one receiver for each frequency; used only by the drawing thread."""
 
-    def __init__(self, world: WorldModel, support: GlSupport | None, backend: str, lasts: bool) -> None:
-        prepare(support.backend if support is not None and backend == "gl" else "none")
-        self._camera_lasts = lasts
-        self._camera = _lasting_camera(world.mjcf, backend) if lasts else _new_camera(world.mjcf, backend)
+    def __init__(self, world: WorldModel, camera: Any) -> None:
+        self._camera = camera
         self._video_link = importlib.import_module("scout_model.video_link")
         self._distance_m = importlib.import_module("scout_model.air").distance_m
         self._world = world
@@ -235,28 +224,10 @@ class _Studio:
             state.on_since.get(robot, 0),
         )
 
-    def close(self) -> None:
-        if not self._camera_lasts:
-            self._camera.close()
 
-
-def _new_camera(mjcf: str, backend: str) -> Any:
-    return importlib.import_module("scout_model.camera").Camera(mjcf, backend)
-
-
-@functools.lru_cache(maxsize=CAMERAS_KEPT)
-def _lasting_camera(mjcf: str, backend: str) -> Any:
-    """Return the camera that all worlds of this model share in this process, one after the other on virtual clocks.
-
-    One thread draws all worlds, and a picture depends only on the world's state. So pictures cached for one world are
-    valid for the next.
-    """
-    return _new_camera(mjcf, backend)
-
-
-def _choose(wanted: str, folder: Path | None) -> tuple[GlSupport | None, str]:
-    """Return the OpenGL support (if the choice depends on it) and the camera to use."""
+def _choose(wanted: str, folder: Path | None) -> tuple[GlSupport | None, Backend]:
+    """Return the OpenGL support (if the choice depends on it) and the OpenGL to use."""
     if wanted == "paint":
-        return None, "paint"
+        return None, "none"
     support = probe() if folder is None else probe_once(folder)
-    return support, support.camera_backend
+    return support, support.backend

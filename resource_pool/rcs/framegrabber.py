@@ -59,7 +59,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
 
     parameters_type = FramegrabberParameters
     shares_process = False
-    alike_most = 5  # measured: a second one in a process costs a third of its memory, and five draw a fifth of a core
+    alike_most = 5  # measured: they share one renderer and its thread, and draw for a fifth of a core
     commands = Tune
     driver_kind = "framegrabber"
     closed_most_s = 5.0  # chosen: a camera starts within two; its RC waits for no driver call

@@ -20,7 +20,7 @@ from backbone.keys import Conversation, key
 
 pytestmark = pytest.mark.processes
 
-WARM_UP_S, HOSTILE_S = 180.0, 180.0  # a framegrabber fills its stores of noise and pictures for three minutes
+WARM_UP_S, HOSTILE_S = 180.0, 180.0  # a renderer grows with the views that it draws, for three minutes
 LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its size
 CREATOR_MIB = 60.0  # of a small computer with half a gigabyte, a tenth
 CORE, CORE_S = "backbone.component.process", 0.3  # all that a component's process needs before its own class

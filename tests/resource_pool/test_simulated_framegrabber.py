@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
+import scout_model.camera
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.keys import Conversation
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope
-from resource_pool.drivers import simulated_video
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated_video import GrabberOptions, SimulatedFramegrabber
 from resource_pool.drivers.world_messages import AskWorld, WorldModel, WorldState
@@ -183,7 +183,7 @@ async def test_closed_while_it_opens_it_closes_its_renderer_and_holds_nobody_up(
 ) -> None:
     begun, may_go_on, log = threading.Event(), threading.Event(), list[str]()
 
-    class SlowStudio:
+    class SlowCamera:
         def __init__(self, *_given: object) -> None:
             begun.set()
             may_go_on.wait(5.0)
@@ -192,7 +192,7 @@ async def test_closed_while_it_opens_it_closes_its_renderer_and_holds_nobody_up(
         def close(self) -> None:
             log.append("closed")
 
-    monkeypatch.setattr(simulated_video, "_Studio", SlowStudio)
+    monkeypatch.setattr(scout_model.camera, "Camera", SlowCamera)
     studio = Studio()
     opening = asyncio.create_task(studio.driver.open())
     await asyncio.to_thread(begun.wait, 5.0)
@@ -203,3 +203,76 @@ async def test_closed_while_it_opens_it_closes_its_renderer_and_holds_nobody_up(
     may_go_on.set()
     await closing
     assert log == ["made", "closed"]
+
+
+# ---------------------------------------------------------------------- neighbors in one process
+class CountedCamera(scout_model.camera.Camera):
+    """A camera that counts those that are open."""
+
+    made = still_open = 0
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        CountedCamera.made += 1
+        CountedCamera.still_open += 1
+
+    def close(self) -> None:
+        CountedCamera.still_open -= 1
+        super().close()
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> type[CountedCamera]:
+    monkeypatch.setattr(scout_model.camera, "Camera", CountedCamera)
+    monkeypatch.setattr(CountedCamera, "made", 0)
+    monkeypatch.setattr(CountedCamera, "still_open", 0)
+    return CountedCamera
+
+
+async def test_neighbors_share_one_renderer_until_the_last_is_closed(counted: type[CountedCamera]) -> None:
+    studios = [Studio() for _ in range(3)]
+    await asyncio.gather(*(studio.driver.open() for studio in studios))
+    assert (counted.made, counted.still_open) == (1, 1)
+    await studios[0].close()
+    await studios[1].close()
+    assert counted.still_open == 1
+    pictures, deliver = collector()
+    studios[2].driver.tune("video", deliver)
+    studios[2].show(1, {"scout1": "video"})
+    assert (await asyncio.wait_for(pictures.get(), 5.0)).robot == "scout1"
+    await studios[2].close()
+    assert counted.still_open == 0
+
+
+async def test_neighbors_of_one_renderer_get_each_their_own_pictures(counted: type[CountedCamera]) -> None:
+    studios, heard = [Studio() for _ in range(2)], [collector() for _ in range(2)]
+    for studio, (_, deliver), frequency in zip(studios, heard, ("red", "blue"), strict=True):
+        await studio.driver.open()
+        studio.driver.tune(frequency, deliver)
+    for studio in studios:
+        studio.show(1, {"scout1": "red", "scout2": "blue"})
+    got = [(await asyncio.wait_for(pictures.get(), 5.0)).robot for pictures, _ in heard]
+    assert got == ["scout1", "scout2"]
+    assert counted.made == 1
+    for studio in studios:
+        await studio.close()
+
+
+async def test_a_renderer_that_does_not_open_fails_each_neighbor_and_the_next_try_may_succeed(
+    counted: type[CountedCamera], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def breaks(*_given: object) -> None:
+        raise RuntimeError("no device")
+
+    studios = [Studio() for _ in range(2)]
+    with monkeypatch.context() as broken:
+        broken.setattr(scout_model.camera, "Camera", breaks)
+        failed = await asyncio.gather(*(studio.driver.open() for studio in studios), return_exceptions=True)
+        assert [str(error) for error in failed] == ["no device"] * 2
+    for studio in studios:
+        await studio.close()
+    again = Studio()
+    await again.driver.open()
+    assert counted.still_open == 1
+    await again.close()
+    assert counted.still_open == 0

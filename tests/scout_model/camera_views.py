@@ -1,9 +1,12 @@
 """A program for the camera tests: draw the published geometry with a backend and save it.
 
-OpenGL must be set up before mujoco is imported, so these pictures come from a process of their own.
-Usage: python camera_views.py {egl|osmesa|none} FILE.npz
+A process can load only one OpenGL, so these pictures come from a process of their own.
+Usage: python camera_views.py {egl|osmesa|none} FILE.npz [late]
+With "late", mujoco is imported before the backend is set up.
 """
 
+import importlib
+import os
 import sys
 
 from scout_model import gl_probe
@@ -13,7 +16,10 @@ THINGS = ("scout1", "scout2", "scout3", "scout4")
 
 
 def main() -> None:
-    backend, file = sys.argv[1:]
+    backend, file, *options = sys.argv[1:]
+    if options == ["late"]:
+        os.environ["MUJOCO_GL"] = "disable"
+        importlib.import_module("mujoco")
     assert backend in ("egl", "osmesa", "none")
     gl_probe.prepare(backend)  # type: ignore[arg-type]
     import math

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scout_model.camera import Camera
 from scout_model.description import Furniture, RobotPlace, Target, WorldDescription
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
-from scout_model.gl_probe import GlSupport, prepare, probe
+from scout_model.gl_probe import GlSupport, probe
 from scout_model.world import World
 
 Picture = NDArray[np.uint8]
@@ -33,9 +33,9 @@ def gl() -> GlSupport:
     return probe()
 
 
-def views(backend: str, folder: Path) -> dict[str, Picture]:
+def views(backend: str, folder: Path, *options: str) -> dict[str, Picture]:
     program, file = Path(__file__).with_name("camera_views.py"), folder / f"{backend}.npz"
-    subprocess.run([sys.executable, str(program), backend, str(file)], check=True, timeout=60)
+    subprocess.run([sys.executable, str(program), backend, str(file), *options], check=True, timeout=60)
     with np.load(file) as pictures:
         return {name: pictures[name] for name in pictures.files}
 
@@ -109,8 +109,15 @@ def test_a_process_not_prepared_for_opengl_is_told_so(monkeypatch: pytest.Monkey
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     with pytest.raises(RenderingUnavailable, match="prepare"):
         Camera(room().mjcf, "gl")
-    with pytest.raises(RenderingUnavailable, match="imported before"):
-        prepare("egl")
+
+
+@pytest.mark.processes
+def test_opengl_is_loaded_also_after_mujoco(gl: GlSupport, tmp_path: Path) -> None:
+    """A zygote has imported mujoco without OpenGL, and forks the process that draws."""
+    if gl.backend == "none":
+        pytest.skip(f"no OpenGL here; install {gl.missing_packages}")
+    late = views(gl.backend, tmp_path, "late")
+    assert all(np.array_equal(picture, late[name]) for name, picture in views(gl.backend, tmp_path).items())
 
 
 @pytest.mark.processes

@@ -11,13 +11,18 @@ from backbone.creator.preload import preloaded_modules
 from backbone.mission.reader import read_mission
 
 
-def test_all_nodes_of_the_tree_are_counted_and_what_stands_twice_is_preloaded() -> None:
+def test_all_nodes_of_the_tree_are_counted_and_shipped_types_are_preloaded() -> None:
     mission = read_mission(Path(__file__).parents[3] / "mission.xml")
     counts = Counter(mission.placed_types())
     assert (counts["surveillance"], counts["watch_for_motion"]) == (1, 2)
     found = preloaded_modules(mission.types, mission.placed_types())
-    assert "mission_control.behaviors.watch_for_motion" in found
-    assert "mission_control.behaviors.surveillance" not in found
+    assert {
+        "mission_control.behaviors.watch_for_motion",
+        "mission_control.behaviors.surveillance",
+        "resource_pool.rcs.scout",
+        "resource_pool.simulated_world",
+    } <= set(found)
+    assert "mission_control.behaviors.jump" not in found
 
 
 def test_code_of_ones_own_is_read_anew_at_each_start() -> None:

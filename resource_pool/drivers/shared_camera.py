@@ -1,0 +1,88 @@
+"""SharedCamera: one renderer and one drawing thread for all simulated framegrabbers of a process that show one world.
+
+A renderer takes much more memory and time to open than its pictures. On a virtual clock the worlds of an experiment
+come one after the other, so there a renderer outlives its users.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import importlib
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from scout_model.gl_probe import Backend, prepare
+
+CAMERAS_KEPT = 2  # chosen: enough for one experiment, or for two that alternate
+PICTURES_KEPT = 256  # chosen: 20 MB for each of these cameras; the worlds of an experiment pass the same states
+
+_Key = tuple[str, Backend, bool]
+_open: dict[_Key, SharedCamera] = {}
+
+
+class SharedCamera:
+    """The renderer of a world in this process; use ``join`` and ``leave`` in one event loop.
+
+    Attributes:
+        thread: The only thread that may open and use the camera.
+        users: How many use it.
+    """
+
+    def __init__(self, key: _Key) -> None:
+        self.thread = ThreadPoolExecutor(1, thread_name_prefix="camera")
+        self.users = 0
+        self._key = key
+        self._camera: Any = None
+
+    @classmethod
+    def join(cls, mjcf: str, gl: Backend, *, lasts: bool) -> SharedCamera:
+        """Return the shared camera of this world, for one more user.
+
+        Args:
+            mjcf: Model of the world.
+            gl: OpenGL that renders; ``none``: the camera paints.
+            lasts: True: the renderer outlives its users.
+        """
+        key = (mjcf, gl, lasts)
+        shared = _open.setdefault(key, cls(key))
+        shared.users += 1
+        return shared
+
+    def opened(self) -> Any:
+        """Return the ``scout_model.camera.Camera``; the first call opens it. When: in ``thread``."""
+        if self._camera is None:
+            mjcf, gl, lasts = self._key
+            self._camera = _lasting_camera(mjcf, gl) if lasts else _new_camera(mjcf, gl)
+        return self._camera
+
+    async def leave(self) -> None:
+        """End the use by one user. After the last one, the camera is closed, unless it lasts."""
+        self.users -= 1
+        if self.users:
+            return
+        del _open[self._key]
+        try:
+            await asyncio.get_running_loop().run_in_executor(self.thread, self._close)
+        finally:
+            self.thread.shutdown(wait=False)
+
+    def _close(self) -> None:
+        if self._camera is not None and not self._key[-1]:
+            self._camera.close()
+
+
+def _new_camera(mjcf: str, gl: Backend, *memo_pictures: int) -> Any:
+    prepare(gl)
+    camera = importlib.import_module("scout_model.camera").Camera
+    return camera(mjcf, "paint" if gl == "none" else "gl", *memo_pictures)
+
+
+@functools.lru_cache(maxsize=CAMERAS_KEPT)
+def _lasting_camera(mjcf: str, gl: Backend) -> Any:
+    """Return the camera that all worlds of this model share in this process, one after the other on virtual clocks.
+
+    One thread draws all worlds, and a picture depends only on the world's state. So pictures cached for one world are
+    valid for the next.
+    """
+    return _new_camera(mjcf, gl, PICTURES_KEPT)
