@@ -65,10 +65,6 @@ class BusBase(ABC):
         """Return the quality in which this bus sends the messages of a key."""
         return self._qualities.get((address, conversation)) or QUALITY[conversation]
 
-    def is_unheard(self, conversation: Conversation) -> bool:  # noqa: ARG002
-        """Return False, because other processes may listen or record; see ``Bus.is_unheard``."""
-        return False
-
     def envelope(self, body: Message) -> Envelope[Message]:
         """Return the body in an envelope with the next sequence number, now, and the current cause."""
         self._sequence += 1

@@ -107,6 +107,10 @@ class SharedBus(Neighbor, ZenohBus):
             if conversation in NEVER_DROPPED:
                 self.tell(address, conversation, envelope)
 
+    def is_unheard(self, conversation: Conversation) -> bool:
+        """Return whether certainly neither a neighbor nor another process hears this; see ``Bus.is_unheard``."""
+        return not self.is_overheard_by_neighbors(conversation) and super().is_unheard(conversation)
+
     def pass_on(self, address: str, conversation: Conversation, envelope: Envelope[Message]) -> None:
         """Send a message of another sender, to neighbors too; see ``Bus.pass_on``."""
         super().pass_on(address, conversation, envelope)

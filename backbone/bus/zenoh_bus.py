@@ -277,6 +277,13 @@ class ZenohBus(LifeBus):
             return True
         return self._outlet(self.source, conversation).has_subscriber
 
+    def is_unheard(self, conversation: Conversation) -> bool:
+        """Return whether certainly no component hears this conversation; False while its publisher is new."""
+        is_told = self.is_overheard(Conversation.TOLD) or copiers(self.copies, self.far, conversation)
+        if is_told or self.lossless.to(self.source, conversation):
+            return False
+        return self._outlet(self.source, conversation).is_unheard(self._loop.time())
+
     def tell_later(self, act: Callable[[], None]) -> None:
         """Call a function when the copies of ``TELL_WITHIN_S`` have gathered."""
         self._loop.call_later(TELL_WITHIN_S, act)

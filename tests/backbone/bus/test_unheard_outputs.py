@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import pytest_asyncio
 from free_ports import free_endpoint
+from hosts_with_boards import until
 
 from backbone.bus import zenoh_outlets
 from backbone.bus.clock import MissionClock
@@ -103,3 +104,26 @@ async def test_only_outputs_go_unsent_because_the_next_one_follows(
     unit.publish(OUTPUT, Conversation.OUTPUTS, Ball(1))
     unit.publish(OUTPUT, Conversation.EVENTS, Ball(2))
     assert encoded == [2]
+
+
+@pytest.mark.usefixtures("encoded")
+async def test_a_bus_knows_soon_whether_certainly_nobody_hears_it(buses: tuple[SharedBus, SharedBus, ZenohBus]) -> None:
+    unit, taker, stranger = buses
+
+    def unheard() -> bool:
+        return unit.is_unheard(Conversation.SCHEDULE)
+
+    await until(unheard, "nobody hears it")
+    listeners = [
+        lambda: taker.subscribe(UNIT, Conversation.SCHEDULE, Ball, lambda _one: None),
+        lambda: stranger.subscribe(UNIT, Conversation.SCHEDULE, Ball, lambda _one: None),
+        lambda: stranger.subscribe("*/*", Conversation.SCHEDULE, Ball, lambda _one: None, latest=True),
+        lambda: stranger.subscribe(UNIT, Conversation.SCHEDULE, Ball, lambda _one: None, lossless=True),
+        lambda: stranger.overhear(Conversation.SCHEDULE, lambda _key, _raw: None, 1_000_000),
+        lambda: stranger.overhear(Conversation.TOLD, lambda _key, _raw: None, 1_000_000),
+    ]
+    for listen in listeners:
+        listening = listen()
+        await until(lambda: not unheard(), "somebody hears it")
+        listening.close()
+        await until(unheard, "nobody hears it any more")
