@@ -43,6 +43,7 @@ def test_one_behavior_patrols_with_a_walker_and_with_a_scout_on_one_radio() -> N
     patrols(1)
 
 
+@pytest.mark.thorough
 def test_the_walker_goes_out_and_home_by_dead_reckoning() -> None:
     run_virtual(errand(WALKER, "walker1", "walker", (4.0, 3.0)))
 
