@@ -12,7 +12,7 @@ from hypothesis import settings
 Case = TypeVar("Case")
 
 FULL = 100  # what the profile "full" has
-FEWEST = 3  # chosen: a law is tried with more than one example
+FEWEST = 2  # chosen: a law is tried with more than one example
 
 
 def share(count: int) -> int:
