@@ -37,10 +37,10 @@ TRIALS = ("backbone.mission.class_probe", "scout_model.gl_trial", "def get_versi
 STARTS_A_PROCESS = (
     (subprocess.Popen, "__init__"),
     (BaseProcess, "start"),
-    *((os, name) for name in ("fork", "forkpty", "posix_spawn", "posix_spawnp")),
+    *((os, name) for name in ("fork", "forkpty", "posix_spawn", "posix_spawnp", "system")),
 )
-"""All that asyncio and the standard library start goes through one of them. They are wrapped: a hook for audit events
-would be called for each of the many events that start nothing."""
+"""Whatever Python starts for a test goes through one of them. They are wrapped: a hook for audit events would be called
+for each of the many events that start nothing."""
 
 
 class Machine:

@@ -79,6 +79,7 @@ WAYS = {
     "multiprocessing-fork": lambda: multiply("fork"),
     "multiprocessing-spawn": lambda: multiply("spawn"),
     "popen": lambda: os.popen("true").close(),
+    "system": lambda: os.system("true"),
 }
 
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
@@ -122,8 +123,8 @@ def test_with_workers_a_test_that_hangs_fails_alone(tmp_path: Path) -> None:
 
 def test_no_way_to_start_a_process_is_missed(tmp_path: Path) -> None:
     printed = run(tmp_path, suite=STARTS)
-    assert printed.count("starts a process without the marker 'processes'") >= 7
-    assert "7 failed, 1 passed" in printed
+    assert printed.count("starts a process without the marker 'processes'") >= 8
+    assert "8 failed, 1 passed" in printed
 
 
 TOGETHER = """

@@ -182,7 +182,7 @@ def test_an_operator_who_is_in_is_not_cut_off_for_newcomers(encrypted: bool) -> 
 def test_strangers_are_gone_after_a_while(
     way: str, encrypted: bool, loop: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pending_connections, "AUTHENTICATED_WITHIN_S", 0.1)
+    monkeypatch.setattr(pending_connections, "AUTHENTICATED_WITHIN_S", 0.3)
 
     async def visit(here: Served) -> None:
         with ExitStack() as stack:
