@@ -261,7 +261,7 @@ def test_replies_pass_the_same_air_as_packets_and_what_is_lost_is_counted_for_ea
         async with pool_in(local_mission, world_with(radio_loss=0.3)) as pool:
             packets = overhear(pool, AIR, Conversation.COMMAND, RadioPacket)
             arrived = overhear(pool, AIR, Conversation.REPLIES, ReplyOnAir)
-            await drive(pool, 30.0, await granted(pool), await granted(pool, "scout2"))
+            await drive(pool, 60.0, await granted(pool), await granted(pool, "scout2"))
             found, air = counts(pool, "radio"), counts(pool, "world")
             asks = {
                 robot: [packet for packet in packets if packet.asks and packet.network_id == robot] for robot in (1, 2)
