@@ -18,7 +18,11 @@ Inside one process objects are delivered without decoding, because all code ther
 
 from __future__ import annotations
 
+import functools
+import typing
+from collections.abc import Iterable
 from enum import Enum
+from itertools import chain, repeat
 from typing import Annotated, Any
 
 from msgspec import Meta, Struct
@@ -133,7 +137,7 @@ DEEPEST = 24  # chosen: the description of a world is six deep
 def wildness(value: object, depth: int = 0) -> str:
     """Return why a value of any kind is illegal, empty if it is legal: plain, finite and bounded.
 
-    The reader calls this for messages with fields of any kind; types check all other messages.
+    The reader calls this for messages with fields of any kind; types check all other messages and fields.
 
     Example:
         >>> wildness({"speed": [1, 2.5, None]}), wildness([float("nan")])
@@ -159,12 +163,24 @@ def wildness(value: object, depth: int = 0) -> str:
         case list() | tuple() | dict() if depth > DEEPEST:
             return f"more than {DEEPEST} values inside each other"
         case list() | tuple():
-            return next((wild for one in value if (wild := wildness(one, depth + 1))), "")
+            inside: Iterable[object] = value
         case dict():
-            inside = (part for item in value.items() for part in item)
-            return next((wild for one in inside if (wild := wildness(one, depth + 1))), "")
+            inside = chain(value.keys(), value.values())
         case Struct():
-            inside = (getattr(value, name) for name in value.__struct_fields__)
-            return next((wild for one in inside if (wild := wildness(one, depth + 1))), "")
+            inside = (getattr(value, name) for name in _fields_of_any_kind(type(value)))
         case _:
             return f"a value of type {type(value).__name__}"
+    return next(filter(None, map(wildness, inside, repeat(depth + 1))), "")
+
+
+@functools.cache
+def holds_values_of_any_kind(kind: Any) -> bool:
+    """Return whether this type admits values of any kind, which types alone cannot check."""
+    if isinstance(kind, type) and issubclass(kind, Struct):
+        return bool(_fields_of_any_kind(kind))
+    return kind is Any or any(map(holds_values_of_any_kind, typing.get_args(kind)))
+
+
+@functools.cache
+def _fields_of_any_kind(kind: type[Struct]) -> list[str]:
+    return [name for name, field in typing.get_type_hints(kind).items() if holds_values_of_any_kind(field)]

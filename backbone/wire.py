@@ -17,7 +17,6 @@ A change of a struct that old readers cannot read gets a new version: ``class Dr
 from __future__ import annotations
 
 import dataclasses
-import functools
 import types
 import typing
 from collections.abc import Hashable, Mapping
@@ -26,7 +25,19 @@ from typing import Any, Generic, TypeVar, cast
 import msgspec
 
 from backbone.errors import Fact, Refusal, code_of, revive
-from backbone.ranges import LONGEST_TEXT, MOST_FEW, Count, Facts, Instant, Mention, Source, Text, Version, wildness
+from backbone.ranges import (
+    LONGEST_TEXT,
+    MOST_FEW,
+    Count,
+    Facts,
+    Instant,
+    Mention,
+    Source,
+    Text,
+    Version,
+    holds_values_of_any_kind,
+    wildness,
+)
 
 WIRE_VERSION = 1
 MAX_MESSAGE_BYTES = 8 * 1024 * 1024  # chosen: a 1080p colour frame (6.2 MB) fits, a runaway list does not
@@ -195,14 +206,6 @@ def plain(value: object) -> Any:
     if isinstance(value, Mapping):
         return {str(name): plain(each) for name, each in value.items()}
     return value
-
-
-@functools.cache
-def holds_values_of_any_kind(kind: Any) -> bool:
-    """Return whether this type admits values of any kind, which types alone cannot check."""
-    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
-        return any(map(holds_values_of_any_kind, typing.get_type_hints(kind).values()))
-    return kind is Any or any(map(holds_values_of_any_kind, typing.get_args(kind)))
 
 
 class Reader(Generic[Body]):

@@ -16,9 +16,12 @@ from __future__ import annotations
 import contextlib
 import faulthandler
 import fcntl
+import functools
 import os
+import subprocess
 import sys
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +34,13 @@ GRACE_S = 60.0  # chosen: a test that was interrupted may stop its mission
 LOCKS = (Path(__file__).with_name("conftest.py"), Path(__file__))  # files that are there anyway
 TRIALS = ("backbone.mission.class_probe", "scout_model.gl_trial", "def get_version(library_handle)", "fc-list")
 """Parts of commands that look what is there: two of the product, one of glfw, which MuJoCo loads, one of matplotlib."""
-STARTS_A_PROCESS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn"})
+STARTS_A_PROCESS = (
+    (subprocess.Popen, "__init__"),
+    (BaseProcess, "start"),
+    *((os, name) for name in ("fork", "forkpty", "posix_spawn", "posix_spawnp", "system")),
+)
+"""Whatever Python starts for a test goes through one of them. They are wrapped: a hook for audit events would be called
+for each of the many events that start nothing."""
 
 
 class Machine:
@@ -62,11 +71,18 @@ class Limits:
         self._grace_s, self._machine = grace_s, machine
         self._started: list[str] = []
         self._stderr = os.dup(sys.__stderr__.fileno()) if sys.__stderr__ is not None else 2
-        sys.addaudithook(self._hear)
+        for owner, name in STARTS_A_PROCESS:
+            setattr(owner, name, self._heard(getattr(owner, name)))
 
-    def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
-        if event in STARTS_A_PROCESS and not any(trial in str(arguments[:2]) for trial in TRIALS):
-            self._started.append(f"{event} {arguments[:2]}")
+    def _heard(self, start: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(start)
+        def start_and_hear(*arguments: Any, **named: Any) -> Any:
+            command = str(named.get("args", arguments[1:2]))
+            if not any(trial in command for trial in TRIALS):
+                self._started.append(f"{start.__qualname__} {command}")
+            return start(*arguments, **named)
+
+        return start_and_hear
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:

@@ -6,6 +6,7 @@ that use this. Values are plain data as MessagePack carries them; a message is a
 
 from __future__ import annotations
 
+import functools
 import importlib
 import math
 import pkgutil
@@ -150,7 +151,7 @@ def _limits(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
         case inspect.DictType():
             yield "empty", {}
             yield from ((f"value {name}", {"plain": value}) for name, value in _limits(kind.value_type))
-            yield "longest", dict.fromkeys(map("a{}".format, range(kind.max_length or 0)), _honest(kind.value_type))
+            yield "longest", _entries(kind.max_length or 0, _honest(kind.value_type))
         case inspect.TupleType():
             yield from _each_item(kind, _limits)
         case inspect.UnionType():
@@ -212,8 +213,7 @@ def _beyond(kind: inspect.Type) -> Iterator[tuple[str, Any]]:
         case inspect.DictType():
             yield from ((f"value {name}", {"plain": value}) for name, value in _beyond(kind.value_type))
             yield "a key of 1 MB", {"a" * A_MEGABYTE: _honest(kind.value_type)}
-            names = map("a{}".format, range((kind.max_length or MOST_ENTRIES) + 1))
-            yield "too many", dict.fromkeys(names, _honest(kind.value_type))
+            yield "too many", _entries((kind.max_length or MOST_ENTRIES) + 1, _honest(kind.value_type))
             yield from _named("no map", (5, math.nan, "plain", None))
         case inspect.TupleType():
             yield from _each_item(kind, _beyond)
@@ -248,7 +248,16 @@ def _is_of(kind: inspect.Type, value: Any) -> bool:
 
 
 def _named(what: str, values: Any) -> Iterator[tuple[str, Any]]:
-    return ((f"{what} {value!r:.40}", value) for value in values)
+    return ((f"{what} {value[:40] if isinstance(value, str) else value!r:.40}", value) for value in values)
+
+
+@functools.cache
+def _keys(count: int) -> list[str]:
+    return [f"a{number}" for number in range(count)]
+
+
+def _entries(count: int, value: Any) -> dict[str, Any]:
+    return dict.fromkeys(_keys(count), value)
 
 
 def _each_item(kind: inspect.TupleType, choose: Any) -> Iterator[tuple[str, Any]]:

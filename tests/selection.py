@@ -1,7 +1,7 @@
 """Which tests run when nothing is said: those of a few seconds.
 
-* ``slow`` marks the long experiments, ``thorough`` the tests that take longer than some three seconds on a calm
-  machine. Both are left out unless the expression of ``-m`` names their marker or the command names the test
+* ``slow`` marks the long experiments, ``thorough`` the tests that take seconds and whose mechanism a shorter one tries
+  too. Both are left out unless the expression of ``-m`` names their marker or the command names the test
   (``file.py::test``).
 * ``pytest -m "not processes"`` leaves them out too: an expression that does not name them does not ask for them.
 """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 
 def _words(text: str) -> frozenset[str]:
@@ -40,12 +40,17 @@ def system_calls(source: str) -> set[str]:
         >>> sorted(system_calls("import os, fcntl\\nos.kill(1, 2)"))
         ['fcntl', 'os.kill']
     """
-    return set(_found(ast.parse(source)))
+    return calls_among([*ast.walk(ast.parse(source))])
 
 
-def _found(tree: ast.Module) -> Iterator[str]:
-    documents = {id(text) for node in ast.walk(tree) for text in _documents(node)}
-    for node in ast.walk(tree):
+def calls_among(nodes: Sequence[ast.AST]) -> set[str]:
+    """Return the same of all nodes of a file."""
+    return set(_found(nodes))
+
+
+def _found(nodes: Sequence[ast.AST]) -> Iterator[str]:
+    documents = {id(text) for node in nodes for text in _documents(node)}
+    for node in nodes:
         match node:
             case ast.Import(names=names):
                 yield from (one.name for one in names if one.name.partition(".")[0] in IMPORTS)

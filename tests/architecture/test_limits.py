@@ -52,6 +52,46 @@ def test_comes_after_one_that_hangs():
 ALONE = ("test_sleeps", "test_starts", "test_plays_for_long")
 
 
+STARTS = """
+import asyncio, multiprocessing, os, subprocess, sys
+import pytest
+
+PASS = (sys.executable, "-c", "pass")
+
+def fork():
+    if (child := os.fork()) == 0:
+        os._exit(0)
+    os.waitpid(child, 0)
+
+async def start():
+    await (await asyncio.create_subprocess_exec(*PASS)).wait()
+
+def multiply(method):
+    process = multiprocessing.get_context(method).Process(target=print)
+    process.start()
+    process.join()
+
+WAYS = {
+    "subprocess": lambda: subprocess.run(args=PASS),
+    "asyncio": lambda: asyncio.run(start()),
+    "fork": fork,
+    "posix_spawn": lambda: os.waitpid(os.posix_spawn(sys.executable, PASS, {}), 0),
+    "multiprocessing-fork": lambda: multiply("fork"),
+    "multiprocessing-spawn": lambda: multiply("spawn"),
+    "popen": lambda: os.popen("true").close(),
+    "system": lambda: os.system("true"),
+}
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_starts(way):
+    way()
+
+def test_looks_what_is_there():
+    with pytest.raises(FileNotFoundError):
+        subprocess.run(["no-such-folder/fc-list"])
+"""
+
+
 def run(folder: Path, *options: str, suite: str = SUITE) -> str:
     """Return what pytest prints of the suite."""
     top = Path(__file__).parents[2]
@@ -79,6 +119,12 @@ def test_with_workers_a_test_that_hangs_fails_alone(tmp_path: Path) -> None:
     for name in (*ALONE, "test_hangs"):
         assert f"FAILED test_suite.py::{name}" in printed
     assert "4 failed, 2 passed" in printed
+
+
+def test_no_way_to_start_a_process_is_missed(tmp_path: Path) -> None:
+    printed = run(tmp_path, suite=STARTS)
+    assert printed.count("starts a process without the marker 'processes'") >= 8
+    assert "8 failed, 1 passed" in printed
 
 
 TOGETHER = """

@@ -7,6 +7,8 @@ the same contracts.
 from __future__ import annotations
 
 import ast
+import contextlib
+import gc
 import graphlib
 import re
 import tomllib
@@ -32,6 +34,17 @@ def modules(top: Path, packages: list[str]) -> dict[str, Path]:
 def nodes(file: Path) -> list[ast.AST]:
     """Return all nodes of a file that no test changes."""
     return [*ast.walk(ast.parse(file.read_bytes(), str(file)))]
+
+
+@contextlib.contextmanager
+def kept_trees() -> Iterator[None]:
+    """Keep parsed files to the end of the block; garbage collection would visit a million nodes again and again."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        nodes.cache_clear()
+        gc.enable()
 
 
 def imports(found: dict[str, Path], importers: Iterable[str]) -> set[Import]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from examples import rest_thorough
 from running_mission import mission_up
 
 from backbone.component.messages import AskStatistics, Statistics
@@ -46,7 +47,7 @@ def _the_pair_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(EXAMPLES)
 
 
-@pytest.mark.parametrize("units", ARRANGEMENTS.values(), ids=ARRANGEMENTS)
+@pytest.mark.parametrize("units", rest_thorough(reversed(ARRANGEMENTS.values())), ids=reversed(ARRANGEMENTS))
 async def test_an_arrangement_says_what_the_modules_say_by_hand(units: str, tmp_path: Path) -> None:
     import pair
 

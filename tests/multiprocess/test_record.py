@@ -185,7 +185,6 @@ async def test_reasons_of_any_instant_are_those_that_were_given_then(tmp_path: P
     assert found.decisions > 5
 
 
-@pytest.mark.thorough
 def test_a_mission_that_was_brought_up_with_a_recording_has_it_from_the_first_decision_on(tmp_path: Path) -> None:
     path = tmp_path / "it.mcap"
     with mission_up("--record", str(path)) as mission:
@@ -344,6 +343,7 @@ def test_a_recorder_begun_by_hand_is_named_while_it_hangs_and_no_longer(
     assert (name in log, log.count(f"recorder-{killed.pid} "), log.count(f"recorder-{lost.pid} ")) == (False, 1, 1), log
 
 
+@pytest.mark.thorough
 def test_what_cannot_be_recorded_is_refused_with_a_remedy(mission: RunningMission, tmp_path: Path) -> None:
     there = tmp_path / "there.mcap"
     there.touch()

@@ -19,7 +19,7 @@ from backbone.keys import address_of
 from backbone.recording.joining import join
 from backbone.recording.reader import Recorded, Recording, missing_numbers
 
-pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.processes, pytest.mark.thorough, pytest.mark.timeout(400)]
 
 HOSTS = ("base", "near", "far")
 FAR_ROBOT = "resource_pool/scout2"
@@ -135,7 +135,6 @@ def before_their_causes(messages: list[Recorded] | Iterator[Recorded]) -> list[s
     return [one.id for number, one in enumerate(listed) if place.get(one.cause, -1) > number]
 
 
-@pytest.mark.thorough
 @pytest.mark.alone
 def test_what_a_host_says_while_its_link_is_cut_is_recorded_and_afterwards_it_goes_on_in_a_further_file(
     short_path: Path,

@@ -56,6 +56,7 @@ def environment(path: Path) -> dict[str, str]:
     return {**os.environ, "XDG_RUNTIME_DIR": str(path.parent)}
 
 
+@pytest.mark.thorough
 def test_at_ten_times_the_speed_a_listener_that_waited_hears_all_in_order(recording: Path) -> None:
     with replay(recording, "--speed", "10", "--from=-40"):
         words = ["watch", f"{SCOUT}/log", "--json", "--most", "100", "--for", "30", "--mission", NAME]

@@ -161,6 +161,7 @@ async def test_a_patrol_is_exchanged_a_hundred_times_and_twenty_broken_ones_leav
     judged(source.parent / "trace")
 
 
+@pytest.mark.thorough
 async def test_a_person_exchanges_a_behavior_and_a_driver_and_new_starts_have_them(
     mission: RunningMission, source: Path
 ) -> None:

@@ -200,6 +200,7 @@ async def test_a_person_exchanges_a_module_and_a_new_start_has_the_new_class(
         await talk.until_answered_by("second")
 
 
+@pytest.mark.thorough
 async def test_an_interrupted_command_says_that_the_exchange_goes_on_and_it_does(mission: RunningMission) -> None:
     async with talk_with(mission):
         words = ["swap", "answerer", f"{FILE}:Answerer", "--prove", "8", "--mission", mission.name]

@@ -108,6 +108,7 @@ def test_a_host_that_dies_and_is_back_gets_its_components_again(mission: ThreeHo
         assert mission.components()["scout2"]["host"] == "far"
 
 
+@pytest.mark.thorough
 def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwhile(short_path: Path) -> None:
     with machines(short_path) as mission:
         mission.type_what_up_prints("near")

@@ -51,6 +51,7 @@ async def at_random(mission: RunningMission, cycles: int, seed: int) -> Measured
     return take_overs.took
 
 
+@pytest.mark.thorough
 async def test_a_few_random_take_overs_by_two_consoles(mission: RunningMission) -> None:
     await at_random(mission, 8, seed=1)
 

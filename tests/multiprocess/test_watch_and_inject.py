@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from examples import rest_thorough
 from running_mission import MISSION_XML, RunningMission, mission_up
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
@@ -72,18 +73,21 @@ def test_a_message_is_injected_and_the_log_tells_who_did(mission: RunningMission
 
 @pytest.mark.parametrize(
     ("key", "said", "code", "told"),
-    [
-        ("resource_pool/scout1", '{"schema": "AskState"}', 2, "no key"),
-        ("resource_pool/*/ask", '{"schema": "AskState"}', 2, "no key"),
-        ("resource_pool/scout1/asks", '{"schema": "AskState"}', 2, "did you mean 'ask'"),
-        ("resource_pool/scout1/ask", "nonsense", 5, "no JSON"),
-        ("resource_pool/scout1/ask", "[1]", 5, "no object"),
-        ("resource_pool/scout1/ask", '{"schema": "AskStat"}', 5, "did you mean 'AskState'"),
-        ("resource_pool/scout1/ask", '{"schema": "AskStory", "subjet": "x"}', 5, "did you mean 'subject'"),
-        ("resource_pool/scout1/ask", '{"schema": "Move", "forward_m_s": 1e300, "turn_rad_s": 0}', 5, "Move/1"),
-        ("resource_pool/scout1/ask", '{"schema": "SetParameter", "name": "x"}', 5, "no value"),
-        ("resource_pool/nobody/ask", '{"schema": "AskState"}', 4, "no component answered"),
-    ],
+    rest_thorough(
+        [
+            ("resource_pool/scout1/ask", '{"schema": "AskStory", "subjet": "x"}', 5, "did you mean 'subject'"),
+            ("resource_pool/nobody/ask", '{"schema": "AskState"}', 4, "no component answered"),
+            ("resource_pool/scout1", '{"schema": "AskState"}', 2, "no key"),
+            ("resource_pool/*/ask", '{"schema": "AskState"}', 2, "no key"),
+            ("resource_pool/scout1/asks", '{"schema": "AskState"}', 2, "did you mean 'ask'"),
+            ("resource_pool/scout1/ask", "nonsense", 5, "no JSON"),
+            ("resource_pool/scout1/ask", "[1]", 5, "no object"),
+            ("resource_pool/scout1/ask", '{"schema": "AskStat"}', 5, "did you mean 'AskState'"),
+            ("resource_pool/scout1/ask", '{"schema": "Move", "forward_m_s": 1e300, "turn_rad_s": 0}', 5, "Move/1"),
+            ("resource_pool/scout1/ask", '{"schema": "SetParameter", "name": "x"}', 5, "no value"),
+        ],
+        quick=2,
+    ),
 )
 def test_what_does_not_fit_is_not_injected(mission: RunningMission, key: str, said: str, code: int, told: str) -> None:
     done = injected(mission, key, said)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from pool_on_local_network import Pool, a_pool
+from rehearsed_missions import assert_each_gets_its_turn
 
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import WrongParameter
@@ -67,11 +66,8 @@ def test_each_piece_of_mission_file_in_the_guide_stands_in_the_example() -> None
     assert [part for part in of_the_lamp if part not in example] == []
 
 
-@pytest.mark.processes
 def test_the_example_is_sound_and_both_robots_get_the_lamp() -> None:
-    command = [str(Path(sys.executable).parent / "scout-backbone"), "check", "docs/examples/lamp.xml", "--dry-run"]
-    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, check=False)
-    assert (done.returncode, "every request gets its turn" in done.stdout) == (0, True), done.stdout + done.stderr
+    assert_each_gets_its_turn(TOP / "docs/examples/lamp.xml")
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -90,7 +91,7 @@ def test_who_was_set_down_obeys_and_who_is_carried_goes_nowhere() -> None:
     assert room.pose("scout2")[:2] == pytest.approx((SECOND.x_m, SECOND.y_m), abs=2e-3)
 
 
-@settings(max_examples=5)
+@settings(max_examples=share(5))
 @given(st.floats(0.2, 1.0), st.floats(0.0, 3.0))
 def test_place_and_time_do_not_depend_on_how_fast_it_comes(speed_m_s: float, begin_s: float) -> None:
     carrier = Target("carrier", "carrier", [(1.5, 3.0), (3.5, 3.0)], speed_m_s, begin_s=begin_s)

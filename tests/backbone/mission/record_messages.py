@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from backbone.mission.reader import MissionInvalid, read_mission
+from mission_files import faults_of_broken
 
 HERE = Path(__file__).parent
 MESSAGES = HERE / "messages.json"
@@ -21,11 +21,7 @@ def messages() -> dict[str, list[str]]:
 
 def messages_of(path: Path) -> list[str]:
     """Return the faults of one file, without its name."""
-    try:
-        read_mission(path)
-    except MissionInvalid as invalid:
-        return [str(fault).removeprefix(f"{path}:").replace(str(path.parent), ".") for fault in invalid.faults]
-    return []
+    return [str(one).removeprefix(f"{path}:").replace(str(path.parent), ".") for one in faults_of_broken(path)]
 
 
 if __name__ == "__main__":

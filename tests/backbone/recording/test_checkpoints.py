@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_recordings import CLASSES, SCOUT, Said, recorded
@@ -57,7 +58,7 @@ def told(mission: RecordedMission) -> list[Message | str]:
     return [*(answer(*question) for question in QUESTIONS), *(str(one) for one in mission.newest())]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=share(40))
 @given(
     said=st.lists(st.tuples(st.floats(0.0, LAST_S), kinds), min_size=1, max_size=40),
     looks=st.lists(st.floats(0.0, LAST_S + 1.0), min_size=1, max_size=6),

@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_recordings import CLASSES, SCOUT, Said, recorded
@@ -116,7 +117,7 @@ def played(
 tokens: list[tuple[str, bool]] = []
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share(60))
 @given(times=st.lists(st.floats(0.0, 50.0), min_size=1, max_size=30), since_s=st.sampled_from([0.0, 10.0]))
 def test_each_publication_comes_at_its_time_in_order_with_its_sender_and_number(times: list[float], since_s: float):
     times.sort()
@@ -183,7 +184,7 @@ def test_step_by_step_the_order_is_the_same():
     assert [envelope.sequence for _at_s, _said, envelope in heard] == [1, 3, 4, 5]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=share(40))
 @given(times=st.lists(st.sampled_from([0.0, 0.1, 0.101, 0.2, 7.0]), min_size=1, max_size=30), data=st.data())
 def test_at_any_speed_and_step_by_step_the_order_is_the_same(times: list[float], data: st.DataObject):
     """Also of messages of one instant, from several senders."""

@@ -10,6 +10,7 @@ from itertools import accumulate
 from typing import Any
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.stream_reader import breakup_chunk
@@ -93,7 +94,7 @@ def played(file: io.BytesIO, chunk_s: float = 0.0) -> list[tuple[str, float, flo
     return log
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share(60))
 @given(messages=st.lists(st.tuples(gaps_s, sizes), min_size=1, max_size=40))
 def test_nothing_is_decoded_while_a_decoded_message_is_due(messages: list[tuple[float, int]]):
     log = played(recording_of(messages))

@@ -46,7 +46,7 @@ def test_a_message_is_what_its_schema_says_and_comes_back_as_it_was(kind: type[M
     validator = jsonschema.Draft202012Validator(msgspec.json.decode(schema_json(kind)))
     validator.check_schema(validator.schema)
     for body in [honest_body(kind), *(sample.body for sample in limit_bodies(kind))]:
-        if len(str(body)) > 100_000:
+        if len(on_the_wire(body)) > 10_000:
             continue  # as another, longer
         made, said = translated(body)
         assert made is kind

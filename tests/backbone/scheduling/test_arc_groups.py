@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -8,13 +9,13 @@ from backbone.scheduling.groups import Groups, groups
 uses = st.dictionaries(st.text("abcdefgh", min_size=1, max_size=1), st.sets(st.integers(1, 8).map(str), max_size=3))
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(uses)
 def test_every_arc_is_in_one_group(asked):
     assert sorted(arc for group in groups(asked) for arc in group) == sorted(asked)
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(uses)
 def test_arcs_of_two_groups_share_no_rc(asked):
     found = groups(asked)
@@ -24,7 +25,7 @@ def test_arcs_of_two_groups_share_no_rc(asked):
         assert mine.isdisjoint(others)
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(uses)
 def test_a_group_cannot_be_cut_in_two(asked):
     for group in groups(asked):
@@ -34,7 +35,7 @@ def test_a_group_cannot_be_cut_in_two(asked):
         assert reached == set(group)
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(uses, st.randoms(use_true_random=False))
 def test_order_of_arrival_does_not_matter(asked, rng):
     shuffled = [*asked.items()]
@@ -50,7 +51,7 @@ def test_three_scouts_on_one_video_frequency_are_one_group():
     ]
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(st.lists(st.tuples(st.sampled_from("abcdefgh"), st.sets(st.integers(1, 8).map(str), max_size=3)), max_size=40))
 def test_groups_that_are_kept_up_to_date_are_the_groups_of_those_that_are_there(steps):
     """Each step lets an ARC come with its RCs, or go if it is there."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,7 +17,7 @@ paths = st.lists(st.sampled_from("abcdef"), min_size=1, max_size=4).map(
 )
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(st.lists(st.tuples(paths, st.floats(0, 100)), max_size=12), paths)
 def test_the_largest_value_above_a_path_is_that_of_those_higher_than_it(known: list[tuple[Path, float]], path: Path):
     above = PrefixMaximum()

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -49,7 +50,7 @@ def higher_by_walking_up(tree: Tree, a: str, b: str) -> bool:
     raise AssertionError("all roots are siblings")
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(trees())
 def test_higher_is_what_walking_up_to_the_common_parent_says(tree):
     for a in tree:
@@ -57,7 +58,7 @@ def test_higher_is_what_walking_up_to_the_common_parent_says(tree):
             assert higher(path(tree, a), path(tree, b)) == higher_by_walking_up(tree, a, b)
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(trees(), st.randoms(use_true_random=False))
 def test_nobody_comes_before_one_that_is_higher_and_else_the_smallest_key_comes_first(tree, rng):
     keys = {node: rng.randint(0, 5) for node in tree}

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from examples import share
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from trace_checker import admissible as independently_admissible
@@ -44,7 +45,7 @@ def worst_by_playing(streams: list[Stream], place: int) -> int:
     return worst
 
 
-@settings(max_examples=300)
+@settings(max_examples=share(300))
 @given(small_sets())
 def test_worst_response_is_exactly_what_playing_the_worst_case_shows(streams):
     assume(utilization(streams) < 0.99)
@@ -52,13 +53,13 @@ def test_worst_response_is_exactly_what_playing_the_worst_case_shows(streams):
         assert worst_response_us(streams, place) == worst_by_playing(streams, place)
 
 
-@settings(max_examples=300)
+@settings(max_examples=share(300))
 @given(small_sets(), st.sampled_from([0.5, 0.8, 1.0]))
 def test_an_independent_analysis_admits_the_same_sets(streams, capacity):
     assert admissible(streams, capacity) == independently_admissible([CheckedStream(*one) for one in streams], capacity)
 
 
-@settings(max_examples=100)
+@settings(max_examples=share(100))
 @given(small_sets())
 def test_what_the_exact_test_admits_the_sum_admits_too(streams):
     if admissible(streams, 1.0):

@@ -57,7 +57,7 @@ class Doubled:
         return getattr(self._first, name)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share(150))
 @given(seed=st.integers(0, 2**32), rules=st.sampled_from(RULES), at=st.integers(0, 120))
 @example(seed=713, rules={"exact_up_to": 2, "discipline": "time"}, at=11)  # one ARC came to want a shared RC alone
 @example(seed=10, rules={"exact_up_to": 2}, at=20)
@@ -75,7 +75,7 @@ def test_the_comparison_takes_place():
 
 
 @pytest.mark.thorough
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share(60))
 @given(seed=st.integers(0, 2**32), rules=st.sampled_from(RULES), until_s=st.floats(0.0, END_S))
 def test_a_copy_gives_the_same_reasons(seed: int, rules: dict[str, Any], until_s: float):
     bench, happens = random_mission(Random(seed), **rules)

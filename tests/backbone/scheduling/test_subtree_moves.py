@@ -7,6 +7,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_missions import play, random_mission
@@ -43,7 +44,7 @@ class PlainTree:
         return tuple((name, self.number[name]) for name in self.way(node))
 
 
-@settings(max_examples=200, derandomize=True)
+@settings(max_examples=share(200))
 @given(seeds)
 def test_after_any_moves_everybody_stands_where_a_plain_tree_has_them(seed):
     """However often requests repeat the ways their owners were started with."""
@@ -203,7 +204,7 @@ def moves(rng: Random, bench: Bench, nodes: Iterable[str]) -> None:
         bench.at(rng.randint(0, 200) / 4, PriorityChanged(rng.choice(names), rng.randint(0, 3)))
 
 
-@settings(max_examples=80, derandomize=True)
+@settings(max_examples=share(80))
 @given(seeds, st.sampled_from(["no_delay", "strict"]))
 def test_the_checker_finds_nothing_when_branches_move(seed, policy):
     rng = Random(seed)

@@ -107,7 +107,8 @@ def play(seed: int, folder: Path) -> str:
     return by
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in (1, 2))])
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(3))
 def test_a_night_ends_as_its_tree_says(seed: int, tmp_path: Path) -> None:
     play(seed, tmp_path)
 

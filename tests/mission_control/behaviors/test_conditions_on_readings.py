@@ -33,7 +33,7 @@ LOW = {"source": "scout1", "message": "Readings", "field": "values.battery_share
 BATTERY = EXAMPLES / "battery.xml"
 HOME_M = (1.0, 1.0)
 WAY_HOME_S = 45.0  # 5 m from the farthest way point at 0.2 m/s, two turns, and starting a patrol
-SEEDS, QUICK_SEEDS = 20, 2
+SEEDS, QUICK_SEEDS = 20, 1
 
 
 class Scene:

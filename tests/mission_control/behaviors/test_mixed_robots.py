@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 from behaviors_at_work import EXAMPLES, Person, at_work, driving, hear, pose, wait_until
 from errands import errand
+from rehearsed_missions import assert_each_gets_its_turn
 
 from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
@@ -65,8 +62,5 @@ def test_a_rover_goes_out_and_home_by_dead_reckoning() -> None:
     run_virtual(errand(MIXED, "rover1", "rover", (6.0, 4.0)))
 
 
-@pytest.mark.processes
 def test_the_example_is_sound_and_no_robot_waits_for_the_other() -> None:
-    command = [str(Path(sys.executable).parent / "scout-backbone"), "check", "docs/examples/mixed.xml", "--dry-run"]
-    done = subprocess.run(command, cwd=MIXED.parents[2], capture_output=True, text=True, check=False)
-    assert (done.returncode, "every request gets its turn" in done.stdout) == (0, True), done.stdout + done.stderr
+    assert_each_gets_its_turn(MIXED)

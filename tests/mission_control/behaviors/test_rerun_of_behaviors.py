@@ -20,7 +20,7 @@ from backbone.recording.reader import Recorded, Recording
 from backbone.recording.rerun import launch_of, run_again
 
 PATROL, SERVO = "patrol-scout1", "servo-scout3"
-LASTED_S = 12.0
+LASTED_S = 10.0
 MOVE = "Move/1"
 Said = dict[tuple[str, str], list[tuple[str, bytes]]]
 

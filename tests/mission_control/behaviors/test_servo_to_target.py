@@ -86,6 +86,7 @@ def test_taken_over_at_many_more_moments_it_still_arrives(disturbances: Disturba
     play(disturbances)
 
 
+@pytest.mark.thorough
 def test_where_there_is_no_target_it_fails_after_its_turns() -> None:
     async def scene() -> None:
         async with at_work(without_landmark(example(NAME, search_turns=1))) as running:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 from behaviors_at_work import EXAMPLES, at_work, hear, pose, wait_until
 from errands import errand
+from rehearsed_missions import assert_each_gets_its_turn
 
 from backbone.bus.clock import run_virtual
 from backbone.mission.reader import read_mission
@@ -43,6 +40,7 @@ def test_one_behavior_patrols_with_a_walker_and_with_a_scout_on_one_radio() -> N
     patrols(1)
 
 
+@pytest.mark.thorough
 def test_the_walker_goes_out_and_home_by_dead_reckoning() -> None:
     run_virtual(errand(WALKER, "walker1", "walker", (4.0, 3.0)))
 
@@ -52,8 +50,5 @@ def test_the_walker_patrols_ten_rounds() -> None:
     patrols(10)
 
 
-@pytest.mark.processes
 def test_the_example_is_sound_and_no_robot_waits_for_the_other() -> None:
-    command = [str(Path(sys.executable).parent / "scout-backbone"), "check", "docs/examples/walker.xml", "--dry-run"]
-    done = subprocess.run(command, cwd=WALKER.parents[2], capture_output=True, text=True, check=False)
-    assert (done.returncode, "every request gets its turn" in done.stdout) == (0, True), done.stdout + done.stderr
+    assert_each_gets_its_turn(WALKER)

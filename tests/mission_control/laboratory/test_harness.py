@@ -54,7 +54,7 @@ def test_progress_is_told_after_each_result() -> None:
     assert told == [(1, 3), (2, 3), (3, 3)]
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.processes)])
 def test_the_first_failure_is_raised(jobs: int) -> None:
     with pytest.raises(ArithmeticError, match="seven"):
         run_all(picky, range(12), jobs=jobs)

@@ -75,7 +75,7 @@ def test_a_block_that_crosses_the_view_is_found_where_it_is(seed: int, speed_px:
             assert 80 <= blob.y_px <= 150
 
 
-@settings(max_examples=5)
+@settings(max_examples=share(5))
 @given(seed=st.integers(0, 1000), share=st.floats(0.3, 1.0))
 def test_a_picture_torn_in_many_rows_is_rejected(seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)
@@ -90,7 +90,7 @@ def test_a_picture_torn_in_many_rows_is_rejected(seed: int, share: float) -> Non
             assert detector.look(room(seed)) is None
 
 
-@settings(max_examples=5)
+@settings(max_examples=share(5))
 @given(seed=st.integers(0, 1000))
 def test_single_torn_rows_are_no_motion(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -125,7 +125,7 @@ def test_at_71_percent_tracking_goes_on_and_at_69_it_ends_in_acquisition(match: 
     assert seen[-1] is ends_in
 
 
-@settings(max_examples=4)
+@settings(max_examples=share(4))
 @given(seed=st.integers(0, 1000), sigma=st.floats(0.0, 15.0), start_deg=st.floats(-40.0, 40.0))
 def test_an_approaching_target_is_followed_from_picture_to_picture(seed: int, sigma: float, start_deg: float) -> None:
     rng = np.random.default_rng(seed)

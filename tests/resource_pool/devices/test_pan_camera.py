@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pool_on_local_network import Pool, a_pool
+from rehearsed_missions import assert_each_gets_its_turn
 from world_joints import joints
 
 from backbone.bus.clock import run_virtual
@@ -134,11 +133,8 @@ def test_an_emergency_stop_holds_it_where_it_looks(local_mission: Any) -> None:
     play(local_mission, scene)
 
 
-@pytest.mark.processes
 def test_the_example_is_sound() -> None:
-    command = [str(Path(sys.executable).parent / "scout-backbone"), "check", "docs/examples/cameras.xml", "--dry-run"]
-    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, check=False)
-    assert (done.returncode, "every request gets its turn" in done.stdout) == (0, True), done.stdout + done.stderr
+    assert_each_gets_its_turn(TOP / "docs/examples/cameras.xml")
 
 
 # ---------------------------------------------------------------------- its program alone

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -53,7 +54,7 @@ def test_standing_is_all_joints_at_zero() -> None:
     assert Kinematics().joints(STANDING) == pytest.approx((0.0,) * 12, abs=1e-9)
 
 
-@settings(max_examples=15)
+@settings(max_examples=share(15))
 @given(gaits, st.lists(moves, min_size=1, max_size=3))
 def test_the_joints_bring_the_feet_of_every_gait_where_they_shall_be(
     parameters: GaitParameters, asked: list[TrunkSpeed]
@@ -136,7 +137,7 @@ def test_a_control_that_was_held_up_does_not_leap() -> None:
     assert held_up.step(61.0) == pytest.approx(on_time.step(1.0 + LONGEST_STEP_S), abs=1e-9)
 
 
-@settings(max_examples=15)
+@settings(max_examples=share(15))
 @given(moves, st.integers(0, 60))
 def test_a_control_that_rests_begins_anew_from_the_standing_posture(move: TrunkSpeed, steps: int) -> None:
     rested, new = MotionControl(), MotionControl()

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 from design_hands import BIN, ROOT
+from examples import rest_thorough
 from websockets.asyncio.client import ClientConnection, connect
 
 from ui_console.design.keeping import DraftFile, path_of_draft
@@ -96,7 +97,7 @@ async def assert_goes_on(file: Path, priority: str) -> None:
     assert_not_saved(file)
 
 
-@pytest.mark.parametrize("number", ASKED_TO_END)
+@pytest.mark.parametrize("number", rest_thorough(ASKED_TO_END))
 async def test_a_signal_that_ends_the_server_loses_not_even_the_last_change(
     number: signal.Signals, tmp_path: Path
 ) -> None:
@@ -110,7 +111,7 @@ async def test_a_signal_that_ends_the_server_loses_not_even_the_last_change(
     await assert_goes_on(file, "119")
 
 
-@pytest.mark.parametrize("number", KILLED)
+@pytest.mark.parametrize("number", rest_thorough(KILLED))
 async def test_a_server_that_crashes_loses_nothing_that_was_kept(number: signal.Signals, tmp_path: Path) -> None:
     file = mission(tmp_path)
     with server(file) as (process, address):

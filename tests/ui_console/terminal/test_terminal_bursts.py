@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from bursts import EVERY_KEY, LEAVE, LOOKS, SIZES, burst, press_all_twice
 from console_scenes import STOP, held_model
+from examples import some
 from screen_text import screen_text
 from textual.app import App
 from textual.pilot import Pilot
@@ -73,7 +74,7 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
 
 # ---------------------------------------------------------------------- what was seen to end a console
 @pytest.mark.usefixtures("quiet")
-@pytest.mark.parametrize("name", [name for name in CONSOLE_SCREENS if name not in NO_DIALOGS])
+@pytest.mark.parametrize("name", some(name for name in CONSOLE_SCREENS if name not in NO_DIALOGS))
 async def test_a_dialog_is_answered_once_however_fast_its_key_comes_twice(name: str) -> None:
     keys = ["enter", "escape", "space", "l", "q"]
     await press_all_twice(console(), (80, 24), CONSOLE_SCREENS[name], keys, to_main, state_of, is_dialog=True)

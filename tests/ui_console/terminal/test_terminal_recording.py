@@ -76,7 +76,7 @@ def session() -> RecordedSession:
 async def arrived(shown: RecordedSession, pilot: Pilot[Any]) -> str:
     """Return the screen once it shows the time that was gone to."""
     await shown.play.wait_arrived()
-    await pilot.pause(3.0)
+    await pilot.pause(1.2)
     return screen_text(pilot.app)
 
 

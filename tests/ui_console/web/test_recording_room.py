@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_files.page_types import View
@@ -133,7 +134,7 @@ def round_at(at_s: float) -> str:
     return f"round {int((at_s - 2.0) // EACH_S)}" if at_s >= 2.0 else "gone"
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share(25))
 @given(times=st.lists(st.floats(2.0, LAST_S), min_size=1, max_size=4))
 def test_a_time_shows_the_same_however_one_got_there(times: list[float]):
     async def scene(room: RecordingRoom, page: Page) -> None:

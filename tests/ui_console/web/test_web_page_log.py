@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from axe import serious_findings
+from examples import rest_thorough
 from web_browser import assert_no_sideways_scroll
 from web_page import page_at
 from web_stage import Stage
@@ -93,7 +94,7 @@ async def test_more_is_shown_at_a_touch_and_all_of_it_is_exported(stage: Stage, 
         assert {"at_s", "time", "level", "subject", "person", "where", "cause"} < set(lines[0])
 
 
-@pytest.mark.parametrize(("size", "theme"), [("phone", "light"), ("tablet", "dark")])
+@pytest.mark.parametrize(("size", "theme"), rest_thorough([("phone", "light"), ("tablet", "dark")]))
 async def test_the_search_fits_a_small_screen_and_axe_finds_nothing_serious(
     stage: Stage, size: str, theme: str
 ) -> None:

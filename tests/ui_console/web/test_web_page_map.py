@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 from axe import serious_findings
+from examples import rest_thorough
 from fake_resource_pool import FakeArc
 from map_stage import PLAN, Floor, floor_on
 from msgspec.structs import replace
@@ -214,7 +215,7 @@ async def test_a_finger_selects_and_sends_on_a_phone(floor: Floor) -> None:
         await wait_sent(floor, "scout3", "go_to", 1.5, 3.0)
 
 
-@pytest.mark.parametrize("size", ALL_SIZES)
+@pytest.mark.parametrize("size", rest_thorough(reversed(ALL_SIZES)))
 async def test_the_map_has_large_targets_reached_by_focus_and_axe_finds_nothing_serious(
     floor: Floor, size: str
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
+from examples import rest_thorough, some
 from web_browser import Cable, Finger
 from web_page import (
     ALL_SIZES,
@@ -30,21 +31,25 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 HOLD_S = 1.0  # as holding.js has it
 
 
-@pytest.mark.parametrize("size", ALL_SIZES)
-async def test_stop_pressed_twice_at_one_place_stops_and_never_lifts(stage: Stage, size: str) -> None:
+@pytest.mark.parametrize(
+    ("size", "robot", "gap_s"),
+    some((size, *way) for size in ALL_SIZES for way in (("scout1", 0.15), ("scout2", 0.3), ("scout3", 0.6))),
+)
+async def test_stop_pressed_twice_at_one_place_stops_and_never_lifts(
+    stage: Stage, size: str, robot: str, gap_s: float
+) -> None:
     async with page_at(stage, size) as page:
-        for robot, gap_s in (("scout1", 0.15), ("scout2", 0.3), ("scout3", 0.6)):
-            button = stop_button(page, robot)
-            await button.scroll_into_view_if_needed()
-            box = await button.bounding_box()
-            x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-            for _ in range(3):
-                await page.mouse.click(x, y)
-                await asyncio.sleep(gap_s)
-            await wait_stopped(page, robot)
-            await asyncio.sleep(0.3)
-            assert stage.robots[robot].is_stopped
-            assert stage.robots[robot].lifts == 0
+        button = stop_button(page, robot)
+        await button.scroll_into_view_if_needed()
+        box = await button.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        for _ in range(3):
+            await page.mouse.click(x, y)
+            await asyncio.sleep(gap_s)
+        await wait_stopped(page, robot)
+        await asyncio.sleep(0.3)
+        assert stage.robots[robot].is_stopped
+        assert stage.robots[robot].lifts == 0
 
 
 async def test_take_over_pressed_twice_takes_and_never_gives_back(stage: Stage) -> None:
@@ -130,7 +135,7 @@ async def test_who_lifts_anothers_stop_reads_whose_it_is_and_that_one_is_asked(s
                 await page.locator("#asked").get_by_text("ben keeps scout1 stopped").wait_for()
 
 
-@pytest.mark.parametrize("hand", HANDS)
+@pytest.mark.parametrize("hand", rest_thorough(HANDS))
 async def test_what_is_held_through_a_stop_and_its_end_moves_nothing_before_it_is_pressed_anew(
     stage: Stage, hand: str
 ) -> None:
@@ -156,7 +161,7 @@ async def test_what_is_held_through_a_stop_and_its_end_moves_nothing_before_it_i
         await wheels.wait_halted()
 
 
-@pytest.mark.parametrize("hand", HANDS)
+@pytest.mark.parametrize("hand", rest_thorough(reversed(HANDS)))
 async def test_what_is_held_when_the_robot_is_granted_moves_nothing_before_it_is_pressed_anew(
     stage: Stage, hand: str
 ) -> None:

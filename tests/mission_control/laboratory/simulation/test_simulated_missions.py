@@ -6,6 +6,7 @@ import functools
 import os
 import subprocess
 import sys
+from collections import Counter
 
 import pytest
 from examples import share
@@ -45,12 +46,13 @@ def test_missions_keep_the_laws_whatever_goes_wrong(seed: int) -> None:
 
 def test_missions_are_busy() -> None:
     """Laws are easily kept where nothing happens."""
-    runs = [mission(seed, chaos=True) for seed in range(10)]
-    words = [happening.what for run in runs for happening in run.happenings]
-    assert words.count("grant") > 40
-    assert words.count("packet") > 500
-    for word in ("killed", "cut off", "revoke", "suspending", "suspended", "refused", "unanswered", "safe"):
-        assert word in words, f"no mission in which anybody is told: {word}"
+    missing = Counter({"grant": 41, "packet": 501, "killed": 1, "cut off": 1, "revoke": 1, "suspending": 1})
+    missing += Counter(["suspended", "refused", "unanswered", "safe"])
+    for seed in range(10):
+        missing -= Counter(happening.what for happening in mission(seed, chaos=True).happenings)
+        if not missing:
+            return
+    pytest.fail(f"no mission in which anybody is told: {dict(missing)}")
 
 
 @pytest.mark.thorough
