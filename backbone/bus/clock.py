@@ -76,8 +76,7 @@ class PunctualClock(MissionClock):
 class VirtualClock:
     """Mission time that is the time of the running event loop, which a ``VirtualLoop`` makes virtual."""
 
-    def __init__(self) -> None:
-        self._loop: asyncio.AbstractEventLoop | None = None
+    _loop: asyncio.AbstractEventLoop | None = None
 
     @property
     def rate(self) -> float:

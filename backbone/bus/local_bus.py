@@ -282,7 +282,7 @@ class LocalBus(Neighbor):
 
     def is_unheard(self, conversation: Conversation) -> bool:
         """Return whether no component hears this conversation; see ``Bus.is_unheard``."""
-        return not self.is_overheard_by_neighbors(conversation)
+        return not any(map(self.is_overheard_by_neighbors, (conversation, Conversation.TOLD)))
 
     def declare_alive(self, address: str) -> NeighborDeclaration:
         """Declare a liveliness token; see ``Bus.declare_alive``."""

@@ -53,7 +53,10 @@ def script(*, falls: bool = False, for_s: str = "0.5") -> subprocess.Popen[str]:
 
 
 def test_the_pair_in_two_processes_says_what_it_says_in_one() -> None:
-    text = (EXAMPLES / "pair_in_processes.py").read_text().replace("for_s=2", "for_s=0.5")
+    """Slowly: an input that waits while the next one comes is replaced by it."""
+    text = (
+        (EXAMPLES / "pair_in_processes.py").read_text().replace("frequency_hz=20, for_s=2", "frequency_hz=2, for_s=1.5")
+    )
     done = subprocess.run(
         [sys.executable, "-c", text],
         env={"PYTHONPATH": str(EXAMPLES)},

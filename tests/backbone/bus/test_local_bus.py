@@ -145,5 +145,7 @@ def test_inside_one_process_a_bus_knows_that_nobody_hears_it() -> None:
         subscribed.close()
         elsewhere.close()
         assert source.is_unheard(Conversation.POSES)
+        listener.overhear(Conversation.TOLD, lambda _key, _raw: None, 1_000_000)
+        assert not source.is_unheard(Conversation.POSES), "copies of some conversations go to a recorder"
 
     run_virtual(main())
