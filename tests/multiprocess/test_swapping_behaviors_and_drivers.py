@@ -200,8 +200,7 @@ async def test_a_person_exchanges_a_behavior_and_a_driver_and_new_starts_have_th
             assert "does not answer" in done.stderr
         finally:
             with contextlib.suppress(ProcessLookupError):  # its creator may have replaced it by then
-                os.kill(pid, signal.SIGCONT)
-                os.kill(pid, signal.SIGKILL)
+                os.kill(pid, signal.SIGKILL)  # without SIGCONT, after which it might reach another way point
         visits.numbers.clear()
         await visits.more(1)
         assert (await statistics(bus, PATROL))["second"] == 1.0, "its next life has the new class"
