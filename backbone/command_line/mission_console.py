@@ -142,18 +142,26 @@ class ConsoleObserver:
             self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")
 
     async def _tell_holders(self, bus: Bus, clock: Clock) -> None:
-        """Print the holders whenever they have changed, until cancelled.
+        """Print the holders whenever they have changed, until the mission is down.
 
-        The published schedule is not subscribed to, because it is worked out twice a second as long as it is heard.
+        Until the last run begins, which cancels this, the published schedule is not subscribed to: it is worked out
+        twice a second as long as it is heard.
         """
         decided = asyncio.Event()
         bus.subscribe(RC_MANAGER, Conversation.EVENTS, TraceLine, lambda _line: decided.set())
-        while True:
-            decided.clear()
-            with contextlib.suppress(LinkError):  # of the next RC manager there are events, too
-                self._tell_changed(await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S))
-            await decided.wait()
-            await clock.sleep_s(SWITCH_S * clock.rate)
+        try:
+            while True:
+                decided.clear()
+                with contextlib.suppress(LinkError):  # of the next RC manager there are events, too
+                    self._tell_changed(await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S))
+                await decided.wait()
+                await clock.sleep_s(SWITCH_S * clock.rate)
+        finally:
+            with contextlib.suppress(RuntimeError):  # the bus is closed already
+                bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard_schedule, latest=True)
+
+    def _heard_schedule(self, envelope: Envelope[Schedule]) -> None:
+        self._tell_changed(envelope.body)
 
     def _tell_changed(self, schedule: Schedule) -> None:
         if any(request.state in (RequestState.CONNECTING, RequestState.REVOKING) for request in schedule.requests):
