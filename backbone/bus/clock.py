@@ -86,7 +86,7 @@ class VirtualClock:
     def now_s(self) -> float:
         """Return the loop's time in seconds."""
         loop = self._loop
-        if loop is None or not loop.is_running():  # Python asks the system for the process before it tells the loop
+        if loop is None or not loop.is_running():  # ``get_running_loop`` makes a system call
             loop = self._loop = asyncio.get_running_loop()
         return loop.time()
 

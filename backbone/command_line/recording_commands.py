@@ -296,8 +296,7 @@ def replay(
     """Play a recording as a mission that is up; with --without NAME, run that component on it and compare instead."""
     from backbone.command_line import replaying
 
-    given = dict(named_value(value) for value in values or [])
-    allowed = dict(_tolerance(one) for one in tolerances or [])
+    given, allowed = dict(map(named_value, values or [])), dict(map(_tolerance, tolerances or []))
     if without == "":
         raise typer.BadParameter("--without needs the name of a component")
     if without == "rc_manager":

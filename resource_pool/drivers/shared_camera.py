@@ -45,7 +45,8 @@ class SharedCamera:
             lasts: True: the renderer outlives its users.
         """
         key = (mjcf, gl, lasts)
-        shared = _open.setdefault(key, cls(key))
+        if (shared := _open.get(key)) is None:
+            shared = _open[key] = cls(key)
         shared.users += 1
         return shared
 

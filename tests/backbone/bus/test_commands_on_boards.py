@@ -1,4 +1,4 @@
-"""Commands to listeners of the same host: each goes over a blackboard, in order, and wakes nobody else."""
+"""Commands to listeners of the same host: each goes over a blackboard, in order, and not through the hub."""
 
 from __future__ import annotations
 

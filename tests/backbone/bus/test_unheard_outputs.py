@@ -113,7 +113,7 @@ async def test_a_bus_knows_soon_whether_certainly_nobody_hears_it(buses: tuple[S
     def unheard() -> bool:
         return unit.is_unheard(Conversation.SCHEDULE)
 
-    await until(unheard, "nobody hears it")
+    await until(unheard, "the bus knows that no listener is there")
     listeners = [
         lambda: taker.subscribe(UNIT, Conversation.SCHEDULE, Ball, lambda _one: None),
         lambda: stranger.subscribe(UNIT, Conversation.SCHEDULE, Ball, lambda _one: None),
@@ -124,6 +124,6 @@ async def test_a_bus_knows_soon_whether_certainly_nobody_hears_it(buses: tuple[S
     ]
     for listen in listeners:
         listening = listen()
-        await until(lambda: not unheard(), "somebody hears it")
+        await until(lambda: not unheard(), "the bus knows the listener")
         listening.close()
-        await until(unheard, "nobody hears it any more")
+        await until(unheard, "the bus knows that the listener has left")
