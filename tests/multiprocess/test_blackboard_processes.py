@@ -156,6 +156,7 @@ def test_a_writer_that_is_stopped_blocks_nobody(folder: Path, processes: Process
     for _ in range(200):
         watcher.see_a_new_value()
     writer.send_signal(signal.SIGSTOP)
+    os.waitid(os.P_PID, writer.pid, os.WSTOPPED)  # a signal that is sent has not yet stopped a process that runs
     began_s = time.monotonic()
     late = BlackboardReader(folder, NAME)
     assert late.newest() is None
