@@ -1,8 +1,8 @@
 """The robots' cameras: draw pictures of a world from its MJCF and its state.
 
-Two backends draw the same scene: ``gl`` renders with MuJoCo's classic OpenGL renderer, ``paint``
-needs no OpenGL (``scout_model.painter``). Draw in the process that needs the picture, not in the one that runs physics:
-a state vector of a few hundred bytes is enough.
+Two backends draw the same scene: ``gl`` renders with MuJoCo's classic OpenGL renderer, ``paint`` needs no OpenGL
+(``scout_model.painter``). Draw in the process that needs the picture, not in the one that runs physics: a state vector
+of a few hundred bytes is enough.
 
 A picture that was drawn before comes from a cache. The cache's key is the poses of the camera and of all moving bodies
 in its view, so a robot elsewhere does not matter. States are rounded before drawing: a picture depends only on the
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from scout_model.dimensions import DARKNESS, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
-from scout_model.painter import Painter
+from scout_model.painter import Painter, only_opengl_shows
 from scout_model.world import STATE, model_of
 
 MEMO_PICTURES = 16  # chosen: 1.2 MB; a standing robot's view while nothing moves, for each of some robots
@@ -37,6 +37,11 @@ _STATE_DECIMALS = 5  # chosen: a hundredth of a millimetre, a fiftieth of a pixe
 _MARGIN_M = 0.002  # chosen: a line is drawn up to a pixel wider than its true width
 _SEEN_GROUPS = 2  # the greatest visible geom group, see room.xml
 _DARK = "dark/"  # prefix of the names of dark sites
+
+
+def unpainted(mjcf: str) -> list[str]:
+    """Return what pictures of a world with this ``World.mjcf`` have by ``gl`` and would lack by ``paint``."""
+    return only_opengl_shows(model_of(mjcf))
 
 
 class _Drawing(Protocol):
@@ -78,6 +83,9 @@ class Camera:
         backend: ``gl`` or ``paint``.
         memo_pictures: Size of the cache in pictures of 77 kB; 0: no cache.
 
+    Attributes:
+        lacks: What the pictures lack that they would have by ``gl``.
+
     Raises:
         RenderingUnavailable: ``gl``, but this process has no OpenGL.
     """
@@ -89,11 +97,12 @@ class Camera:
             self._model.camera(camera).name.rpartition("/")[0]: camera for camera in range(self._model.ncam)
         }
         self._drawing: _Drawing
+        self.lacks = list[str]()
         match backend:
             case "gl":
                 self._drawing = _GlDrawing(self._model)
             case "paint":
-                self._drawing = Painter(self._model)
+                self._drawing, self.lacks = Painter(self._model), only_opengl_shows(self._model)
             case _:
                 raise ValueError(f"no backend {backend!r}; there are 'gl' and 'paint'")
         self._movers = _Movers(self._model)

@@ -31,6 +31,7 @@ TRIAL_TIME_S = 20.0  # chosen: a trial takes half a second; a hanging driver mus
 
 FOUND_FILE = "gl_support.json"
 
+_IN_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "software rasterizer")  # as OpenGL reports them
 _CANDIDATES: tuple[OpenGl, ...] = ("egl", "osmesa")  # OSMesa last: newer Mesa versions lack it
 _CHOOSER = "mujoco.rendering.classic.gl_context"  # at its import it chooses the OpenGL that MUJOCO_GL names
 _MUJOCO_GL: dict[Backend, str] = {"egl": "egl", "osmesa": "osmesa", "none": "disable"}
@@ -51,8 +52,13 @@ class GlSupport:
     missing_packages: str
 
     @property
+    def has_card(self) -> bool:
+        """Whether a graphics card renders, and not the processor."""
+        return self.backend != "none" and not any(name in self.renderer.lower() for name in _IN_SOFTWARE)
+
+    @property
     def camera_backend(self) -> Literal["gl", "paint"]:
-        """The best backend for ``scout_model.camera.Camera`` here."""
+        """The backend of ``scout_model.camera.Camera`` that draws as MuJoCo does, if there is one."""
         return "paint" if self.backend == "none" else "gl"
 
     @property

@@ -36,6 +36,23 @@ _DISC_M = 0.002  # chosen: a mark is a disc on a surface, not a band around a bo
 _FARTHEST_PX = 1e6  # chosen: fits OpenCV's fixed-point coordinates
 _ROOM, _MARKS, _THINGS = 0, 1, 2  # geom groups, see room.xml
 _LUMA = np.array([0.299, 0.587, 0.114])  # as OpenCV's RGB to gray
+_UNPAINTED = (int(mujoco.mjtGeom.mjGEOM_HFIELD), int(mujoco.mjtGeom.mjGEOM_SDF))
+
+
+def only_opengl_shows(model: mujoco.MjModel) -> list[str]:
+    """Return what a picture of this model has by OpenGL and would lack by the painter; empty: nothing."""
+    seen = (model.geom_group <= _THINGS) & (model.geom_rgba[:, 3] > 0)
+    sun = int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    parts = {
+        "height fields and signed distance fields": np.isin(model.geom_type[seen], _UNPAINTED).any(),
+        "materials": (model.geom_matid[seen] >= 0).any(),
+        "transparent geoms": (model.geom_rgba[seen, 3] < 1).any(),
+        "lamps": (model.light_type != sun).any() or np.any(model.vis.headlight.diffuse),
+        "sites": ((model.site_group <= _THINGS) & (model.site_rgba[:, 3] > 0)).any(),
+        "tendons": (model.tendon_group <= _THINGS).any(),
+        "skins and soft bodies": model.nskin + model.nflex > 0,
+    }
+    return [part for part, is_there in parts.items() if is_there]
 
 
 @dataclass(frozen=True, slots=True)

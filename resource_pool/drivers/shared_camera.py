@@ -10,14 +10,21 @@ import asyncio
 import functools
 import importlib
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NamedTuple
 
 from scout_model.gl_probe import Backend, prepare
 
 CAMERAS_KEPT = 2  # chosen: enough for one experiment, or for two that alternate
 PICTURES_KEPT = 256  # chosen: 20 MB for each of these cameras; the worlds of an experiment pass the same states
 
-_Key = tuple[str, Backend, bool]
+
+class _Key(NamedTuple):
+    mjcf: str
+    gl: Backend
+    paints_first: bool
+    lasts: bool
+
+
 _open: dict[_Key, SharedCamera] = {}
 
 
@@ -36,15 +43,16 @@ class SharedCamera:
         self._camera: Any = None
 
     @classmethod
-    def join(cls, mjcf: str, gl: Backend, *, lasts: bool) -> SharedCamera:
+    def join(cls, mjcf: str, gl: Backend, *, paints_first: bool, lasts: bool) -> SharedCamera:
         """Return the shared camera of this world, for one more user.
 
         Args:
             mjcf: Model of the world.
-            gl: OpenGL that renders; ``none``: the camera paints.
+            gl: OpenGL that renders; ``none``: the painter draws.
+            paints_first: True: the painter draws also where OpenGL could, unless the pictures would lack something.
             lasts: True: the renderer outlives its users.
         """
-        key = (mjcf, gl, lasts)
+        key = _Key(mjcf, gl, paints_first, lasts)
         if (shared := _open.get(key)) is None:
             shared = _open[key] = cls(key)
         shared.users += 1
@@ -53,8 +61,7 @@ class SharedCamera:
     def opened(self) -> Any:
         """Return the ``scout_model.camera.Camera``; the first call opens it. When: in ``thread``."""
         if self._camera is None:
-            mjcf, gl, lasts = self._key
-            self._camera = _lasting_camera(mjcf, gl) if lasts else _new_camera(mjcf, gl)
+            self._camera = _lasting_camera(self._key) if self._key.lasts else _new_camera(self._key)
         return self._camera
 
     async def leave(self) -> None:
@@ -69,21 +76,24 @@ class SharedCamera:
             self.thread.shutdown(wait=False)
 
     def _close(self) -> None:
-        if self._camera is not None and not self._key[-1]:
+        if self._camera is not None and not self._key.lasts:
             self._camera.close()
 
 
-def _new_camera(mjcf: str, gl: Backend, *memo_pictures: int) -> Any:
-    prepare(gl)
-    camera = importlib.import_module("scout_model.camera").Camera
-    return camera(mjcf, "paint" if gl == "none" else "gl", *memo_pictures)
+def _new_camera(key: _Key, *memo_pictures: int) -> Any:
+    prepare("none")  # the painter and the world's model need MuJoCo, and no OpenGL
+    cameras = importlib.import_module("scout_model.camera")
+    if key.gl == "none" or (key.paints_first and not cameras.unpainted(key.mjcf)):
+        return cameras.Camera(key.mjcf, "paint", *memo_pictures)
+    prepare(key.gl)
+    return cameras.Camera(key.mjcf, "gl", *memo_pictures)
 
 
 @functools.lru_cache(maxsize=CAMERAS_KEPT)
-def _lasting_camera(mjcf: str, gl: Backend) -> Any:
+def _lasting_camera(key: _Key) -> Any:
     """Return the camera that all worlds of this model share in this process, one after the other on virtual clocks.
 
     One thread draws all worlds, and a picture depends only on the world's state. So pictures cached for one world are
     valid for the next.
     """
-    return _new_camera(mjcf, gl, PICTURES_KEPT)
+    return _new_camera(key, PICTURES_KEPT)

@@ -32,7 +32,7 @@ from resource_pool.drivers.picture_pace import PicturePace
 from resource_pool.drivers.shared_camera import SharedCamera
 from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.drivers.world_messages import WorldModel, WorldState
-from scout_model.gl_probe import Backend, GlSupport, forget, probe, probe_once
+from scout_model.gl_probe import GlSupport, forget, probe, probe_once
 
 EARLY_S = 1 / 120  # chosen: a quarter of a frame, so that rounded frame times skip no frame
 
@@ -79,19 +79,21 @@ class SimulatedFramegrabber:
         return self._pace.allowed_hz
 
     async def open(self) -> None:
-        """Fetch the world's model, and open the renderer (the painter if OpenGL is missing) if no neighbor did."""
-        run = asyncio.get_running_loop().run_in_executor
-        choosing = run(None, _choose, self._site.parameters.camera, self._site.folder)
+        """Fetch the world's model, and open the renderer or the painter if no neighbor did."""
+        run, wanted = asyncio.get_running_loop().run_in_executor, self._site.parameters.camera
+        probing = run(None, _support, wanted, self._site.folder)
         world = await meet_world(self._site)
-        support, gl = await choosing
+        support = await probing
+        paints_first = wanted == "auto" and not support.has_card
         lasts = isinstance(asyncio.get_running_loop(), VirtualLoop)
-        camera = self._camera = SharedCamera.join(world.mjcf, gl, lasts=lasts)
+        camera = SharedCamera.join(world.mjcf, support.backend, paints_first=paints_first, lasts=lasts)
+        self._camera = camera
         try:
             self._studio = await run(camera.thread, lambda: _Studio(world, camera.opened()))
         except Exception:  # mujoco's import raises errors of many kinds where OpenGL is missing
             forget(self._site.folder)
             raise
-        if support is not None and support.missing_packages:
+        if support.missing_packages and (wanted == "gl" or self._studio.lacks):
             self._site.tell(support.summary)
         self._world = self._site.bus.subscribe(
             world_of(self._site), Conversation.BODIES, WorldState, self._world_moved, latest=True
@@ -177,10 +179,15 @@ class _Tuned:
 
 
 class _Studio:
-    """Cameras of all robots and one receiver for each frequency; used only by the drawing thread."""
+    """Cameras of all robots and one receiver for each frequency; used only by the drawing thread.
+
+    Attributes:
+        lacks: What the pictures lack without OpenGL.
+    """
 
     def __init__(self, world: WorldModel, camera: Any) -> None:
         self._camera = camera
+        self.lacks: list[str] = camera.lacks
         self._video_link = importlib.import_module("scout_model.video_link")
         self._distance_m = importlib.import_module("scout_model.air").distance_m
         self._world = world
@@ -225,9 +232,8 @@ class _Studio:
         )
 
 
-def _choose(wanted: str, folder: Path | None) -> tuple[GlSupport | None, Backend]:
-    """Return the OpenGL support (if the choice depends on it) and the OpenGL to use."""
+def _support(wanted: str, folder: Path | None) -> GlSupport:
+    """Return the OpenGL support of this machine; none if a painted picture is wanted."""
     if wanted == "paint":
-        return None, "none"
-    support = probe() if folder is None else probe_once(folder)
-    return support, support.backend
+        return GlSupport("none", "", "")
+    return probe() if folder is None else probe_once(folder)

@@ -40,7 +40,8 @@ class FramegrabberParameters(RcParameters, frozen=True, kw_only=True):
 
     Attributes:
         frame_rate_hz: Pictures a second, above 0 to 30.
-        camera: For the simulated driver: ``auto``, ``gl`` or ``paint``.
+        camera: What draws for the simulated driver: ``gl`` (MuJoCo's OpenGL renderer), ``paint`` (the painter, which
+            needs no OpenGL), or ``auto``: OpenGL on a graphics card, else the painter if it shows all of the room.
     """
 
     frame_rate_hz: Annotated[float, msgspec.Meta(gt=0, le=30)] = 15.0

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from scout_model import dimensions, radio_link
-from scout_model.camera import Camera
+from scout_model.camera import Camera, unpainted
 from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, RobotPlace, Target, WorldDescription
 from scout_model.errors import InvalidWorld
 from scout_model.world import World
@@ -251,6 +251,37 @@ def test_a_target_passes_the_same_places_at_the_same_times_in_every_world(shape:
     assert speeds_m_s == pytest.approx(0.5, abs=1e-9)
 
 
+# ---------------------------------------------------------------------- what only OpenGL shows
+@pytest.mark.parametrize(
+    ("asset", "part", "lacks"),
+    [
+        ("", '<geom type="box" size="1 1 1" rgba="0.2 0.2 0.2 1"/>', []),
+        ("", '<geom type="box" size="1 1 1" rgba="1 0 0 0"/>', []),
+        ("", '<geom type="box" size="1 1 1" rgba="1 0 0 0.5" group="3"/>', []),
+        ("", '<geom type="box" size="1 1 1" rgba="1 0 0 0.5"/>', ["transparent geoms"]),
+        ('<material name="m"/>', '<geom type="sphere" size="1" material="m"/>', ["materials"]),
+        ('<material name="m"/>', '<geom type="sphere" size="1" material="m" group="3"/>', []),
+        ("", '<light type="directional"/>', []),
+        ("", "<light/>", ["lamps"]),
+        ("", '<site size="0.1"/>', ["sites"]),
+        ("", '<site size="0.1" group="4"/>', []),
+    ],
+)
+def test_what_the_painter_cannot_show_is_known_before_it_draws(asset: str, part: str, lacks: list[str]) -> None:
+    mjcf = f"<mujoco><asset>{asset}</asset><worldbody>{part}</worldbody></mujoco>"
+    assert unpainted(World(described(mjcf=mjcf, robots=[])).mjcf) == lacks
+
+
+def test_shapes_that_the_painter_has_not_are_known_before_it_draws() -> None:
+    """Rooms are refused with them; the body of a robot may have them."""
+    mjcf = """<mujoco>
+      <visual><headlight diffuse="0 0 0"/></visual>
+      <asset><hfield name="hills" nrow="2" ncol="2" size="1 1 1 1" elevation="0 0 0 1"/></asset>
+      <worldbody><geom type="hfield" hfield="hills"/></worldbody>
+    </mujoco>"""
+    assert unpainted(mjcf) == ["height fields and signed distance fields"]
+
+
 # ---------------------------------------------------------------------- anything that may be described
 sizes_m = st.floats(0.11, 2.0)
 places_m = st.tuples(st.floats(0.5, 8.5), st.floats(0.5, 5.5))
@@ -281,3 +312,4 @@ def test_whatever_may_be_described_is_built_stepped_and_seen(description: WorldD
     world.step_frame()
     assert np.isfinite(world.state()).all()
     assert view(world).shape == (240, 320)
+    assert unpainted(world.mjcf) == []
