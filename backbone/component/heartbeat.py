@@ -17,12 +17,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from backbone.bus.interface import Clock
-from backbone.operating_system.processes import processor_times_s
+from backbone.operating_system.processes import first_bytes, processor_times_s
 
 log = logging.getLogger(__name__)
 
 BEAT_EVERY_S = 1 / 3  # chosen: a hung process is seen within 1 s, at three wake-ups of the event loop a second
 DOING_BYTES = 160  # chosen: a line for people
+_FOLDER = "heartbeat"
 _ONE_BEAT_NS = 1_000_000_000  # chosen: every file system keeps whole seconds
 _LATEST_NS = 1_000_000_000 * _ONE_BEAT_NS  # 2001: the stamp of a file before its first beat is later
 
@@ -88,7 +89,7 @@ class Heartbeat:
 
 def heartbeat_path(run_directory: str, pid: int) -> Path:
     """Return the path of the heartbeat of this pid."""
-    return Path(run_directory) / "heartbeat" / str(pid)
+    return Path(run_directory) / _FOLDER / str(pid)
 
 
 def read_vitals(run_directory: str, pid: int) -> Vitals | None:
@@ -98,11 +99,11 @@ def read_vitals(run_directory: str, pid: int) -> Vitals | None:
         return None
     beats, doing = 0, b""
     if run_directory:
+        path = f"{run_directory}/{_FOLDER}/{pid}"
         with suppress(OSError):
-            path = heartbeat_path(run_directory, pid)
-            stamp_ns = path.stat().st_mtime_ns
+            stamp_ns = os.stat(path).st_mtime_ns
             beats = 0 if stamp_ns > _LATEST_NS else stamp_ns // _ONE_BEAT_NS
-            doing = path.read_bytes()
+            doing = first_bytes(path, DOING_BYTES)
     return Vitals(beats, *times_s, doing.decode(errors="replace").strip())
 
 

@@ -10,6 +10,20 @@ from contextlib import suppress
 from pathlib import Path
 
 _NS = 1e-9
+_LINE_BYTES = 4096  # the kernel's lines are shorter
+
+
+def first_bytes(path: str, most: int) -> bytes:
+    """Return the first bytes of a small file, for half of the processor time of a file object.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
+    file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        return os.read(file, most)
+    finally:
+        os.close(file)
 
 
 def threads() -> int:
@@ -33,7 +47,7 @@ def table_line(pid: int) -> str:
     Raises:
         OSError: It has ended.
     """
-    return Path(f"/proc/{pid}/stat").read_text()
+    return first_bytes(f"/proc/{pid}/stat", _LINE_BYTES).decode(errors="replace")
 
 
 def exists(pid: int) -> bool:
@@ -54,7 +68,7 @@ def processor_times_s(pid: int) -> tuple[float, float] | None:
     Both are 0 where the kernel does not count them.
     """
     try:
-        ran_ns, queued_ns, *_ = Path(f"/proc/{pid}/schedstat").read_bytes().split()
+        ran_ns, queued_ns, *_ = first_bytes(f"/proc/{pid}/schedstat", _LINE_BYTES).split()
         return int(ran_ns) * _NS, int(queued_ns) * _NS
     except FileNotFoundError:
         return None
