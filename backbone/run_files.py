@@ -135,17 +135,19 @@ def prepare(mission: str) -> Path:
     return directory
 
 
-def require_writable(trace: Path) -> None:
-    """Return if the trace is writable; its content stays, and an empty file may be created.
+def begin_trace(trace: Path) -> None:
+    """Make the file of a trace, unless it is there and empty, or a pipe or device.
 
     Raises:
-        TraceUnwritable: The trace is not writable.
+        TraceUnwritable: The system refuses the file, or it has content: two missions in one trace cannot be judged.
     """
     try:
-        with trace.open("ab"):
-            return
+        with trace.open("ab") as file:
+            length = os.fstat(file.fileno()).st_size
     except OSError as error:
         raise TraceUnwritable(f"{trace}: {error.strerror}", trace=str(trace)) from error
+    if length:
+        raise TraceUnwritable(f"{trace} has content", remedy="Name a new file, or remove this one.", trace=str(trace))
 
 
 def write(run_file: RunFile) -> Path:

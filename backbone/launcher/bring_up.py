@@ -44,7 +44,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     Raises:
         MissionAlreadyUp: A mission of this name runs on this machine.
         RunFolderUnusable: The run folder is not writable.
-        TraceUnwritable: The trace is not writable.
+        TraceUnwritable: The trace is not writable, or has content.
         RecorderFailed: The file of the recording exists, or cannot be written.
         BackboneError: The nameserver did not start.
     """
@@ -52,7 +52,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     share_heaps()
     refuse_if_up(description.name)
     if options.trace is not None:
-        run_files.require_writable(options.trace)
+        run_files.begin_trace(options.trace)
     if options.record is not None:
         require_new(options.record)
     directory = run_files.prepare(description.name)

@@ -142,9 +142,22 @@ def test_a_runtime_folder_that_cannot_be_made_is_refused(tmp_path: Path, monkeyp
         run_files.find()
 
 
-def test_a_trace_that_cannot_be_opened_is_refused_and_an_old_one_stays(tmp_path: Path) -> None:
+def test_a_trace_that_cannot_be_opened_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TraceUnwritable, match="No such file"):
-        run_files.require_writable(tmp_path / "no" / "trace.jsonl")
-    (tmp_path / "trace.jsonl").write_text("old")
-    run_files.require_writable(tmp_path / "trace.jsonl")
-    assert (tmp_path / "trace.jsonl").read_text() == "old"
+        run_files.begin_trace(tmp_path / "no" / "trace.jsonl")
+
+
+def test_a_trace_of_an_earlier_mission_is_neither_continued_nor_lost(tmp_path: Path) -> None:
+    """Two missions in one file would be judged as one."""
+    trace = tmp_path / "trace.jsonl"
+    run_files.begin_trace(trace)
+    run_files.begin_trace(trace)  # still empty
+    trace.write_text("of an earlier mission\n")
+    with pytest.raises(TraceUnwritable, match="has content") as refused:
+        run_files.begin_trace(trace)
+    assert "new file" in refused.value.remedy
+    assert trace.read_text() == "of an earlier mission\n"
+
+
+def test_a_trace_may_go_to_a_device() -> None:
+    run_files.begin_trace(Path("/dev/null"))
