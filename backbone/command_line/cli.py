@@ -16,6 +16,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from backbone.command_line.asking_commands import log, story, why
+from backbone.command_line.message_commands import inject, top, watch
 from backbone.command_line.module_commands import swap
 from backbone.command_line.options import (
     AsJson,
@@ -36,7 +37,7 @@ from backbone.command_line.options import (
     run,
     run_table,
 )
-from backbone.command_line.recording_commands import compare, inject, record, recording, replay, top, watch
+from backbone.command_line.recording_commands import compare, record, recording, replay
 from backbone.command_line.tool_commands import bridge, metrics
 from backbone.command_line.tree_commands import tree
 from backbone.launcher.endings import ExitCode, say

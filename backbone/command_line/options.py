@@ -255,6 +255,8 @@ NameOrCause = Annotated[
     ),
 ]
 ComponentName = Annotated[str, typer.Argument(autocompletion=complete_name, help="A component of the mission.")]
+MOST_LINES = 1_000_000  # chosen: more than a person reads
+For = Annotated[float | None, typer.Option("--for", min=0.1, max=1e9, help="End after so many seconds.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 

@@ -1,4 +1,4 @@
-"""``scout-backbone`` ``record``, ``recording``, ``watch``, ``top``, ``inject``: recorded and live messages.
+"""``scout-backbone`` ``record``, ``recording``, ``replay``, ``compare``: recorded messages.
 
 Rules of this file: as those of ``cli``.
 """
@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from backbone.command_line.options import (
+    MOST_LINES,
     AsJson,
     CommandTable,
     Endpoint,
+    For,
     MissionName,
     SecretFile,
     chosen,
@@ -44,17 +46,11 @@ Keys = Annotated[
 ]
 Since = Annotated[float, typer.Option("--since", min=0, max=LATEST_S, help="Not before this mission time, seconds.")]
 Until = Annotated[float | None, typer.Option("--until", min=0, max=LATEST_S, help="Not after this time, seconds.")]
-KeyGlobs = Annotated[
-    list[str] | None,
-    typer.Argument(metavar="KEY…", help="Keys or patterns, as 'resource_pool/*/readings'; default: all."),
-]
-For = Annotated[float | None, typer.Option("--for", min=0.1, max=1e9, help="End after so many seconds.")]
 Tolerances = Annotated[
     list[str] | None,
     typer.Option("--tolerance", metavar="FIELD=X", help="Numbers of this field may be so far apart; repeatable."),
 ]
 DELAY = "delay_s"
-MOST_LINES = 1_000_000
 
 
 class TableFormat(StrEnum):
@@ -277,15 +273,15 @@ def replay(
     ] = None,
     keys: Keys = None,
     without: Annotated[
-        str | None,
-        typer.Option("--without", metavar="NAME", help="Run this component for real, and compare its messages."),
+        list[str] | None,
+        typer.Option("--without", metavar="NAME", help="Run it for real, and compare its messages; repeatable."),
     ] = None,
     class_path: Annotated[
-        str, typer.Option("--class", metavar="MODULE:CLASS", help="With --without: another class.")
+        str, typer.Option("--class", metavar="MODULE:CLASS", help="With one --without: another class.")
     ] = "",
     values: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="With --without: another parameter or rule; repeatable."),
+        typer.Option("--set", metavar="NAME=VALUE", help="With one --without: another parameter or rule; repeatable."),
     ] = None,
     tolerances: Tolerances = None,
     as_json: AsJson = False,
@@ -293,16 +289,19 @@ def replay(
         str | None, typer.Option("--mission", help="Name under which it is up; default: replay-NAME.")
     ] = None,
 ) -> None:
-    """Play a recording as a mission that is up; with --without NAME, run that component on it and compare instead."""
+    """Play a recording as a mission that is up; with --without NAME, run these components on it and compare instead."""
     from backbone.command_line import replaying
 
     given, allowed = dict(map(named_value, values or [])), dict(map(_tolerance, tolerances or []))
-    if without == "":
+    names = list(dict.fromkeys(without or []))
+    if "" in names:
         raise typer.BadParameter("--without needs the name of a component")
-    if without == "rc_manager":
+    if len(names) > 1 and (class_path or given or "rc_manager" in names):
+        raise typer.BadParameter("--class, --set and the rc_manager are for a single --without NAME")
+    if names == ["rc_manager"]:
         run(lambda: replaying.decide_anew(file, since_s or 0.0, given, as_json=as_json))
-    if without:
-        run(lambda: replaying.run_without(file, without, class_path, given, allowed, as_json=as_json))
+    if names:
+        run(lambda: replaying.run_without(file, names, class_path, given, allowed, as_json=as_json))
     if class_path or given or allowed or as_json:
         raise typer.BadParameter("--class, --set, --tolerance and --json are for --without NAME")
     wanted = replaying.Playing(mission, since_s, speed, is_stepped, tuple(keys or ()))
@@ -338,63 +337,3 @@ def _tolerance(given: str) -> tuple[str, float]:
     if not isinstance(value, int | float) or isinstance(value, bool) or not 0 <= value <= MOST_TOLERANCE:
         raise typer.BadParameter(f"{given!r} is not FIELD=X with a number of at least 0")
     return field, float(value)
-
-
-def watch(
-    keys: KeyGlobs = None,
-    field: Annotated[str, typer.Option("--field", help="Only this field, as 'x_m' or 'rcs.0.rc'.")] = "",
-    rate: Annotated[
-        bool, typer.Option("--rate", help="Rates and sizes each second instead, as 'top' prints them.")
-    ] = False,
-    most: Annotated[
-        int | None, typer.Option("--most", min=1, max=MOST_LINES, help="End after so many messages.")
-    ] = None,
-    for_s: For = None,
-    as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
-    """Print the messages at these keys of a mission that is up, questions and answers too, until Ctrl-C."""
-    from backbone.command_line import watching
-    from backbone.operating_system.own_process import go_behind_others
-
-    where = chosen(mission, connect, secret_file)
-    wanted = watching.Watched(tuple(keys or ()), field, most, for_s, as_json)
-    go_behind_others()
-    run(lambda: watching.top(where, wanted, once=False) if rate else watching.watch(where, wanted))
-
-
-def top(
-    keys: KeyGlobs = None,
-    for_s: Annotated[float, typer.Option("--for", min=0.1, max=1e6, help="Seconds to listen.")] = 2.0,
-    as_json: AsJson = False,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
-    """Print rates and sizes of the keys of a mission that is up, the busiest first."""
-    from backbone.command_line import watching
-    from backbone.operating_system.own_process import go_behind_others
-
-    where = chosen(mission, connect, secret_file)
-    wanted = watching.Watched(tuple(keys or ()), for_s=for_s, as_json=as_json)
-    go_behind_others()
-    run(lambda: watching.top(where, wanted, once=True))
-
-
-def inject(
-    key: Annotated[str, typer.Argument(metavar="KEY", help="As 'watch' prints it; a question's ends with '/ask'.")],
-    message: Annotated[str, typer.Argument(metavar="JSON", help="An object with 'schema' and the message's fields.")],
-    within_s: Annotated[
-        float, typer.Option("--within", min=0.1, max=600.0, help="Seconds to wait for the answer to a question.")
-    ] = 5.0,
-    mission: MissionName = None,
-    connect: Endpoint = None,
-    secret_file: SecretFile = None,
-) -> None:
-    """Send a message on the bus of a mission that is up, checked against its schema; the log names its sender."""
-    from backbone.command_line.injecting import inject as inject_message
-
-    where = chosen(mission, connect, secret_file)
-    run(lambda: inject_message(where, key, message, within_s))

@@ -10,6 +10,7 @@ import signal
 import socket
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import takewhile
@@ -39,12 +40,12 @@ from backbone.recording.playback import NoSuchTime
 from backbone.recording.player import Player
 from backbone.recording.reader import Contents, Recorded, Recording
 from backbone.recording.reasons import reasons_at
-from backbone.recording.rerun import classes_of, launch_of, run_again
+from backbone.recording.rerun import RealComponent, classes_of, launch_of, run_again
 from backbone.recording.revival import with_names
 from backbone.scheduling.events import Record
 from backbone.spoken import counted
 from backbone.waiting import first_to_end
-from backbone.wire import plain
+from backbone.wire import Message, plain
 
 REPLAY = "replay"
 COLLECT_GAP_S = 0.03  # chosen: a multiple of a collection's duration; nearly every mission has such gaps
@@ -53,30 +54,38 @@ LEAD_S = 0.05  # chosen: writing a run file takes less; seconds of the machine
 
 
 async def run_without(
-    path: Path, name: str, class_path: str, parameters: dict[str, Any], tolerances: dict[str, float], *, as_json: bool
+    path: Path,
+    names: Sequence[str],
+    class_path: str,
+    parameters: dict[str, Any],
+    tolerances: dict[str, float],
+    *,
+    as_json: bool,
 ) -> ExitCode:
-    """Run one component for real on the recording, and compare its messages with those of the recorded component.
+    """Run components for real on the recording, and compare their messages with those of the recorded ones.
 
     Args:
-        class_path: Path of another class; empty: the recorded class.
-        parameters: Parameters that differ from the recorded ones.
+        class_path: Path of another class, of a single component; empty: the recorded class.
+        parameters: Parameters of a single component that differ from the recorded ones.
         tolerances: See ``compared``.
     """
     with opened(path) as recording:
-        launch = launch_of(recording, message_classes(), name)
-        launch = msgspec.structs.replace(
-            launch, class_path=class_path or launch.class_path, parameters={**launch.parameters, **parameters}
-        )
-        say(f"runs {launch.class_path} as {name} on {path}")
-        kind = load_class(launch.class_path)
-        classes = classes_of(launch)
-        rerun = await asyncio.to_thread(run_again, recording, classes, launch, kind)
-        recorded = (with_names(classes, one) for one in recording.messages(source=launch.address))
+        components, classes = list[RealComponent](), dict[str, type[Message]]()
+        for name in names:
+            launch = launch_of(recording, message_classes(), name)
+            launch = msgspec.structs.replace(
+                launch, class_path=class_path or launch.class_path, parameters={**launch.parameters, **parameters}
+            )
+            say(f"runs {launch.class_path} as {name} on {path}")
+            components.append(RealComponent(launch, load_class(launch.class_path)))
+            classes |= classes_of(launch)
+        rerun = await asyncio.to_thread(run_again, recording, classes, components)
+        sources = {launch.address for launch, _kind in components}
+        recorded = (with_names(classes, one) for one in recording.messages() if one.source in sources)
         result = print_comparison(compared(recorded, rerun.said, tolerances), as_json=as_json)
-    if rerun.fell is not None:
-        say(f"the component failed: {type(rerun.fell).__name__}: {rerun.fell}")
-        return ExitCode.REFUSED
-    return result
+    for name, bug in rerun.fell.items():
+        say(f"{name} failed: {type(bug).__name__}: {bug}")
+    return ExitCode.REFUSED if rerun.fell else result
 
 
 async def print_reasons_at(path: Path, name: str, at_s: float | None, *, as_json: bool) -> ExitCode:

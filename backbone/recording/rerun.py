@@ -1,17 +1,18 @@
-"""Rerun: runs one component for real, on virtual time; the recording supplies everything around it.
+"""Rerun: runs components for real, on virtual time; the recording supplies everything around them.
 
-The component gets the recorded publications, tokens and questions at their recorded times. Its questions get the
-recorded answers, not earlier than recorded. All its messages are kept, to be compared with those of the recorded
-component.
+They get the recorded publications, tokens and questions at their recorded times. Their questions get the recorded
+answers, not earlier than recorded. What they send to each other is what they send now. All their messages are kept, to
+be compared with those of the recorded components.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections import defaultdict, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, Clock, Subscription, current_cause
@@ -45,19 +46,24 @@ class NoSuchComponent(Refusal):
     remedy = "Name a component of 'scout-backbone recording keys FILE'; record it from its start on: up --record."
 
 
+class RealComponent(NamedTuple):
+    """A component that runs again: its launch, and its class, which may be another one than the recorded."""
+
+    launch: Launch
+    make: ComponentType
+
+
 @dataclass(frozen=True, slots=True)
 class Rerun:
-    """The messages of a component that ran again.
+    """What happened while components ran again.
 
     Attributes:
-        class_path: Its class.
-        said: The messages in the order of sending.
-        fell: The exception that ended the component early; None: it ran to the end.
+        said: Their messages in the order of sending.
+        fell: Name of each component that an exception ended early → the exception.
     """
 
-    class_path: str
     said: tuple[Recorded, ...]
-    fell: BaseException | None
+    fell: dict[str, BaseException]
 
 
 def launch_of(recording: Recording, classes: Known, name: str) -> Launch:
@@ -116,102 +122,142 @@ def classes_of(launch: Launch) -> Known:
     return message_classes(path.partition(":")[0] for path in (launch.class_path, *paths))
 
 
-def run_again(recording: Recording, classes: Known, launch: Launch, component: ComponentType) -> Rerun:
-    """Run the component on the recording, from its first to its last message; return its messages.
+def run_again(recording: Recording, classes: Known, components: Sequence[RealComponent]) -> Rerun:
+    """Run components on the recording, from their first to their last message, or until one falls.
 
     Args:
         recording: Must not be used elsewhere meanwhile.
         classes: Known message classes, by schema.
-        launch: Launch of the component.
-        component: Its class.
+        components: At least one.
     """
-    return run_virtual(_run(recording, classes, launch, component))
+    return run_virtual(_run(recording, classes, components))
 
 
-async def _run(recording: Recording, classes: Known, launch: Launch, make: ComponentType) -> Rerun:
+async def _run(recording: Recording, classes: Known, components: Sequence[RealComponent]) -> Rerun:
     clock = VirtualClock()
-    network = _RecordedNetwork(recording, classes, launch)
-    await clock.sleep_until_s(network.begin_s)
-    ear, bus = network.join("backbone/recorder", clock), network.join(launch.address, clock)
+    network = _RecordedNetwork(recording, classes, [one.launch for one in components])
+    await clock.sleep_until_s(min(life.begin_s for life in network.lives.values()))
+    ear = network.join("backbone/recorder", clock)
     for conversation in to_overhear(()):
         ear.overhear(conversation, partial(network.heard, clock), MOST_WAITING_BYTES)
-    current_cause.set(network.begin_cause)
-    component = make(launch, bus, clock)
-    component.pid = network.pid
-    living = asyncio.create_task(component.run(), name=f"rerun of {launch.name}")
+    living = {
+        one.launch.name: asyncio.create_task(_live(network, clock, one), name=f"rerun of {one.launch.name}")
+        for one in components
+    }
     playing = asyncio.create_task(network.play(ear, clock), name="the recording")
-    await asyncio.wait({living, playing}, return_when=asyncio.FIRST_COMPLETED)
-    fell = living.exception() if living.done() and not living.cancelled() else None
-    for task in (living, playing):
+    while not playing.done() and not any(map(_has_fallen, living.values())):
+        going_on = [task for task in (playing, *living.values()) if not task.done()]
+        await asyncio.wait(going_on, return_when=asyncio.FIRST_COMPLETED)
+    fell = {name: bug for name, task in living.items() if _has_fallen(task) and (bug := task.exception()) is not None}
+    for task in (playing, *living.values()):
         task.cancel()
-    await asyncio.wait({living, playing})
+    await asyncio.wait({playing, *living.values()})
     await ear.close()
-    await bus.close()
     if not playing.cancelled():
         playing.result()
-    return Rerun(launch.class_path, tuple(network.said), fell)
+    return Rerun(tuple(network.said), fell)
+
+
+async def _live(network: _RecordedNetwork, clock: Clock, component: RealComponent) -> None:
+    """Run a component from its first recorded message on."""
+    life = network.lives[component.launch.address]
+    if clock.now_s() < life.begin_s:
+        await clock.sleep_until_s(life.begin_s)
+    bus = network.join(component.launch.address, clock)
+    try:
+        current_cause.set(life.begin_cause)
+        made = component.make(component.launch, bus, clock)
+        made.pid = life.pid
+        await made.run()
+    finally:
+        await bus.close()
+
+
+def _has_fallen(task: asyncio.Task[None]) -> bool:
+    return task.done() and not task.cancelled() and task.exception() is not None
+
+
+@dataclass(slots=True)
+class _Life:
+    """The recorded life of a component: mission times of its first and last message, cause of the first, and pid."""
+
+    begin_s: float = -1.0
+    end_s: float = 0.0
+    begin_cause: str = ""
+    pid: int = 0
 
 
 class _RecordedNetwork(LocalNetwork):
-    """A mission around one component; all other components are recorded."""
+    """A mission around some real components; all other components are recorded."""
 
-    def __init__(self, recording: Recording, classes: Known, launch: Launch) -> None:
-        super().__init__(launch.mission)
+    def __init__(self, recording: Recording, classes: Known, launches: Sequence[Launch]) -> None:
+        super().__init__(launches[0].mission)
         self.said: list[Recorded] = []
-        self._recording, self._classes, self._own = recording, classes, launch.address
+        self.lives = {launch.address: _Life() for launch in launches}
+        self._recording, self._classes = recording, classes
         self._hearing = Hearing(classes)
         self._tokens: dict[str, Subscription] = {}
-        self._answers: dict[tuple[str, str, bytes], deque[tuple[float, Message]]] = defaultdict(deque)
-        self.begin_s, self.end_s, self.pid = -1.0, 0.0, 0
-        self.begin_cause = ""
+        self._answers: dict[tuple[str, tuple[str, str, bytes]], deque[tuple[float, Message]]] = defaultdict(deque)
         self._learn()
 
     def _learn(self) -> None:
-        """Find out when the component lived, and which answers it got."""
-        asked: dict[str, tuple[str, Message]] = {}
+        """Find out when the components lived, and which answers the recorded ones gave them."""
+        asked: dict[str, tuple[str, str, Message]] = {}  # id → who asked, who was asked, question
         for message in self._recording.messages():
             address, is_asked = address_of(message.key), message.key.endswith(f"/{Conversation.ASK}")
-            if message.source == self._own:
-                if self.begin_s < 0:
-                    self.begin_s = _sent_s(message)
-                    self.begin_cause = message.cause if message.schema == schema_of(Register) else ""
-                self.end_s = _sent_s(message)
-                if is_asked and address != self._own and (said := message_as_sent(self._classes, message)) is not None:
-                    asked[message.id] = address, said
-                if not self.pid and message.schema == schema_of(ComponentState):
-                    self.pid = int(message.body["pid"])
-            elif is_asked and message.cause in asked and asked[message.cause][0] == message.source == address:
+            life = self.lives.get(message.source)
+            if life is not None:
+                if life.begin_s < 0:
+                    life.begin_s = _sent_s(message)
+                    life.begin_cause = message.cause if message.schema == schema_of(Register) else ""
+                life.end_s = _sent_s(message)
+                is_elsewhere = is_asked and address not in self.lives
+                if is_elsewhere and (said := message_as_sent(self._classes, message)) is not None:
+                    asked[message.id] = message.source, address, said
+                if not life.pid and message.schema == schema_of(ComponentState):
+                    life.pid = int(message.body["pid"])
+            elif is_asked and message.cause in asked and asked[message.cause][1] == message.source == address:
                 answer = message_as_sent(self._classes, message)
                 if answer is not None:
-                    self._answers[asked_of(*asked.pop(message.cause))].append((_sent_s(message), answer))
+                    asker, _address, question = asked.pop(message.cause)
+                    self._answers[asker, asked_of(address, question)].append((_sent_s(message), answer))
 
     async def play(self, bus: Bus, clock: Clock) -> None:
-        """Publish the others' messages at their recorded times; return after the component's last recorded message."""
-        for message in self._recording.messages(until_s=self.end_s):
-            await clock.sleep_until_s(_sent_s(message))
-            if message.source != self._own:
-                self._play(bus, message)
-        await clock.sleep_until_s(self.end_s)
+        """Publish the others' messages at their recorded times; return after the last message of a real component.
+
+        Of what was sent before the first of them began, only tokens have an effect: none of them could hear the rest.
+        """
+        begin_s, end_s = clock.now_s(), max(life.end_s for life in self.lives.values())
+        for message in self._recording.messages(until_s=end_s):
+            at_s = _sent_s(message)
+            if message.source in self.lives or (at_s < begin_s and message.schema != schema_of(Presence)):
+                continue
+            await clock.sleep_until_s(at_s)
+            self._play(bus, message)
+        await clock.sleep_until_s(end_s)
 
     def _play(self, bus: Bus, message: Recorded) -> None:
         address, conversation = address_of(message.key), message.key.rpartition("/")[2]
-        said = message_as_sent(self._classes, message)
+        said, is_real = message_as_sent(self._classes, message), address in self.lives
         if isinstance(said, Presence):
             token = self._tokens.pop(address, None)
             if token is not None:
                 token.close()
-            if said.alive and address != self._own:
+            if said.alive and not is_real:
                 self._tokens[address] = bus.declare_alive(address)
         elif said is not None and conversation == Conversation.ASK:
-            if address == self._own and address in self.servers:
-                LocalNetwork.carry_question(self, address, _sent(message, said), lambda _answer: None)
+            if is_real and address in self.servers:
+                super().carry_question(address, _sent(message, said), lambda _answer: None)
         elif said is not None:
             bus.pass_on(address, Conversation(conversation), _sent(message, said))
 
     def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
-        """Give the component's question its recorded answer."""
+        """Give a question to a real component, or its recorded answer."""
+        if address in self.lives:
+            super().carry_question(address, asked, answered)
+            return
         self._keep(key_of(self.mission, address, Conversation.ASK), write(asked), asked.stamp_s)
-        known = self._answers[asked_of(address, asked.body)]
+        known = self._answers[asked.source, asked_of(address, asked.body)]
         loop = asyncio.get_running_loop()
         if known:
             at_s, answer = known.popleft() if len(known) > 1 else known[0]
@@ -224,12 +270,12 @@ class _RecordedNetwork(LocalNetwork):
         loop.call_at(max(at_s, loop.time()), answered, envelope)
 
     def heard(self, clock: Clock, key: str, raw: bytes) -> None:
-        """Keep a message that the component published or answered."""
+        """Keep a message that a real component published, asked of another real one, or answered."""
         self._keep(key, raw, clock.now_s())
 
     def _keep(self, key: str, raw: bytes, at_s: float) -> None:
         for said_at, message in self._hearing.heard(key, raw, at_s):
-            if message.source == self._own:
+            if message.source in self.lives:
                 self.said.append(heard_now(said_at, message, at_s))
 
 

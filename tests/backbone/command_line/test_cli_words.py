@@ -62,6 +62,8 @@ def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
         (["--without", ""], "--without needs the name of a component"),
         (["--set", "gain=2"], "are for --without NAME"),
         (["--json"], "are for --without NAME"),
+        (["--without", "a", "--without", "b", "--set", "gain=2"], "are for a single --without NAME"),
+        (["--without", "a", "--without", "rc_manager"], "are for a single --without NAME"),
     ],
 )
 def test_options_of_a_replay_that_mean_nothing_are_wrong_usage(tmp_path: Path, options: list[str], told: str) -> None:

@@ -17,13 +17,13 @@ from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
 from backbone.recording.comparison import KeyComparison, compared
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.rerun import NoSuchComponent, classes_of, launch_of, run_again
+from backbone.recording.rerun import NoSuchComponent, RealComponent, classes_of, launch_of, run_again
 from backbone.recording.revival import with_names
 
 MISSION_XML = Path(__file__).parents[3] / "mission.xml"
 LASTED_S = 20.0
 FINDINGS = "mission_control/watch-scout2/events MotionSeen/1"
-WATCHERS = ("watch-scout1", "watch-scout2")
+WATCHERS, ARC = ("watch-scout1", "watch-scout2"), "watch-scout1-capture"
 Same = Callable[[str], dict[str, KeyComparison]]
 
 
@@ -36,13 +36,17 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Any:
         yield Recording(file)
 
 
-def rerun_of(recording: Recording, name: str, **parameters: Any) -> dict[str, KeyComparison]:
-    """Return what the component said on the recording beside what the recorded one said, by schema."""
-    launch = launch_of(recording, CLASSES, name)
-    launch = msgspec.structs.replace(launch, parameters={**launch.parameters, **parameters})
-    rerun = run_again(recording, CLASSES, launch, load_class(launch.class_path))
-    assert rerun.fell is None
-    found = compared(recording.messages(source=launch.address), rerun.said)
+def rerun_of(recording: Recording, *names: str, **parameters: Any) -> dict[str, KeyComparison]:
+    """Return what the components said on the recording beside what the recorded ones said, by schema."""
+    components = []
+    for name in names:
+        launch = launch_of(recording, CLASSES, name)
+        launch = msgspec.structs.replace(launch, parameters={**launch.parameters, **parameters})
+        components.append(RealComponent(launch, load_class(launch.class_path)))
+    rerun = run_again(recording, CLASSES, components)
+    assert rerun.fell == {}
+    addresses = {launch.address for launch, _kind in components}
+    found = compared((one for one in recording.messages() if one.source in addresses), rerun.said)
     return {f"{key} {schema}": one for (key, _source, schema), one in found.items()}
 
 
@@ -52,11 +56,18 @@ def same(recording: Recording) -> Same:
     return cache(lambda name: rerun_of(recording, name))
 
 
-@pytest.mark.parametrize("name", WATCHERS)
+@pytest.mark.parametrize("name", [*WATCHERS, ARC])
 def test_the_same_component_says_the_same(same: Same, name: str):
     found = same(name)
     assert {key for key, one in found.items() if not one.is_same} == set()
     assert sum(one.first for one in found.values()) > 50
+
+
+def test_components_that_run_again_together_say_the_same(recording: Recording):
+    """What children and parent say to each other is from this run, not from the recording."""
+    found = rerun_of(recording, "surveillance", *WATCHERS)
+    assert {key for key, one in found.items() if not one.is_same} == set()
+    assert sum(one.first for key, one in found.items() if "ChildReport" in key) > 2
 
 
 def test_there_is_something_to_find(same: Same):
@@ -74,7 +85,7 @@ def test_another_parameter_is_named_at_the_first_finding_that_differs(recording:
 
 def test_another_class_may_take_its_place(recording: Recording):
     launch = msgspec.structs.replace(launch_of(recording, CLASSES, "watch-scout1"), parameters={"seconds": 5.0})
-    rerun = run_again(recording, CLASSES, launch, load_class("mission_control.behaviors.wait:Wait"))
+    rerun = run_again(recording, CLASSES, [RealComponent(launch, load_class("mission_control.behaviors.wait:Wait"))])
     found = compared(recording.messages(source=launch.address), rerun.said)
     assert not all(one.is_same for one in found.values())
 
@@ -85,7 +96,9 @@ def test_a_component_that_falls_is_told(recording: Recording):
             raise ZeroDivisionError
 
     launch = msgspec.structs.replace(launch_of(recording, CLASSES, "watch-scout1"), parameters={"seconds": 5.0})
-    assert isinstance(run_again(recording, CLASSES, launch, Broken).fell, ZeroDivisionError)
+    [(name, bug)] = run_again(recording, CLASSES, [RealComponent(launch, Broken)]).fell.items()
+    assert name == "watch-scout1"
+    assert isinstance(bug, ZeroDivisionError)
 
 
 def test_of_nobody_there_is_no_launch(recording: Recording):

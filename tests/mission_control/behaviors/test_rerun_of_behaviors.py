@@ -17,7 +17,7 @@ from backbone.component.class_path import load_class
 from backbone.launcher.endings import ExitCode
 from backbone.recording.comparison import compared
 from backbone.recording.reader import Recorded, Recording
-from backbone.recording.rerun import launch_of, run_again
+from backbone.recording.rerun import RealComponent, launch_of, run_again
 
 PATROL, SERVO = "patrol-scout1", "servo-scout3"
 LASTED_S = 10.0
@@ -42,8 +42,8 @@ def rerun_of(recording: Recording, name: str, **parameters: Any) -> tuple[list[R
     """Return what the component said then, and what it says on the recording."""
     launch = launch_of(recording, CLASSES, name)
     launch = msgspec.structs.replace(launch, parameters={**launch.parameters, **parameters})
-    rerun = run_again(recording, CLASSES, launch, load_class(launch.class_path))
-    assert rerun.fell is None
+    rerun = run_again(recording, CLASSES, [RealComponent(launch, load_class(launch.class_path))])
+    assert rerun.fell == {}
     return [*recording.messages(source=launch.address)], [*rerun.said]
 
 
@@ -65,9 +65,9 @@ def test_all_that_it_says_is_the_same_to_the_byte_with_its_causes(recording: Rec
 
 
 async def test_the_command_tells_both(path: Path, capsys: pytest.CaptureFixture[str]):
-    assert await run_without(path, PATROL, "", {}, {}, as_json=False) is ExitCode.DONE
+    assert await run_without(path, [PATROL], "", {}, {}, as_json=False) is ExitCode.DONE
     assert capsys.readouterr().out == ""
-    assert await run_without(path, PATROL, "", {"speed_m_s": 0.19}, {}, as_json=False) is ExitCode.REFUSED
+    assert await run_without(path, [PATROL], "", {"speed_m_s": 0.19}, {}, as_json=False) is ExitCode.REFUSED
     told = capsys.readouterr()
     assert "patrol-scout1-drive/ask  Move" in told.out
     assert "; the first is message 0 of " in told.err
