@@ -136,7 +136,7 @@ def run_again(recording: Recording, classes: Known, components: Sequence[RealCom
 async def _run(recording: Recording, classes: Known, components: Sequence[RealComponent]) -> Rerun:
     clock = VirtualClock()
     network = _RecordedNetwork(recording, classes, [one.launch for one in components])
-    await clock.sleep_until_s(min(life.begin_s for life in network.lives.values()))
+    await clock.sleep_until_s(network.begin_s)
     ear = network.join("backbone/recorder", clock)
     for conversation in to_overhear(()):
         ear.overhear(conversation, partial(network.heard, clock), MOST_WAITING_BYTES)
@@ -199,6 +199,7 @@ class _RecordedNetwork(LocalNetwork):
         self._tokens: dict[str, Subscription] = {}
         self._answers: dict[tuple[str, tuple[str, str, bytes]], deque[tuple[float, Message]]] = defaultdict(deque)
         self._learn()
+        self.begin_s = min(life.begin_s for life in self.lives.values())
 
     def _learn(self) -> None:
         """Find out when the components lived, and which answers the recorded ones gave them."""
@@ -227,10 +228,10 @@ class _RecordedNetwork(LocalNetwork):
 
         Of what was sent before the first of them began, only tokens have an effect: none of them could hear the rest.
         """
-        begin_s, end_s = clock.now_s(), max(life.end_s for life in self.lives.values())
+        end_s = max(life.end_s for life in self.lives.values())
         for message in self._recording.messages(until_s=end_s):
             at_s = _sent_s(message)
-            if message.source in self.lives or (at_s < begin_s and message.schema != schema_of(Presence)):
+            if message.source in self.lives or (at_s < self.begin_s and message.schema != schema_of(Presence)):
                 continue
             await clock.sleep_until_s(at_s)
             self._play(bus, message)

@@ -73,8 +73,10 @@ def test_an_environment_that_cannot_be_read_is_empty() -> None:
 @pytest.mark.processes
 def test_what_left_the_group_by_another_program_is_known_by_its_environment() -> None:
     component = 4_194_305  # no pid: Linux gives none above 2**22
-    environ = {**os.environ, MARK: str(component)}
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, env=environ) as program:
+    environ, waits = {**os.environ, MARK: str(component)}, [sys.executable, "-c", "print(flush=True); input()"]
+    with subprocess.Popen(waits, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environ) as program:
+        assert program.stdout is not None
+        program.stdout.readline()  # a program that has just begun has no environment yet
         assert remains(read_table(), component) == {program.pid}
         assert remains(read_table(), component, adopter=os.getpid()) == {program.pid}
         assert remains(read_table(), component, adopter=program.pid) == set()
