@@ -19,6 +19,7 @@ from ui_console.model.events import ConsentHeard, GivenBack, Granted, said
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
 SLICE_S = 5.0
+HEARD_LATE_S = 0.3  # a console on a busy machine hears of its end so much later than the other of its grant
 
 
 @pytest.fixture(scope="module")
@@ -86,4 +87,4 @@ async def test_equals_who_ask_for_nothing_but_the_robot_take_turns(mission: Runn
             lost_s = next(event.at_s for event in cleo.events[mark:] if said(event) is lost)
             again = await cleo.hears(mark, Granted)
             assert again.again
-            assert 1.0 <= again.at_s - lost_s < WAIT_S
+            assert 1.0 - HEARD_LATE_S <= again.at_s - lost_s < WAIT_S

@@ -41,7 +41,7 @@ print(len({{os.getpid(), *pids}}), sorted(told), told["smoothing"]["smoothing_ru
 """
 
 
-def script(*, falls: bool = False, for_s: str = "0.5") -> subprocess.Popen[str]:
+def script(*, falls: bool = False, for_s: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-c", SCRIPT.format(falls=falls, for_s=for_s)],
         cwd=TOP,
@@ -70,7 +70,7 @@ def test_the_pair_in_two_processes_says_what_it_says_in_one() -> None:
 
 
 def test_modules_of_the_script_itself_run_elsewhere_and_its_statistics_come_back() -> None:
-    said, complaint = script().communicate(timeout=WITHIN_S)
+    said, complaint = script(for_s="2").communicate(timeout=WITHIN_S)
     assert said.splitlines()[-1:] == ["2 ['falling', 'smoothing', 'wave'] True"], complaint
 
 

@@ -1,5 +1,6 @@
 """Publications: the same on each bus."""
 
+import asyncio
 from typing import Any
 
 from bus_laws import ASK_S, ASKER, SERVER, THIRD, Echo, Echoed, Heard, Net, News, Other, Runner, pair, until_known
@@ -177,7 +178,11 @@ def test_a_lossless_listener_gets_every_picture_of_a_burst_in_order(on_bus: Runn
         for heard in (every, also):
             await heard.until_count(200)
             assert heard.numbers() == list(range(200))
-        await newest.until(lambda heard: heard[-1].body.number > 0, "a newer picture")
+        number = 200
+        while not any(one.body.number > 0 for one in newest.all):  # all of a burst but its first may be dropped for it
+            sender.publish(SERVER, Conversation.FRAMES, Picture(number, bytes(76_800)))
+            number += 1
+            await asyncio.sleep(0.05)
         assert SERVER + "/frames" not in keen.dropped()
 
     on_bus(law)
