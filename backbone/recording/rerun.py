@@ -178,7 +178,7 @@ def _has_fallen(task: asyncio.Task[None]) -> bool:
 
 
 @dataclass(slots=True)
-class _Life:
+class _RecordedLife:
     """The recorded life of a component: mission times of its first and last message, cause of the first, and pid."""
 
     begin_s: float = -1.0
@@ -193,7 +193,7 @@ class _RecordedNetwork(LocalNetwork):
     def __init__(self, recording: Recording, classes: Known, launches: Sequence[Launch]) -> None:
         super().__init__(launches[0].mission)
         self.said: list[Recorded] = []
-        self.lives = {launch.address: _Life() for launch in launches}
+        self.lives = {launch.address: _RecordedLife() for launch in launches}
         self._recording, self._classes = recording, classes
         self._hearing = Hearing(classes)
         self._tokens: dict[str, Subscription] = {}
