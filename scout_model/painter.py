@@ -39,9 +39,14 @@ _LUMA = np.array([0.299, 0.587, 0.114])  # as OpenCV's RGB to gray
 _UNPAINTED = (int(mujoco.mjtGeom.mjGEOM_HFIELD), int(mujoco.mjtGeom.mjGEOM_SDF))
 
 
+def _is_seen(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Return which geoms a picture may show: MuJoCo leaves out those without any opacity."""
+    return np.asarray((model.geom_group <= _THINGS) & (model.geom_rgba[:, 3] > 0), bool)
+
+
 def only_opengl_shows(model: mujoco.MjModel) -> list[str]:
     """Return what a picture of this model has by OpenGL and would lack by the painter; empty: nothing."""
-    seen = (model.geom_group <= _THINGS) & (model.geom_rgba[:, 3] > 0)
+    seen = _is_seen(model)
     sun = int(mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
     parts = {
         "height fields and signed distance fields": np.isin(model.geom_type[seen], _UNPAINTED).any(),
@@ -69,7 +74,7 @@ class Painter:
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
-        geoms = [geom for geom in range(model.ngeom) if model.geom_group[geom] <= _THINGS]
+        geoms = np.flatnonzero(_is_seen(model)).tolist()
         meshes = [_mesh(model, geom) for geom in geoms]
         self._geoms = np.array(geoms)
         self._groups = model.geom_group[self._geoms]

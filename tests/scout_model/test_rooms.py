@@ -272,6 +272,15 @@ def test_what_the_painter_cannot_show_is_known_before_it_draws(asset: str, part:
     assert unpainted(World(described(mjcf=mjcf, robots=[])).mjcf) == lacks
 
 
+def test_a_thing_without_any_opacity_is_not_painted() -> None:
+    """OpenGL leaves it out, too; rooms have such things to collide with."""
+    room = '<mujoco><worldbody><geom type="box" size="1 0.2 1" pos="4 4 1" rgba="%s"/></worldbody></mujoco>'
+    clear, black = (view(World(described(mjcf=room % rgba))) for rgba in ("0 0 0 0", "0 0 0 1"))
+    empty = view(World(described(mjcf="<mujoco><worldbody/></mujoco>")))
+    assert (clear == empty).all()
+    assert (black != empty).any()
+
+
 def test_shapes_that_the_painter_has_not_are_known_before_it_draws() -> None:
     """Rooms are refused with them; the body of a robot may have them."""
     mjcf = """<mujoco>
