@@ -145,10 +145,10 @@ async def _run(recording: Recording, classes: Known, components: Sequence[RealCo
         for one in components
     }
     playing = asyncio.create_task(network.play(ear, clock), name="the recording")
-    while not playing.done() and not any(map(_has_fallen, living.values())):
+    while not playing.done() and all(_bug_of(task) is None for task in living.values()):
         going_on = [task for task in (playing, *living.values()) if not task.done()]
         await asyncio.wait(going_on, return_when=asyncio.FIRST_COMPLETED)
-    fell = {name: bug for name, task in living.items() if _has_fallen(task) and (bug := task.exception()) is not None}
+    fell = {name: bug for name, task in living.items() if (bug := _bug_of(task)) is not None}
     for task in (playing, *living.values()):
         task.cancel()
     await asyncio.wait({playing, *living.values()})
@@ -173,8 +173,8 @@ async def _live(network: _RecordedNetwork, clock: Clock, component: RealComponen
         await bus.close()
 
 
-def _has_fallen(task: asyncio.Task[None]) -> bool:
-    return task.done() and not task.cancelled() and task.exception() is not None
+def _bug_of(task: asyncio.Task[None]) -> BaseException | None:
+    return task.exception() if task.done() and not task.cancelled() else None
 
 
 @dataclass(slots=True)
