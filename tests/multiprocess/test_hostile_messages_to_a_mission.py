@@ -25,6 +25,10 @@ from resource_pool.messages import ImpossibleUse
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
+# Chosen: an RC manager that shares two processors with the askers and three more missions waited up to 71 ms for a
+# processor, without a message of theirs to read. In which order it decides is judged, not whether it had a processor.
+LATE_S = 0.25
+
 
 def raw_ask(session: zenoh.Session, at: str, payload: bytes) -> bytes:
     """Ask with these bytes and return the bytes of the one answer."""
@@ -74,7 +78,7 @@ async def test_numbers_beyond_their_ranges_change_nothing_in_a_running_mission(t
         assert not any(c["restarts"] for c in after["components"])
         assert {rc["rc"]: rc["state"] for rc in after["rcs"]} == dict.fromkeys(rcs, "up")
         assert_trace_says(trace, rcs)
-    assert trace_judge.judge().FullChecker().run(lines_of(trace)) == []
+    assert trace_judge.judge().FullChecker(tol=LATE_S).run(lines_of(trace)) == []
 
 
 def ask_beyond_ranges(session: zenoh.Session, mission: RunningMission, address: str) -> None:
