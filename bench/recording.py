@@ -2,8 +2,10 @@
 
 Runs the mission of IROS 2001 with short slices several times: alone, with a recorder of everything, and, as the floor,
 with a process that receives all copies of its host and discards them. Meanwhile it asks the RC manager a question
-twenty times a second. Prints one JSON line; ``core_share`` and ``floor_share`` are parts of one core, ``switch_ratio``
-and ``question_ratio`` are medians with a recorder over those without.
+twenty times a second. Prints one JSON line; ``core_share`` and ``floor_share`` are parts of one core. Switch times are
+from the RC manager's trace, of all runs together, while no process starts. ``switch_ratio`` and ``question_ratio`` are
+medians with a recorder over those without; ``late`` ones are of the 99th percentiles, ``floor`` ones of the process
+that keeps nothing.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from statistics import median, quantiles
 
 import psutil
 from measuring import BIN, report
-from switch_time import fast_mission, measure
+from switch_time import fast_mission, measure, switches_s
 
 from backbone import run_files
 from backbone.recording.host_ear import HostEar
@@ -32,35 +34,40 @@ SETTLE_S = 3.0  # chosen: the recorder's imports and its first questions are ove
 
 @dataclass
 class Runs:
-    """Measurements in the runs of one kind."""
+    """Durations in the runs of one kind, in seconds."""
 
     switches_s: list[float] = field(default_factory=list)
-    late_switches_s: list[float] = field(default_factory=list)
     questions_s: list[float] = field(default_factory=list)
-    late_questions_s: list[float] = field(default_factory=list)
+
+    def late_switch_s(self) -> float:
+        """Return the 99th percentile of the switches."""
+        return quantiles(self.switches_s, n=100)[98]
+
+    def late_question_s(self) -> float:
+        """Return the 99th percentile of the questions."""
+        return quantiles(self.questions_s, n=100)[98]
 
 
 def run(mission: Path, seconds: float, listener: list[str], runs: Runs) -> float:
     """Run the mission once, with or without a process that overhears it; return that process's share of a core."""
-    command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless"]
+    trace = mission.with_suffix(".jsonl")
+    trace.unlink(missing_ok=True)
+    command = [str(BIN / "scout-backbone"), "up", str(mission), "--headless", "--trace", str(trace)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
         assert launcher.stderr is not None
         next(line for line in launcher.stderr if line.startswith("all ready"))
         recorder = subprocess.Popen(listener) if listener else None
         asyncio.run(asyncio.sleep(SETTLE_S))
         before_s = busy_s(recorder)
-        values, questions = asyncio.run(measure(seconds))
+        measured = asyncio.run(measure(seconds))
         share = (busy_s(recorder) - before_s) / seconds
         if recorder is not None:
             recorder.send_signal(signal.SIGINT)
             recorder.wait(20)
         launcher.terminate()
         launcher.stderr.read()
-    ordered = quantiles(questions, n=100)
-    runs.switches_s.append(values["switch_p50_s"])
-    runs.late_switches_s.append(values["switch_p99_s"])
-    runs.questions_s.append(ordered[49])
-    runs.late_questions_s.append(ordered[98])
+    runs.switches_s += switches_s(trace, measured.since_s, measured.until_s)
+    runs.questions_s += measured.questions_s
     return share
 
 
@@ -92,7 +99,8 @@ def main() -> None:
     if given.overhear:
         asyncio.run(overhear())
         return
-    plain, recorded, shares, floors, messages, size, missing = Runs(), Runs(), [], [], 0, 0, 0
+    plain, recorded, emptied = Runs(), Runs(), Runs()
+    shares, floors, messages, size, missing = [], [], 0, 0, 0
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_RUNTIME_DIR"] = folder
         mission = fast_mission(Path(folder), settling=False, clean_stop=False)
@@ -101,7 +109,7 @@ def main() -> None:
             to = Path(folder) / f"{number}.mcap"
             record = [str(BIN / "scout-backbone"), "record", "--to", str(to)]
             shares.append(run(mission, given.seconds, record, recorded))
-            floors.append(run(mission, given.seconds, [sys.executable, __file__, "--overhear"], Runs()))
+            floors.append(run(mission, given.seconds, [sys.executable, __file__, "--overhear"], emptied))
             with to.open("rb") as file:
                 recording = Recording(file)
                 messages += recording.contents().messages
@@ -115,12 +123,14 @@ def main() -> None:
         missing=missing,
         core_share=round(median(shares), 4),
         floor_share=round(median(floors), 4),
+        switches=len(recorded.switches_s),
         switch_p50_ms=round(median(recorded.switches_s) * 1e3, 2),
-        switch_p99_ms=round(median(recorded.late_switches_s) * 1e3, 2),
+        switch_p99_ms=round(recorded.late_switch_s() * 1e3, 2),
         switch_ratio=round(median(recorded.switches_s) / median(plain.switches_s), 3),
-        late_switch_ratio=round(median(recorded.late_switches_s) / median(plain.late_switches_s), 3),
+        late_switch_ratio=round(recorded.late_switch_s() / plain.late_switch_s(), 3),
+        late_floor_ratio=round(emptied.late_switch_s() / plain.late_switch_s(), 3),
         question_ratio=round(median(recorded.questions_s) / median(plain.questions_s), 3),
-        late_question_ratio=round(median(recorded.late_questions_s) / median(plain.late_questions_s), 3),
+        late_question_ratio=round(recorded.late_question_s() / plain.late_question_s(), 3),
     )
 
 

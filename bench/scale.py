@@ -35,6 +35,7 @@ import psutil
 from idle import name_of, processor_s
 from measuring import BIN, percentile, report
 from scale_mission import NAME, SETTLE_S, SHARING, components, mission_file
+from switch_time import switches_s
 
 from backbone import run_files
 from backbone.addresses import RC_MANAGER
@@ -228,18 +229,6 @@ async def take_over(robot: str, number: int) -> float:
     return next(event.at_s for event in events if isinstance(event, CommandApplied)) - asked
 
 
-def switches_s(trace: Path, since_s: float, until_s: float) -> list[float]:
-    """Return the durations of switches at slice ends that began in this mission time."""
-    found, begun_s = [], dict[str, float]()
-    for line in trace.read_text().splitlines():
-        event = json.loads(line)
-        if event.get("ev") == "revoke" and event["why"] == "slice" and since_s <= event["t"] < until_s:
-            begun_s[event["by"]] = event["t"]
-        elif event.get("ev") == "grant" and event["arc"] in begun_s:
-            found.append(event["t"] - begun_s.pop(event["arc"]) - SETTLE_S)
-    return found
-
-
 async def measure(up: Up, scouts: int, seconds: float, take_overs: int, trace: Path) -> dict[str, Any]:
     """Measure switches, pictures, processor time and take-overs of a mission that is up."""
     grabbers = [f"resource_pool/grabber{number}" for number in range(1, (scouts - 1) // SHARING + 2)]
@@ -262,7 +251,7 @@ async def measure(up: Up, scouts: int, seconds: float, take_overs: int, trace: P
             took.append(round(1000 * await take_over(f"scout{number % scouts + 1}", number)))
         except (BackboneError, TimeoutError, StopIteration) as error:
             took.append(f"{type(error).__name__}: {error}")
-    switches = switches_s(trace, since_s, until_s) or [0.0]
+    switches = switches_s(trace, since_s, until_s, SETTLE_S) or [0.0]
     return {
         **cores_by_kind(before, after, took_s),
         "switches": len(switches),

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import json
 import os
 import re
 import subprocess
@@ -23,6 +24,7 @@ import tempfile
 from pathlib import Path
 from statistics import quantiles
 from time import perf_counter
+from typing import NamedTuple
 
 from measuring import BIN, MISSION_XML, report
 
@@ -54,18 +56,45 @@ def fast_mission(folder: Path, *, settling: bool, clean_stop: bool) -> Path:
     return file
 
 
-async def measure(seconds: float) -> tuple[dict[str, float], list[float]]:
-    """Return the RC manager's statistics after some seconds, and the durations of bare questions meanwhile."""
+class Measured(NamedTuple):
+    """What the RC manager did in some seconds.
+
+    Attributes:
+        since_s, until_s: Mission time of their begin and end.
+        values: The RC manager's statistics at the end, of the whole mission.
+        questions_s: Durations of bare questions meanwhile.
+    """
+
+    since_s: float
+    until_s: float
+    values: dict[str, float]
+    questions_s: list[float]
+
+
+def switches_s(trace: Path, since_s: float, until_s: float, settle_s: float = 0.0) -> list[float]:
+    """Return the durations of switches at slice ends that began in this mission time, without their settling."""
+    found, begun_s = [], dict[str, float]()
+    for line in trace.read_text().splitlines():
+        event = json.loads(line)
+        if event.get("ev") == "revoke" and event["why"] == "slice" and since_s <= event["t"] < until_s:
+            begun_s[event["by"]] = event["t"]
+        elif event.get("ev") == "grant" and event["arc"] in begun_s:
+            found.append(event["t"] - begun_s.pop(event["arc"]) - settle_s)
+    return found
+
+
+async def measure(seconds: float) -> Measured:
+    """Ask the RC manager twenty times a second for so many seconds."""
     questions = []
     async with connected("switching", None, "ui_console/bench") as (bus, clock):
-        ends_s = clock.now_s() + seconds
-        while clock.now_s() < ends_s:
+        since_s = clock.now_s()
+        while clock.now_s() < since_s + seconds:
             began = perf_counter()
             await bus.ask(RC_MANAGER, AskState(), ComponentState, within_s=2)
             questions.append(perf_counter() - began)
             await clock.sleep_s(0.05)
         values = (await bus.ask(RC_MANAGER, AskStatistics(), Statistics, within_s=2)).values
-    return values, questions
+        return Measured(since_s, clock.now_s(), values, questions)
 
 
 def main() -> None:
@@ -86,10 +115,10 @@ def main() -> None:
         ) as launcher:
             assert launcher.stderr is not None
             next(line for line in launcher.stderr if line.startswith("all ready"))
-            values, questions = asyncio.run(measure(given.seconds))
+            measured = asyncio.run(measure(given.seconds))
             launcher.terminate()
             launcher.stderr.read()
-    floor_s = quantiles(questions, n=100)[49]
+    floor_s, values = quantiles(measured.questions_s, n=100)[49], measured.values
     report(
         "switch_time",
         variant="+".join(variant) or "as_shipped",
