@@ -154,6 +154,18 @@ def test_what_is_missing_is_counted_and_no_difference(recorded: RecordMission):
     assert sum(one.missing for one in found) > 0
 
 
+@pytest.mark.parametrize("most", range(100, 110))
+def test_a_decision_at_whose_lines_the_recording_ends_is_not_missing(recorded: RecordMission, most: int):
+    heard = list[str]()
+
+    def after_the_end(key: str, _raw: bytes) -> bool:
+        heard.extend([key] if f"/{RC_MANAGER}/" in key else [])
+        return len(heard) > most
+
+    found = decided_anew(recorded(1, after_the_end))
+    assert (found.difference, found.missing) == (None, 0)
+
+
 def test_the_schedule_of_each_instant_is_the_one_that_was_published_then(recorded: RecordMission):
     recording = recorded(4)
     published = [one for one in recording.messages((f"{RC_MANAGER}/schedule",)) if one.schema == "Schedule/1"]
