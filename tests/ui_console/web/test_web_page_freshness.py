@@ -50,6 +50,18 @@ async def test_the_age_of_what_is_shown_counts_from_the_newest_beat_that_came_ba
         assert ages == [200, 300, 300, 400, 7250, 60000, 60100]
 
 
+async def test_a_page_whose_device_was_busy_for_seconds_keeps_its_robot(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        await take(page)
+        await page.evaluate("() => { for (const until = Date.now() + 3000; Date.now() < until; ); }")
+        said = [await page.locator("#link").text_content()]
+        while said[-1] != "connected" or len(said) < 20:  # the beat after it has returned
+            said.append(await page.locator("#link").text_content())
+            await asyncio.sleep(0.05)
+        assert await page.locator("body").get_attribute("data-held") == "scout1", said
+        assert [arc.released for arc in stage.placer.arcs.values()] == [""]
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("way", ["up", "down", "both"])
 async def test_a_page_that_is_cut_off_says_within_a_second_that_it_cannot_stop_a_robot(stage: Stage, way: str) -> None:

@@ -112,11 +112,11 @@ export class Link {
 
   /** Update the age of the content; not in a hidden page, because no person needs it there. */
   look() {
+    const now = this.now();
+    this.freshness.ran(now);
     if (!this.isUp || document.hidden) return;
-    const now = this.now(),
-      ageMs = this.freshness.age(now);
-    if (Math.min(ageMs, now - this.seenSince) > this.silentMs) this.giveUp();
-    else if (ageMs > this.oldMs) this.become("old", "the server is silent");
+    if (Math.min(this.freshness.silence(now), now - this.seenSince) > this.silentMs) this.giveUp();
+    else if (this.freshness.age(now) > this.oldMs) this.become("old", "the server is silent");
     else this.become("fresh", "");
   }
 
