@@ -105,7 +105,7 @@ async def test_a_strangers_tokens_messages_and_acknowledgements_change_nothing(p
         sender.publish(SERVER, SAID, News(number))
     await heard.until_count(100)
     assert heard.numbers() == list(range(100))
-    assert listener.unreadable == 6
+    await until(lambda: listener.unreadable == 6, "all of the stranger arrived, and was unreadable")
     assert listener.dropped() == {}
     for token in tokens:
         token.undeclare()  # type: ignore[no-untyped-call]
