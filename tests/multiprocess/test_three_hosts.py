@@ -127,6 +127,9 @@ def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwh
         mission.wait("nothing is left", lambda: not mission.left(), GONE_WITHIN_S)
 
 
+AMID_FIRST_IMPORT = "Fatal Python error: init_import_site"
+
+
 @pytest.mark.thorough
 def test_ctrl_c_ends_an_offer_at_any_time(short_path: Path) -> None:
     with machines(short_path) as mission:
@@ -138,7 +141,10 @@ def test_ctrl_c_ends_an_offer_at_any_time(short_path: Path) -> None:
             offer = mission.offers["far"].process
             offer.send_signal(signal.SIGINT)
             try:
-                assert offer.wait(8) in (0, 130, -signal.SIGINT), mission.story()  # the last one: Python still began
+                code = offer.wait(8)
+                # Python itself still began: it ends by the signal, or with 1 if that came amid its first import.
+                is_early = code == -signal.SIGINT or (code == 1 and AMID_FIRST_IMPORT in mission.story())
+                assert code in (0, 130) or is_early, mission.story()
             except subprocess.TimeoutExpired:
                 pytest.fail(f"Ctrl-C after {pause_s} s\n{mission.story()}")
             mission.wait("nothing runs on far", lambda: not mission.hosts["far"].processes(), GONE_WITHIN_S)
