@@ -118,6 +118,7 @@ class DecisionComparison:
         decisions: Number of compared decisions.
         grants: Number of grants among their lines.
         missing: Number of decisions that could not be compared, because the recording lacks the event or lines.
+            The last one is not counted if only the recording's end can have cut it off.
         difference: The first difference; None: all decisions are equal.
     """
 
@@ -134,22 +135,19 @@ class _RecordedDecision:
     Attributes:
         last: Number of the RC manager's message with its last line.
         heard: Numbers of all its messages, from the event to the first message of the next decision.
+        is_last: Whether no other decision follows in the recording, which may have ended before its last line.
     """
 
     decided: Decided
     last: int
     heard: list[int]
     records: list[Record] = field(default_factory=list)
+    is_last: bool = False
 
     @property
     def is_whole(self) -> bool:
         """Whether no message is missing from the event to the one after the last line."""
         return {*range(self.heard[0], self.last + 2)} <= {*self.heard}
-
-    @property
-    def is_cut_off(self) -> bool:
-        """Whether the recording ended at its last line, and no message is missing before."""
-        return self.heard == [*range(self.heard[0], self.last + 1)]
 
 
 def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> DecisionComparison:
@@ -185,9 +183,11 @@ def decided_anew(recording: Recording, since_s: float = 0.0, **rules: Any) -> De
             return found
         recorded, decided = anew.lines(step.records), anew.decide(step.decided.event, step.decided.at_s)
         is_same = [one.line for one in recorded] == [one.line for one in decided]
+        begins_alike = [one.line for one in recorded] == [one.line for one in decided[: len(recorded)]]
+        if not is_same and step.is_last and begins_alike:
+            continue
         if not is_same and not step.is_whole:
-            begins_alike = [one.line for one in recorded] == [one.line for one in decided[: len(recorded)]]
-            found.missing += not (begins_alike and step.is_cut_off)
+            found.missing += 1
             continue
         found.decisions += 1
         found.grants += sum(one.line["ev"] == "grant" for one in recorded)
@@ -268,6 +268,7 @@ def _steps(recording: Recording, since_s: float) -> Iterator[ScheduleSnapshot | 
                 step.last = message.sequence
                 step.records.append(Record(told.line, told.cause))
     if step is not None:
+        step.is_last = True
         yield step
 
 
