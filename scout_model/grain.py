@@ -1,4 +1,4 @@
-"""Grain: noise in whole grey levels, made once and added to many pictures."""
+"""Grain: noise in whole grey levels, to be added to pictures."""
 
 from __future__ import annotations
 
@@ -25,10 +25,14 @@ class Grain:
     darker: Picture
 
     @classmethod
-    def of(cls, levels: NDArray[np.float64] | NDArray[np.float32]) -> Grain:
-        """Return it for these levels, of any size and sign; more than a picture's range has no further effect."""
-        whole = np.clip(np.rint(levels), -255, 255)
-        return cls(np.maximum(whole, 0).astype(np.uint8), np.maximum(-whole, 0).astype(np.uint8))
+    def of(cls, levels: NDArray[np.float64] | NDArray[np.float32], factor: float = 1.0) -> Grain:
+        """Return it for these levels times the factor, which is below 2**31 in magnitude.
+
+        More than a picture's range has no further effect.
+        """
+        # OpenCV rounds to the nearest whole level, halves to even, and cuts off at 0 and 255.
+        brighter, darker = (cv2.multiply(levels, sign * factor, dtype=cv2.CV_8U) for sign in (1.0, -1.0))
+        return cls(np.asarray(brighter, np.uint8), np.asarray(darker, np.uint8))
 
     def on(self, picture: Picture) -> Picture:
         """Return the picture with this noise, within 0 to 255."""

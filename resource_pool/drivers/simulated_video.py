@@ -89,7 +89,7 @@ class SimulatedFramegrabber:
         camera = SharedCamera.join(world.mjcf, support.backend, paints_first=paints_first, lasts=lasts)
         self._camera = camera
         try:
-            self._studio = await run(camera.thread, lambda: _Studio(world, camera.opened()))
+            self._studio = await run(camera.thread, lambda: _Studio(world, camera.opened(), keeps_noise=lasts))
         except Exception:  # mujoco's import raises errors of many kinds where OpenGL is missing
             forget(self._site.folder)
             raise
@@ -181,12 +181,15 @@ class _Tuned:
 class _Studio:
     """Cameras of all robots and one receiver for each frequency; used only by the drawing thread.
 
+    Args:
+        keeps_noise: True where many pictures a second are drawn, in virtual time; see ``video_link.Receiver``.
+
     Attributes:
         lacks: What the pictures lack without OpenGL.
     """
 
-    def __init__(self, world: WorldModel, camera: Any) -> None:
-        self._camera = camera
+    def __init__(self, world: WorldModel, camera: Any, *, keeps_noise: bool) -> None:
+        self._camera, self._keeps_noise = camera, keeps_noise
         self.lacks: list[str] = camera.lacks
         self._video_link = importlib.import_module("scout_model.video_link")
         self._distance_m = importlib.import_module("scout_model.air").distance_m
@@ -201,7 +204,8 @@ class _Studio:
     def _received(self, state: WorldState, frequency: str, is_new: bool) -> Picture:
         receiver = self._receivers.get(frequency)
         if receiver is None:
-            receiver = self._video_link.Receiver(self._world.seed, frequency, self._world.air)
+            world, keeps_noise = self._world, self._keeps_noise
+            receiver = self._video_link.Receiver(world.seed, frequency, world.air, keeps_noise=keeps_noise)
             self._receivers[frequency] = receiver
         if is_new:
             receiver.tune()

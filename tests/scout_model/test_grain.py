@@ -15,9 +15,12 @@ SHAPE = (7, 33)
 @given(
     picture=arrays(np.uint8, SHAPE),
     levels=arrays(np.float64, SHAPE, elements=st.floats(-1000, 1000)),
+    factor=st.floats(0.01, 100),
 )
-def test_a_picture_with_grain_is_their_sum_within_its_range(picture: Picture, levels: np.ndarray) -> None:
+def test_a_picture_with_grain_is_their_sum_within_its_range(
+    picture: Picture, levels: np.ndarray, factor: float
+) -> None:
     before = picture.copy()
-    summed = np.clip(picture.astype(int) + np.rint(levels).astype(int), 0, 255)
-    assert np.array_equal(Grain.of(levels).on(picture), summed)
+    summed = np.clip(picture.astype(int) + np.rint(levels * factor).astype(int), 0, 255)
+    assert np.array_equal(Grain.of(levels, factor).on(picture), summed)
     assert np.array_equal(picture, before)

@@ -263,8 +263,11 @@ def test_half_the_interference_leaves_half_of_the_nearers_rows_in_place() -> Non
 
 @pytest.mark.parametrize("air", [AirDescription(), AS_THE_PAPERS], ids=["mild", "papers"])
 @pytest.mark.parametrize("signals", [[], [Signal(STRIPES, motors=1.0)], [Signal(STRIPES), Signal(GRAY)]])
-def test_the_same_course_of_signals_is_received_the_same_way_again(air: AirDescription, signals: list[Signal]) -> None:
-    first, second = Receiver(1, "video1", air), Receiver(1, "video1", air)
+@pytest.mark.parametrize("keeps_noise", [True, False])
+def test_the_same_course_of_signals_is_received_the_same_way_again(
+    air: AirDescription, signals: list[Signal], keeps_noise: bool
+) -> None:
+    first, second = Receiver(1, "video1", air), Receiver(1, "video1", air, keeps_noise=keeps_noise)
     for frame in range(60):
         assert np.array_equal(first.receive(signals, frame).picture, second.receive(signals, frame).picture)
 
