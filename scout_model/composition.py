@@ -13,7 +13,7 @@ from importlib import resources
 
 import msgspec
 import mujoco
-import numpy as np
+from numpy.random import default_rng  # here, so that a zygote has it: numpy imports it at its first use
 
 from scout_model.description import (
     AirDescription,
@@ -171,7 +171,7 @@ def _add_walls(spec: mujoco.MjSpec, description: WorldDescription) -> None:
 def _add_marks(spec: mujoco.MjSpec, description: WorldDescription) -> None:
     """Put lines on the floor, and skirting boards and posters on the walls, so that motion is visible in a picture."""
     width_m, depth_m = description.width_m, description.depth_m
-    rng = np.random.default_rng(description.seed)
+    rng = default_rng(description.seed)
     world = spec.worldbody
     thin_m, skirting_m = _MARK_THICKNESS_M, 0.10
     for number in range(1, math.ceil(depth_m)):

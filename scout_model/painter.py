@@ -162,8 +162,7 @@ class Painter:
         furniture = [[geom] for geom in self._of_room(_THINGS)]
         moving = [
             [int(geom) for geom in np.flatnonzero((self._bodies == body) & (self._groups == _THINGS))]
-            for body in np.unique(self._bodies)
-            if body != 0
+            for body in sorted(set(self._bodies.tolist()) - {0})
         ]
         return [self._thing(solids) for solids in (*furniture, *moving) if solids]
 
