@@ -71,7 +71,7 @@ class Component(Generic[P_co]):
     is_robot: ClassVar[bool] = False
     """True for the RC of a robot, which operators can stop."""
     shares_process: ClassVar[bool] = True
-    """False for a class that computes for long: unless the mission file names a process, it has one of its own."""
+    """False for a class that computes for long or forks: unless the mission file names a process, it has its own."""
     alike_most: ClassVar[int] = 0
     """Most components of this class in one process, if a host has more of them and the mission file names no process;
     1: each has its own; 0: the placer's default, or 1 if ``shares_process`` is False."""

@@ -66,6 +66,7 @@ class Creator(Component[CreatorParameters]):
 
     parameters_type = CreatorParameters
     accepts = CreatorQuestion
+    shares_process = False
 
     _forked: ClassVar[dict[str, Zygote]] = {}
     """Zygotes that ``before_bus`` forked, by address, until their creators take them over."""

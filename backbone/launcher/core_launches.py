@@ -19,6 +19,8 @@ from backbone.naming import Subsystem
 CORE_POLICY = RestartPolicy(
     back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0
 )  # chosen: a dead hub stops all components, and leases outlast a restart of the RC manager only if its pause is short
+CORE_PACK = "packed--core"
+"""Process of the core services if the components are packed; no mission file can name it."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,8 @@ class UpOptions:
         for_s: Mission seconds from readiness to the end; None: until an order ends it.
         text: Content of the mission file, in which changes of the tree are made. Empty: the tree cannot be changed.
         record: File of the recording, or None.
-        pack: Number of processes of a host into which the placer packs components; 0: a process for each component;
-            None: types with many components share processes.
+        pack: Number of processes of a host into which the placer packs components; the core services share one more. 0:
+            a process for each component; None: types with many components share processes.
     """
 
     speed: float = 1.0
@@ -69,6 +71,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
         },
     }
     hosts = {host.name: host for host in description.hosts}
+    types_by_name = {component_type.name: component_type for component_type in description.types}
     launches = []
     for service in description.core:
         here = hosts[service.host].is_loopback or service.host == own.host
@@ -77,7 +80,8 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
         name = creator_name(service.host) if service.type == "creator" else service.type
         given = parameters[service.type](hosts[service.host])
         launch = service_launch(own, service.type, name, description, given)
-        launches.append(msgspec.structs.replace(launch, host=service.host))
+        process = CORE_PACK if options.pack and types_by_name[service.type].shares_process else ""
+        launches.append(msgspec.structs.replace(launch, host=service.host, process=process))
     return launches
 
 

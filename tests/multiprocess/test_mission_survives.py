@@ -36,6 +36,7 @@ VICTIMS = [
     "nameserver",
     "creator-base",
 ]
+ONE_OF_EACH_PACK = ["watch-scout1", "scout1", "grabber", "world", "rc_manager", "nameserver", "creator-base"]
 
 
 async def wait_until(mission: RunningMission, bus: Bus, what: str, holds: Callable[[dict], bool]) -> dict:
@@ -70,14 +71,17 @@ def somebody_runs(status: dict) -> bool:
 
 
 @pytest.mark.thorough
-async def test_a_mission_recovers_from_the_death_of_each_of_its_processes(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("options", "victims"), [((), VICTIMS), (("--pack", "1"), ONE_OF_EACH_PACK)])
+async def test_a_mission_recovers_from_the_death_of_each_of_its_processes(
+    tmp_path: Path, options: tuple[str, ...], victims: list[str]
+) -> None:
     trace = tmp_path / "run.jsonl"
-    with mission_up("--trace", str(trace)) as mission:
+    with mission_up("--trace", str(trace), *options) as mission:
         async with mission.bus() as bus:
             expected = names(
                 await wait_until(mission, bus, "both watchers ask", lambda s: both_watchers_ask(s) and somebody_runs(s))
             )
-            for victim in VICTIMS:
+            for victim in victims:
                 there = await wait_until(mission, bus, f"{victim} is there", lambda s, v=victim: v in names(s))
                 before = next(c["pid"] for c in there["components"] if c["name"] == victim)
                 with contextlib.suppress(ProcessLookupError):  # the ARC of a behavior that was killed just now
