@@ -8,6 +8,7 @@ the secret in the run folder. Only that file holds the secret: no message, argum
 
 from __future__ import annotations
 
+import ipaddress
 import os
 from pathlib import Path
 
@@ -17,6 +18,7 @@ SOCKET_NAME, SECRET_NAME = "hub.sock", "secret"
 SOCKET = "unixsock-stream/"
 """Prefix of an endpoint that is a unix socket, so its links cannot leave the host."""
 LONGEST_SOCKET_PATH = 107  # linux/un.h: sun_path has 108 bytes, of which the last one is 0
+HUB_PORT = 7447  # Zenoh's own
 USER = "scout"  # the one user of today's hubs; certificates will name hosts and people
 SECRET_BYTES = 32  # chosen: 256 bits cannot be guessed
 LONGEST_SECRET_FILE = 4096  # chosen: a longer file holds no secret
@@ -59,6 +61,14 @@ def tcp_endpoint(address: str, port: int) -> str:
         ('tcp/192.0.2.7:7447', 'tcp/[2001:db8::7]:7447')
     """
     return f"tcp/[{address}]:{port}" if ":" in address else f"tcp/{address}:{port}"
+
+
+def is_loopback(address: str) -> bool:
+    """Return whether this IP address or name means the machine itself."""
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
 
 
 def new_secret() -> str:

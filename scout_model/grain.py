@@ -31,7 +31,9 @@ class Grain:
         More than a picture's range has no further effect.
         """
         # OpenCV rounds to the nearest whole level, halves to even, and cuts off at 0 and 255.
-        brighter, darker = (cv2.multiply(levels, sign * factor, dtype=cv2.CV_8U) for sign in (1.0, -1.0))
+        brighter, darker = (
+            cv2.addWeighted(levels, sign * factor, levels, 0.0, 0.0, dtype=cv2.CV_8U) for sign in (1.0, -1.0)
+        )
         return cls(np.asarray(brighter, np.uint8), np.asarray(darker, np.uint8))
 
     def on(self, picture: Picture) -> Picture:

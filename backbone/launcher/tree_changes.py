@@ -25,7 +25,7 @@ from backbone.launcher.messages import (
     UnknownBehavior,
 )
 from backbone.mission import edit
-from backbone.mission.behavior_orders import PathStep, behavior_order
+from backbone.mission.behavior_orders import PathStep, behavior_order, node_of
 from backbone.mission.document import parse
 from backbone.mission.edit import Element, NewElement, Path
 from backbone.mission.model import BehaviorDescription, MissionDescription
@@ -275,7 +275,7 @@ def _nodes(mission: MissionDescription) -> dict[str, _Known]:
 
     def walk(behaviors: Sequence[BehaviorDescription], parent: str, path: Sequence[PathStep]) -> None:
         for one in behaviors:
-            order = behavior_order(one.model_dump(mode="json"), path)
+            order = behavior_order(node_of(one), path)
             found[one.name] = _Known(parent, order, one.priority, tuple(child.name for child in one.children))
             walk(one.children, one.name, [*path, (one.name, one.priority)])
 

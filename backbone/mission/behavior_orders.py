@@ -3,8 +3,7 @@
 A behavior starts with its own parameters from the file, and with those of the tree: ``path`` (from the mission's root
 to this node), ``arc`` (its claim), ``children`` (whole nodes, which the behavior starts itself, by the same rule). The
 root of the last branch also gets ``is_last``. A behavior that a console ordered also gets ``keeper`` (the console).
-Nothing here imports the mission's model at run time, so a behavior's process can apply the rule to its children without
-loading pydantic.
+A behavior applies the rule to its children, so nothing here imports the mission's model at run time.
 """
 
 from __future__ import annotations
@@ -81,8 +80,14 @@ def behavior_order(node: Node, parent_path: Sequence[PathStep]) -> Start:
     return Start(node["type"], node["name"], {**own, **tree}, process=node.get("process", ""))
 
 
+def node_of(behavior: BehaviorDescription) -> Node:
+    """Return the node of the tree as plain data, as a message carries it."""
+    node: Node = msgspec.msgpack.decode(msgspec.msgpack.encode(behavior))
+    return node
+
+
 def _node(behavior: BehaviorDescription) -> Node:
-    node = behavior.model_dump(mode="json")
+    node = node_of(behavior)
     _refuse_reserved(node)
     return node
 

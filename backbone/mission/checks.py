@@ -10,13 +10,13 @@ import ipaddress
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
+from backbone.authentication import is_loopback
 from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name, offer_name
 from backbone.mission.behavior_checks import check_behaviors
 from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH
-from backbone.mission.declaration.elements import is_loopback
 from backbone.mission.document import Element
 from backbone.mission.module_checks import check_modules
 from backbone.mission.parameter_checks import (

@@ -27,6 +27,7 @@ from backbone.mission.model import (
     BehaviorDescription,
     ComponentDescription,
     CoreServiceDescription,
+    Host,
     LastBranchDescription,
     MissionDescription,
 )
@@ -57,7 +58,7 @@ def describe(
         classes: Class path → facts of the class.
         arranged: Execution unit → parameters of its component.
     """
-    hosts = () if mission.hosts is None else mission.hosts.host
+    hosts = () if mission.hosts is None else tuple(Host(**one.model_dump()) for one in mission.hosts.host)
     world, tree = mission.world, mission.behaviors or BehaviorsElement()
     resources = () if mission.resources is None else mission.resources.resource
     units = () if mission.modules is None else mission.modules.unit

@@ -5,28 +5,35 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+import msgspec
 
+from backbone.authentication import HUB_PORT, is_loopback
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
-from backbone.mission.declaration.elements import ArcAttributes, BehaviorAttributes, Host
-
-__all__ = [
-    "ArcWish",
-    "BehaviorDescription",
-    "ComponentDescription",
-    "CoreServiceDescription",
-    "Host",
-    "LastBranchDescription",
-    "MissionDescription",
-]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+class Host(msgspec.Struct, frozen=True, kw_only=True):
+    """A machine that may run components.
+
+    Attributes:
+        name: Name of the machine within the mission.
+        address: IP address or host name.
+        tags: Abilities of the machine, which types can require.
+        port: TCP port at which other machines reach the first host's hub.
+    """
+
+    name: str
+    address: str
+    tags: tuple[str, ...] = ()
+    port: int = HUB_PORT
+
+    @property
+    def is_loopback(self) -> bool:
+        """True if the address means the machine on which 'up' is typed, without its name."""
+        return is_loopback(self.address)
 
 
-class CoreServiceDescription(_Part):
+class CoreServiceDescription(msgspec.Struct, frozen=True, kw_only=True):
     """A core service and where it runs.
 
     Attributes:
@@ -38,7 +45,7 @@ class CoreServiceDescription(_Part):
     parameters: dict[str, Any] = {}
 
 
-class ComponentDescription(_Part):
+class ComponentDescription(msgspec.Struct, frozen=True, kw_only=True):
     """A component that the mission starts at its beginning, except RCs and behaviors: the world, an execution unit.
 
     Attributes:
@@ -54,33 +61,51 @@ class ComponentDescription(_Part):
     process: str = ""
 
 
-class ArcWish(ArcAttributes):
+class ArcWish(msgspec.Struct, frozen=True, kw_only=True):
     """The ARC a behavior needs.
 
     Attributes:
+        kind: Component type of the ARC.
+        minimum_runtime_s: Shortest time in which the behavior can do something useful, seconds.
+        maximum_runtime_s: Longest slice with all extensions, seconds; 0: the minimum.
+        period_s: Interval between its radio packets, seconds.
+        packet_time_s: Time one of its radio packets is on the air, seconds.
         wish: Role → name.
         features: Role → features.
     """
 
+    kind: str
+    minimum_runtime_s: float
+    maximum_runtime_s: float = 0.0
+    period_s: float = 0.05
+    packet_time_s: float = 0.002
     wish: dict[str, str] = {}
     features: dict[str, tuple[str, ...]] = {}
 
 
-class BehaviorDescription(BehaviorAttributes):
+class BehaviorDescription(msgspec.Struct, frozen=True, kw_only=True):
     """A node of the behavior tree.
 
     Attributes:
+        type: Its component type.
+        name: Name of the behavior, unique in the mission.
+        priority: Its priority among its siblings; larger is higher.
+        process: Name of the process it shares with others; empty: a process of its own.
         parameters: Values for the class's parameters.
         arc: The ARC it needs, if any.
         children: Nodes its parent starts.
     """
 
+    type: str
+    name: str
+    priority: int
+    process: str = ""
     parameters: dict[str, Any] = {}
     arc: ArcWish | None = None
     children: tuple[BehaviorDescription, ...] = ()
 
 
-class LastBranchDescription(_Part):
+class LastBranchDescription(msgspec.Struct, frozen=True, kw_only=True):
     """The branch of the behavior tree that runs when the mission is ordered to end.
 
     Attributes:
@@ -92,7 +117,7 @@ class LastBranchDescription(_Part):
     within_s: float
 
 
-class MissionDescription(_Part):
+class MissionDescription(msgspec.Struct, frozen=True, kw_only=True):
     """A whole mission.
 
     Attributes:
@@ -130,7 +155,7 @@ class MissionDescription(_Part):
         """The mission while its last branch runs, which is then its only behavior; None: there is no last branch."""
         if self.last is None:
             return None
-        return self.model_copy(update={"behaviors": (self.last.behavior,), "last": None})
+        return msgspec.structs.replace(self, behaviors=(self.last.behavior,), last=None)
 
     def core_parameters(self, service: str) -> dict[str, object]:
         """Return the parameters that the file sets of a core service, of the first one of this type."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import ipaddress
-
 from pydantic import Field
 
+from backbone.authentication import HUB_PORT
 from backbone.component_database.messages import Multiplicity as MultiplicityWord
 from backbone.mission.declaration.module_elements import ModulesElement
 from backbone.mission.declaration.parts import Declared, ParameterElement
@@ -26,18 +25,8 @@ from backbone.mission.declaration.values import (
 )
 from backbone.mission.declaration.world_elements import WorldElement
 
-HUB_PORT = 7447  # Zenoh's own
 
-
-def is_loopback(address: str) -> bool:
-    """Return whether this IP address or name means the machine itself."""
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return address == "localhost"
-
-
-class Host(Declared):
+class HostElement(Declared):
     """A machine that may run components."""
 
     name: Name = Field(description="Name of the machine within this file.")
@@ -53,16 +42,11 @@ class Host(Declared):
         ),
     )
 
-    @property
-    def is_loopback(self) -> bool:
-        """True if the address means the machine on which 'up' is typed, without its name."""
-        return is_loopback(self.address)
-
 
 class HostsElement(Declared):
     """The machines; the first one runs the core services. Left out: one host, base, on which 'up' is typed."""
 
-    host: tuple[Host, ...] = ()
+    host: tuple[HostElement, ...] = ()
 
 
 class ServiceElement(Declared):

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from functools import lru_cache
 from xml.sax.saxutils import quoteattr
 
+import msgspec
+
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission_bytes
 from mission_control.laboratory.experiments.conditions import Condition
@@ -54,8 +56,8 @@ def mission_of_trial(condition: Condition, world_seed: int, departs_s: float) ->
     content = dict(world.parameters[WORLD])
     content["seed"] = world_seed
     content["targets"] = [{**target, "begin_s": departs_s} for target in content["targets"]]
-    there = world.model_copy(update={"parameters": {**world.parameters, WORLD: content}})
-    return mission.model_copy(update={"components": (there,)})
+    there = msgspec.structs.replace(world, parameters={**world.parameters, WORLD: content})
+    return msgspec.structs.replace(mission, components=(there,))
 
 
 def _lines(condition: Condition) -> Iterator[str]:

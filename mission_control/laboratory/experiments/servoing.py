@@ -246,5 +246,5 @@ def _mission_from(start: TrialStart, noise: float) -> MissionDescription:
     content |= {"seed": start.world_seed, "air": {"noise": noise}}
     (scout,) = content["robots"]
     content["robots"] = [{**scout, "x_m": start.x_m, "y_m": start.y_m, "heading_rad": start.heading_rad}]
-    there = world.model_copy(update={"parameters": {**world.parameters, WORLD: content}})
-    return mission.model_copy(update={"components": (there,)})
+    there = msgspec.structs.replace(world, parameters={**world.parameters, WORLD: content})
+    return msgspec.structs.replace(mission, components=(there,))

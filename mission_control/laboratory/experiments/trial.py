@@ -133,7 +133,7 @@ class _Trial:
         self._detected = asyncio.Event()
 
     async def run(self) -> tuple[Trial, list[Line]]:
-        bare = self._mission.model_copy(update={"behaviors": ()})
+        bare = msgspec.structs.replace(self._mission, behaviors=())
         consoles = {"operator": SimulatedOperator}
         async with mission_in_one_process(bare, trace=self._decided, consoles=consoles) as running:
             running.bus.subscribe(

@@ -165,4 +165,4 @@ def _node(dice: Random, name: str, resources: tuple[Resource, ...], process: str
 
 
 def _sharing(node: BehaviorDescription, process: str) -> BehaviorDescription:
-    return node.model_copy(update={"process": process}) if process else node
+    return msgspec.structs.replace(node, process=process) if process else node

@@ -197,7 +197,7 @@ def _painted(mission: MissionDescription) -> MissionDescription:
         else resource
         for resource in mission.resources
     )
-    return mission.model_copy(update={"resources": resources})
+    return msgspec.structs.replace(mission, resources=resources)
 
 
 def _first_fall(happenings: list[Happening]) -> str | None:

@@ -165,7 +165,7 @@ def test_its_requests_are_those_the_arcs_of_the_mission_send() -> None:
     from resource_pool.arc_request import ArcParameters
 
     description = read_mission(MISSION_XML)
-    nodes = [msgspec.convert(behavior.model_dump(mode="json"), BehaviorNode) for behavior in description.behaviors]
+    nodes = [msgspec.convert(msgspec.to_builtins(behavior), BehaviorNode) for behavior in description.behaviors]
     claiming = [(path, node.arc) for path, node in walk(nodes, [(description.name, description.priority)]) if node.arc]
     asked = requests(description)
     assert len(asked) == len(claiming) == 2
@@ -193,7 +193,7 @@ def test_its_requests_are_those_the_arcs_of_the_mission_send() -> None:
 def test_the_last_branch_is_tried_by_itself_and_must_find_what_it_needs() -> None:
     def ends_with(branch: BehaviorDescription) -> MissionDescription:
         last = LastBranchDescription(behavior=branch, within_s=20.0)
-        return mission(watch("day", robot="scout1")).model_copy(update={"last": last})
+        return msgspec.structs.replace(mission(watch("day", robot="scout1")), last=last)
 
     dry = dry_run(ends_with(watch("evening", robot="scout1")))
     assert [claimed.behavior for claimed in dry.claimed] == ["day"]

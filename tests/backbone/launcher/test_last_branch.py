@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Coroutine
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -122,7 +123,7 @@ def test_its_root_is_told_that_it_is_the_last() -> None:
     assert order is not None
     assert order.parameters["is_last"] is True
     assert order.parameters["path"] == [["m", 7], ["home", 1]]
-    assert last_order(mission.model_copy(update={"last": None})) is None
+    assert last_order(msgspec.structs.replace(mission, last=None)) is None
 
 
 # ---------------------------------------------------------------------- the run, in virtual time

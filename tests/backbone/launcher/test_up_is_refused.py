@@ -7,6 +7,7 @@ import os
 import socket
 from pathlib import Path
 
+import msgspec
 import pytest
 from typer.testing import CliRunner
 
@@ -75,9 +76,9 @@ def test_the_command_ends_with_4_and_names_the_trace(tmp_path: Path) -> None:
 def test_a_port_that_is_taken_or_an_address_that_is_anothers(shipped: MissionDescription, short_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         base = Host(name="base", address="127.0.0.1", port=taken.getsockname()[1])
-        description = shipped.model_copy(update={"hosts": (base, FAR)})
+        description = msgspec.structs.replace(shipped, hosts=(base, FAR))
         assert f"port {base.port}" in refused(PortTaken, description, UpOptions(), short_path)
-    elsewhere = shipped.model_copy(update={"hosts": (Host(name="base", address="192.0.2.1"), FAR)})
+    elsewhere = msgspec.structs.replace(shipped, hosts=(Host(name="base", address="192.0.2.1"), FAR))
     assert "192.0.2.1" in refused(PortTaken, elsewhere, UpOptions(), short_path)
 
 

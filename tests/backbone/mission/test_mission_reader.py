@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import msgspec
 import pytest
 from examples import share
 from hypothesis import given, settings
@@ -23,9 +24,8 @@ from mission_files import (
 from record_messages import MESSAGES, messages
 
 from backbone.mission.behavior_orders import behavior_orders
-from backbone.mission.declaration.elements import HUB_PORT
 from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
-from backbone.mission.model import MissionDescription
+from backbone.mission.model import HUB_PORT, MissionDescription
 from backbone.mission.reader import MissionInvalid, read_mission
 from backbone.mission.tables import parameter_value
 from backbone.naming import MAX_NAME_LENGTH
@@ -170,7 +170,7 @@ def test_sections_and_what_stands_in_them_may_come_in_any_order(tmp_path: Path) 
     moved = text.replace(hosts[0], "").replace("</mission>", hosts[0] + "</mission>")
     moved = moved.replace(room[0], "").replace("  </world>", room[0] + "  </world>")
     ordered, other = read_text(tmp_path, text), read_text(tmp_path, moved)
-    assert ordered.model_dump() == other.model_dump()
+    assert msgspec.to_builtins(ordered) == msgspec.to_builtins(other)
 
 
 def test_what_is_left_out_gets_its_default() -> None:

@@ -40,7 +40,7 @@ def filmed_at(mission: MissionDescription, frame_rate_hz: float) -> MissionDescr
         else resource
         for resource in mission.resources
     ]
-    return mission.model_copy(update={"resources": tuple(grabbers)})
+    return msgspec.structs.replace(mission, resources=tuple(grabbers))
 
 
 def example(*behaviors: str, **parameters: Any) -> MissionDescription:
@@ -48,8 +48,8 @@ def example(*behaviors: str, **parameters: Any) -> MissionDescription:
     mission = read_mission(EXAMPLES / "behaviors.xml")
     kept = [behavior for behavior in mission.behaviors if behavior.name in behaviors]
     assert len(kept) == len(behaviors), f"{behaviors} of {[behavior.name for behavior in mission.behaviors]}"
-    changed = [behavior.model_copy(update={"parameters": {**behavior.parameters, **parameters}}) for behavior in kept]
-    return mission.model_copy(update={"behaviors": tuple(changed)})
+    changed = [msgspec.structs.replace(behavior, parameters={**behavior.parameters, **parameters}) for behavior in kept]
+    return msgspec.structs.replace(mission, behaviors=tuple(changed))
 
 
 class Person:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
@@ -78,8 +79,8 @@ def only(name: str, **parameters: object) -> MissionDescription:
     """Return the mission of the whole team with this behavior alone."""
     mission = read_mission(TEAM)
     [kept] = [behavior for behavior in mission.behaviors if behavior.name == name]
-    changed = kept.model_copy(update={"parameters": {**kept.parameters, **parameters}})
-    return mission.model_copy(update={"behaviors": (changed,)})
+    changed = msgspec.structs.replace(kept, parameters={**kept.parameters, **parameters})
+    return msgspec.structs.replace(mission, behaviors=(changed,))
 
 
 @pytest.mark.thorough

@@ -37,8 +37,8 @@ def only(*names: str, file: str = "go-to.xml", **parameters: Any) -> MissionDesc
     """Return the example with these behaviors as roots, and these parameters in each of them."""
     mission = read_mission(EXAMPLES / file)
     kept = [behavior for behavior in all_of(mission.behaviors) if behavior.name in names]
-    changed = [one.model_copy(update={"parameters": {**one.parameters, **parameters}}) for one in kept]
-    return mission.model_copy(update={"behaviors": tuple(changed)})
+    changed = [msgspec.structs.replace(one, parameters={**one.parameters, **parameters}) for one in kept]
+    return msgspec.structs.replace(mission, behaviors=tuple(changed))
 
 
 async def believed(running: RunningMission, robot: str = ROBOT) -> Pose:
@@ -171,7 +171,7 @@ def test_a_robot_that_its_localizer_does_not_know_fails_with_the_reason() -> Non
             msgspec.structs.replace(one, parameters={"starts": "scout2:1,1"}) if one.name == "localizer" else one
             for one in mission.resources
         ]
-        async with at_work(mission.model_copy(update={"resources": tuple(resources)})) as running:
+        async with at_work(msgspec.structs.replace(mission, resources=tuple(resources))) as running:
             behavior = await finished(running, GO, 10.0)
             assert behavior.status is BehaviorStatus.FAILURE
             assert behavior.payload["code"] == "localizer.unknown_body"

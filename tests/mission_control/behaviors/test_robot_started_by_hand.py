@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 from behaviors_at_work import Person, at_work, driving, pose
 
 from backbone.addresses import RC_MANAGER
@@ -16,8 +17,8 @@ from backbone.scheduling.views import Schedule
 from mission_control.laboratory.simulation.whole_mission import RunningMission
 
 MISSION = read_mission(Path(__file__).parents[3] / "mission.xml")
-WITHOUT_SCOUT3 = MISSION.model_copy(
-    update={"resources": tuple(resource for resource in MISSION.resources if resource.name != "scout3")}
+WITHOUT_SCOUT3 = msgspec.structs.replace(
+    MISSION, resources=tuple(resource for resource in MISSION.resources if resource.name != "scout3")
 )
 
 

@@ -32,8 +32,8 @@ def without_landmark(mission: MissionDescription) -> MissionDescription:
     def bare(parameters: dict[str, Any]) -> dict[str, Any]:
         return {**parameters, "world": {**parameters["world"], "landmarks": []}}
 
-    worlds = [part.model_copy(update={"parameters": bare(part.parameters)}) for part in mission.components]
-    return mission.model_copy(update={"components": tuple(worlds)})
+    worlds = [msgspec.structs.replace(part, parameters=bare(part.parameters)) for part in mission.components]
+    return msgspec.structs.replace(mission, components=tuple(worlds))
 
 
 def assert_at_its_place(at: Pose) -> None:

@@ -6,6 +6,8 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from backbone.bus.clock import run_virtual
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -34,11 +36,11 @@ def patrols(*, is_real: bool = False) -> MissionDescription:
     mission = read_mission(EXAMPLES / "behaviors.xml")
     if is_real:
         behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
-        return mission.model_copy(update={"behaviors": behaviors})
+        return msgspec.structs.replace(mission, behaviors=behaviors)
     ahead = ComponentType("go_to", "ordered_behaviors:Ahead", Subsystem.MISSION_CONTROL)
     types = (*(one for one in mission.types if one.name not in ("go_to", "follow")), ahead)
     behaviors = tuple(one for one in mission.behaviors if one.name == "patrol-scout1")
-    return mission.model_copy(update={"behaviors": behaviors, "types": types})
+    return msgspec.structs.replace(mission, behaviors=behaviors, types=types)
 
 
 class Operator:

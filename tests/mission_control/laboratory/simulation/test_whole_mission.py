@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from trace_checker import check
 
@@ -83,7 +84,7 @@ def test_a_type_the_mission_does_not_have_is_refused(shipped: MissionDescription
 
 
 def test_a_component_that_falls_ends_the_run_with_its_name_and_reason(shipped: MissionDescription) -> None:
-    worlds = tuple(part.model_copy(update={"parameters": {"world": {}}}) for part in shipped.components)
-    broken = shipped.model_copy(update={"components": worlds})
+    worlds = tuple(msgspec.structs.replace(part, parameters={"world": {}}) for part in shipped.components)
+    broken = msgspec.structs.replace(shipped, components=worlds)
     with pytest.raises(MissionFell, match=r"world fell.*width_m"):
         run_for(broken, 1.0)
