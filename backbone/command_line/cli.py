@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -68,12 +69,12 @@ def main() -> None:
     run_table(app)
 
 
-def read_or_exit(mission_file: Path) -> tuple[Any, bytes]:
+def or_exit(read: Callable[[], tuple[Any, bytes]]) -> tuple[Any, bytes]:
     """Return the checked mission description and the file's text, or print every fault and exit with 3."""
-    from backbone.mission.reader import MissionInvalid, read_written_mission
+    from backbone.mission.report import MissionInvalid
 
     try:
-        return read_written_mission(mission_file)
+        return read()
     except MissionInvalid as invalid:
         print(invalid)
         raise typer.Exit(int(ExitCode.MISSION_INVALID)) from None
@@ -101,7 +102,9 @@ def check(
     """Check a mission file whole: every fault at once as file:line:column. Starts nothing."""
     if not dry_run and (for_s is not None or trace is not None):
         raise typer.BadParameter("--for and --trace need --dry-run")
-    description, _ = read_or_exit(mission_file)
+    from backbone.mission.reader import read_written_mission
+
+    description, _ = or_exit(lambda: read_written_mission(mission_file))
     say(
         f"{mission_file}: mission {description.name} is fine: {counted(len(description.resources), 'resource')}, "
         f"{counted(len(description.types), 'component type')} on {counted(len(description.hosts), 'host')}"
@@ -149,17 +152,20 @@ def up(
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
-    description, text = read_or_exit(mission_file)
+    from backbone.mission.reading_apart import begin_reading
+
+    finish_reading = begin_reading(mission_file)
+    if not detach:  # in the time in which the child reads
+        from backbone.command_line.mission_console import bring_up_on_console
+        from backbone.launcher.verdict import VerdictPipe
     from backbone.launcher.core_launches import UpOptions
 
+    description, text = or_exit(finish_reading)
     options = UpOptions(speed=speed, trace=trace, for_s=for_s, text=text, record=record_to, pack=pack)
     if detach:
         from backbone.launcher.detached import up_detached
 
         raise typer.Exit(up_detached(description.name, mission_file, options))
-    from backbone.command_line.mission_console import bring_up_on_console
-    from backbone.launcher.verdict import VerdictPipe
-
     live = not headless and sys.stdout.isatty()
     verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
     run(lambda: bring_up_on_console(description, options, live=live, verdict=verdict))

@@ -21,7 +21,7 @@ from backbone.component.messages import (
 )
 from backbone.errors import LinkError, Refusal
 from backbone.keys import ROOT, Conversation
-from backbone.mission.tables import EXECUTION_UNIT
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.quality import QUALITY, Quality
 from backbone.recording.hearing import is_meant

@@ -14,7 +14,7 @@ from backbone.component.messages import AskState, ComponentState
 from backbone.errors import LinkError, OutcomeUnknown, Refusal
 from backbone.exchange import NotExchanged, Silent, SwapClass, SwapModule, Swapped, UnknownModule
 from backbone.launcher.endings import ExitCode, say, show
-from backbone.mission.tables import EXECUTION_UNIT
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of, did_you_mean

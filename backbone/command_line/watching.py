@@ -30,7 +30,7 @@ from backbone.component_database.messages import ListTypes, Types
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.launcher.endings import ExitCode, say, show
-from backbone.mission.tables import EXECUTION_UNIT
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.recording.hearing import Hearing, to_overhear
 from backbone.recording.known_messages import message_classes

@@ -10,8 +10,7 @@ from enum import Enum, auto
 
 from backbone.component.messages import StoryEvent
 from backbone.component_database.messages import ComponentType
-from backbone.mission.model import LastBranchDescription
-from backbone.mission.tables import EXECUTION_UNIT
+from backbone.mission.model import EXECUTION_UNIT, LastBranchDescription
 from backbone.naming import Subsystem, component_of
 
 _FINISHED = {"success": "succeeded", "failure": "failed"}

@@ -7,6 +7,7 @@ cannot be reached during the change, it gets its new place as soon as it appears
 from __future__ import annotations
 
 import asyncio
+import importlib
 import logging
 from collections.abc import Awaitable, Callable, Coroutine
 
@@ -28,19 +29,14 @@ from backbone.launcher.messages import (
 from backbone.launcher.tree_changes import (
     PRIORITY,
     RUN_TIMES,
+    ChangedMission,
     Consequences,
-    EditedFile,
     NewPlace,
-    changed,
     consequences,
     orders,
-    written,
 )
 from backbone.mission.behavior_orders import PLACE_PARAMETERS
 from backbone.mission.model import MissionDescription
-from backbone.mission.reader import read_mission_bytes
-from backbone.mission.report import MissionInvalid
-from backbone.mission.tables import parameter_value
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import (
     CreatorSilent,
@@ -141,13 +137,12 @@ class TreeKeeper:
             raise TreeChangedMeanwhile(
                 f"the tree has version {self.version}, and the change is for {change.version}", version=self.version
             )
-        edited = changed(self.text, change)
-        new = await self._checked(edited)
-        follows = consequences(self.description, new, edited.anew)
+        new = await asyncio.to_thread(_applied, self.text, change, self.description.source)
+        follows = consequences(self.description, new.mission, new.anew)
         if isinstance(change, SetInTree):
-            await self._set(change, user)
+            await self._set(change, new.value, user)
         before = self.description, self.text, self.version
-        self.description, self.text, self.version = new, edited.text, self.version + 1
+        self.description, self.text, self.version = new.mission, new.text, self.version + 1
         self._moved |= {told.order.name for told in follows.told}
         for told in follows.told:
             self._owed.setdefault(told.order.name, set()).update(told.anew)
@@ -158,13 +153,6 @@ class TreeKeeper:
             raise
         self._note(self.description.name, f"{user} changed the tree, which has version {self.version} now")
         return TreeChanged(self.version, remarks)
-
-    async def _checked(self, edited: EditedFile) -> MissionDescription:
-        """Return the mission that this text describes; check it as 'scout-backbone check' does."""
-        try:
-            return await asyncio.to_thread(read_mission_bytes, edited.text, self.description.source)
-        except MissionInvalid as invalid:
-            raise edited.invalid(invalid.faults) from None
 
     async def _carry_out(self, follows: Consequences, *, insists: bool) -> list[str]:
         """End removed branches, start new ones, and inform those that stay; return remarks for the operator.
@@ -274,7 +262,7 @@ class TreeKeeper:
             self._begin(self._tell_later(name), f"tell {name}")
 
     # ------------------------------------------------------------------ values
-    async def _set(self, change: SetInTree, user: str) -> None:
+    async def _set(self, change: SetInTree, value: object, user: str) -> None:
         """Send the value to its present user: a run time to the ARC, a parameter to the behavior.
 
         A priority goes to the RC manager with the other consequences.
@@ -283,7 +271,6 @@ class TreeKeeper:
             Refusal: The component rejects the value, or the outcome is unknown.
         """
         name, parameter = change.name, change.parameter
-        value = parameter_value(written(name, parameter, change.value))
         if parameter == PRIORITY:
             return
         at = [address(Subsystem.MISSION_CONTROL, name)]
@@ -317,3 +304,9 @@ class TreeKeeper:
         return await ask_until_answered(
             self._bus, self._clock, at, question, reply, each_s=REPLY_TIME_S, within_s=REPLIES_WITHIN_S
         )
+
+
+def _applied(text: bytes, change: TreeChange, source: str) -> ChangedMission:
+    """Return the mission after the change; see ``tree_texts.applied``, which this process imports only now."""
+    found: ChangedMission = importlib.import_module("backbone.launcher.tree_texts").applied(text, change, source)
+    return found

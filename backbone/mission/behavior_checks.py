@@ -5,10 +5,11 @@ from __future__ import annotations
 from backbone.component_database.messages import Multiplicity
 from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.mission.document import Element
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.reading_checks import check_readings, check_vision
 from backbone.mission.report import Report, listed
-from backbone.mission.tables import EXECUTION_UNIT, Tables, check_parameters, check_unique, is_known
+from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
 from backbone.spoken import counted
 

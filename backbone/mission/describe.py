@@ -23,6 +23,7 @@ from backbone.mission.declaration.module_elements import UnitElement
 from backbone.mission.declaration.parts import Declared, ParameterElement
 from backbone.mission.declaration.world_elements import AirElement, TargetElement, WorldElement
 from backbone.mission.model import (
+    EXECUTION_UNIT,
     ArcWish,
     BehaviorDescription,
     ComponentDescription,
@@ -34,7 +35,6 @@ from backbone.mission.model import (
 from backbone.mission.room_files import floor_plan_text, room_text
 from backbone.mission.tables import (
     CORE_SERVICES,
-    EXECUTION_UNIT,
     FLOOR_PLAN,
     NETWORK_ID,
     ROOM,

@@ -11,6 +11,8 @@ from backbone.authentication import HUB_PORT, is_loopback
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 
+EXECUTION_UNIT = "execution_unit"  # the shipped type that runs modules
+
 
 class Host(msgspec.Struct, frozen=True, kw_only=True):
     """A machine that may run components.

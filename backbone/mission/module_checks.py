@@ -11,9 +11,10 @@ from collections.abc import Iterator
 from backbone.mission.arranged import CLASS, UnitFault, UnitsQuestion
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.parameter_checks import check_class_path
 from backbone.mission.report import Place, Report
-from backbone.mission.tables import EXECUTION_UNIT, Tables, check_host, check_parameters, check_unique, parameters
+from backbone.mission.tables import Tables, check_host, check_parameters, check_unique, parameters
 
 
 def check_modules(tables: Tables, report: Report) -> None:

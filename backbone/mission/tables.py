@@ -16,7 +16,6 @@ CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "depen
 """In their order of start. Source: RAM 2002, "Backbone"."""
 
 SIMULATED = "simulated"  # the driver whose hardware is simulated by the mission's world
-EXECUTION_UNIT = "execution_unit"  # the shipped type that runs modules
 SIMULATED_WORLD = "simulated_world"  # the shipped type of the simulated world
 WORLD = "world"  # the parameter that names the world, and the world's own parameter
 ROOM = "room"  # the parameter with the room, for classes that have it

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from backbone.component_database.messages import TypeCount
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.mission.tables import EXECUTION_UNIT
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.people import is_console
 from backbone.naming import Subsystem, component_of
 from backbone.picture.mission import MissionPicture

@@ -14,8 +14,8 @@ from importlib import resources
 
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Element, outline
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission.shipped_types import shipped_text
-from backbone.mission.tables import EXECUTION_UNIT
 from backbone.naming import Subsystem
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
-from backbone.mission.tables import EXECUTION_UNIT
+from backbone.mission.model import EXECUTION_UNIT
 from backbone.mission_log.people import People
 from backbone.naming import Subsystem, component_of
 from backbone.picture.words import because

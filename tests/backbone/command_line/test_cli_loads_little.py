@@ -53,6 +53,12 @@ def test_help_loads_nothing_heavy(program: str, tmp_path: Path) -> None:
     assert loaded == set()
 
 
+def test_up_reads_the_mission_file_in_another_process(tmp_path: Path) -> None:
+    printed, loaded = run("scout-backbone", "up", str(tmp_path / "missing.xml"), "--for", "1", folder=tmp_path)
+    assert "missing.xml:1:1:" in printed
+    assert not loaded & {"pydantic", "cv2", "mujoco", "numpy"}
+
+
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_both_programs_print_the_version_that_is_installed(program: str, tmp_path: Path) -> None:
     printed, loaded = run(program, "--version", folder=tmp_path)

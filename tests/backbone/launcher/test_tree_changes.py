@@ -19,7 +19,8 @@ from backbone.launcher.messages import (
     TreeInvalid,
     UnknownBehavior,
 )
-from backbone.launcher.tree_changes import changed, consequences, orders
+from backbone.launcher.tree_changes import consequences, orders
+from backbone.launcher.tree_texts import changed
 from backbone.mission.edit import EditRefused
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import MissionInvalid, read_mission_bytes
