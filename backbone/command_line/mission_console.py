@@ -85,6 +85,12 @@ class ConsoleObserver:
         if self._verdict is not None:
             self._verdict.talk(line)
 
+    def refused(self, error: Refusal | LinkError) -> None:
+        """Send the refusal to the command that waits; the caller prints it."""
+        if self._verdict is not None:
+            self._verdict.talk(f"could not be started: {error}")
+        self.decide(complaint_of(error)[1])
+
     def decide(self, exit_code: int) -> None:
         """Send the exit code to the command that waits, unless it has one already."""
         if self._verdict is not None:
@@ -189,8 +195,7 @@ async def bring_up_on_console(
     try:
         outcome = await run_mission(description, options, observer)
     except (Refusal, LinkError) as error:
-        observer.tell(f"could not be started: {error}")
-        observer.decide(complaint_of(error)[1])
+        observer.refused(error)
         raise
     except BackboneError as error:
         outcome = Outcome(failure=error)
