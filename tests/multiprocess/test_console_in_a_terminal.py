@@ -302,6 +302,7 @@ def test_a_recording_is_played_and_asked_key_by_key(mission: RunningMission, tmp
         screen.press("End")
         screen.shows(r"‖ 1 ×  (\d+\.\d) s of \1 s")
         screen.shows(r"timeline[^?]*watch")
+        screen.shows(r"robots[^?]*1 scout1[^?]*timeline")  # what a person asks about is on the screen
         screen.press("X")
         screen.shows(r"This is a recording: nothing in it")  # the rest may stand in the next line
         screen.press("y")

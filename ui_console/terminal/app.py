@@ -253,6 +253,8 @@ class ConsoleApp(ConsoleDisplay):
         if row is not None and row.subject:
             where = next((alarm.where for alarm in self._alarms() if alarm.key == row.key), "")
             self._why(row.subject, [f"where: {where}"] if where else [])
+        else:
+            self.notify(f"{self.chosen} has no row to explain", severity="warning")
 
     @work(group="why", exclusive=True)
     async def _why(self, subject: str, first: list[str]) -> None:

@@ -135,6 +135,14 @@ async def test_why_of_an_alarm_says_where_to_look_too() -> None:
         assert "where: scout on base" in screen_text(app)
 
 
+async def test_why_without_a_row_says_so() -> None:
+    app = ConsoleApp(WrittenSession())
+    async with app.run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("y")
+        await settle(pilot)
+        assert [note.message for note in app._notifications] == ["robots has no row to explain"]  # noqa: SLF001
+
+
 @pytest.mark.parametrize("is_sure", [True, False])
 async def test_a_parameter_is_changed_by_typing_another_value(is_sure: bool) -> None:
     session = WrittenSession(*TEAM_EVENTS)
