@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from backbone.mission.report import Fault, MissionInvalid
-from backbone.operating_system import processes
+from backbone.operating_system import own_process, processes
 from backbone.operating_system.forked_child import ForkedChild
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def _finished(child: ForkedChild | None, path: Path) -> Written:
 
 
 def _answer(path: Path) -> bytes:
+    own_process.die_with_parent()  # a class of the mission may be slow to import
     faults: tuple[Fault, ...] = ()
     try:
         mission, text = _read(path)

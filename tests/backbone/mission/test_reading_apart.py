@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import psutil
 import pytest
 
 pytestmark = pytest.mark.processes
@@ -58,6 +59,20 @@ try:
 except ChildProcessError:
     print("no child is left")
 """
+KILLED = """
+import os, signal, time
+from pathlib import Path
+from backbone.mission import reading_apart
+
+def read_slowly(path):
+    print(os.getpid(), flush=True)
+    time.sleep(60)
+
+reading_apart._read = read_slowly
+reading = reading_apart.begin_reading(Path("mission.xml"))
+input()
+os.kill(os.getpid(), signal.SIGKILL)
+"""
 
 
 def printed(program: str, argument: str) -> str:
@@ -83,6 +98,15 @@ def test_faults_are_the_same_and_so_is_a_missing_file(tmp_path: Path) -> None:
 )
 def test_a_child_answers_or_not_and_never_stays(work: str, answer: str) -> None:
     assert printed(CHILD, work) == f"printed once {answer}\nno child is left\n"
+
+
+def test_the_child_ends_with_a_killed_launcher() -> None:
+    command = [sys.executable, "-c", KILLED]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as launcher:
+        assert launcher.stdout is not None
+        child = psutil.Process(int(launcher.stdout.readline()))
+        launcher.communicate("\n", timeout=20)  # the child has this pipe, too, and communicate waits for its end
+    assert not child.is_running() or child.status() == psutil.STATUS_ZOMBIE
 
 
 def test_the_launcher_holds_no_reader_of_mission_files() -> None:
