@@ -1,0 +1,57 @@
+"""A Ctrl-C is not lost, whatever Python does when it comes."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.processes
+
+DROPPED = """
+import signal, sys, time, weakref
+from backbone.command_line import entry
+
+class Referred: pass
+
+def main():
+    here = Referred()
+    watch = weakref.ref(here, lambda _: signal.raise_signal(signal.SIGINT))
+    del here
+    time.sleep(20)
+    print("goes on")
+
+sys.modules["ui_console.cli"] = sys.modules["__main__"]
+entry.scout_console()
+"""
+OTHER = """
+import sys
+from backbone.command_line import entry
+
+class Faulty:
+    def __del__(self): raise OSError("of a destructor")
+
+def main(): Faulty()
+
+sys.modules["ui_console.cli"] = sys.modules["__main__"]
+entry.scout_console()
+"""
+
+
+def ended(code: str, where: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, cwd=where, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_an_interrupt_that_python_drops_in_a_callback_ends_the_program(tmp_path: Path) -> None:
+    done = ended(DROPPED, tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_another_exception_that_python_drops_is_printed(tmp_path: Path) -> None:
+    done = ended(OTHER, tmp_path)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert "OSError: of a destructor" in done.stderr
