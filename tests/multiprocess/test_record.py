@@ -13,7 +13,7 @@ import tempfile
 import time
 from asyncio.subprocess import PIPE
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from backbone.rc_manager.messages import AskSchedule, AskWhy
 from backbone.recording.decisions import decided_anew
 from backbone.recording.reader import Recorded, Recording, missing_numbers
 from backbone.recording.reasons import reasons_at
+from backbone.scheduling.requests import UnknownRequest
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import WIRE_VERSION, Envelope, write
 
@@ -170,9 +171,11 @@ async def test_reasons_of_any_instant_are_those_that_were_given_then(tmp_path: P
             schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=2.0)
             names = [*(one.arc for one in schedule.requests), *(one.rc for one in schedule.rcs)]
             for _question in range(ASKED):
-                given.append(await bus.ask(RC_MANAGER, AskWhy(drawn.choice(names)), Why, within_s=2.0))
+                with suppress(UnknownRequest):  # on a busy machine an ARC may be silent so long that its request ends
+                    given.append(await bus.ask(RC_MANAGER, AskWhy(drawn.choice(names)), Why, within_s=2.0))
                 await asyncio.sleep(drawn.uniform(0.0, 0.1))
         await asyncio.to_thread(ended, recorder)
+    assert len(given) > ASKED / 2
     assert len({why.state for why in given}) > 1
     with path.open("rb") as file:
         recording = Recording(file)
