@@ -65,7 +65,8 @@ class HealthWatch:
                 while True:
                     news = self._news
                     self._say()
-                    await self._pause(news, LOOK_EVERY_S / 2, SAY_EVERY_S)
+                    due_s = self._due_in_s()
+                    await self._pause(news, min(LOOK_EVERY_S / 2, due_s), due_s)
         finally:
             for subscription in hearing:
                 subscription.close()
@@ -114,6 +115,10 @@ class HealthWatch:
         others = {at: state for at, state in self._components.items() if at != self._bus.source}
         missed = [*self._own(), *self.picture.missed]
         return health(others, missed, self._clock.now_s(), self._clock.rate)
+
+    def _due_in_s(self) -> float:
+        """Return how long the last published health suffices if nothing changes. Machine seconds."""
+        return max(0.0, SAY_EVERY_S - (self._clock.now_s() - self._said_s) / self._clock.rate)
 
     def _say(self) -> None:
         said, now_s = self._health(), self._clock.now_s()

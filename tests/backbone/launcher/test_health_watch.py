@@ -8,6 +8,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from itertools import pairwise
 
+from msgspec.structs import replace
+
 from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
@@ -94,6 +96,20 @@ def test_a_healthy_mission_is_seldom_asked_and_its_health_is_heard_in_time() -> 
             pauses_s = [later - sooner for sooner, later in pairwise(times_s)]
             assert max(pauses_s) < SILENT_AFTER_S
             assert {health.word for _, health in services.said} == {HealthWord.OK}
+
+    run_virtual(main())
+
+
+def test_the_health_is_heard_every_second_also_when_it_was_said_in_between() -> None:
+    async def main() -> None:
+        async with watched() as services:
+            began_s = services.clock.now_s()
+            for pause_s in (7.3, 0.7, 6.1, 0.45, 8.6, 6.9):  # nothing is published, so rounds find the changes
+                services.state = replace(services.state, absent=[] if services.state.absent else [LOST])
+                await services.clock.sleep_s(pause_s)
+            assert {health.word for _, health in services.said} == {HealthWord.OK, HealthWord.DEGRADED}
+            times_s = [at_s for at_s, _ in services.said if at_s > began_s]
+            assert max(later - sooner for sooner, later in pairwise(times_s)) < 1.01 * SAY_EVERY_S
 
     run_virtual(main())
 
