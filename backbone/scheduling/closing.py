@@ -12,7 +12,7 @@ from backbone.scheduling.arc_events import ArcEvents
 from backbone.scheduling.entries import OpenDecision
 from backbone.scheduling.events import RevokeArc, WakeAt
 from backbone.scheduling.master_schedule import MasterSchedule
-from backbone.scheduling.priority import rank
+from backbone.scheduling.priority import rank_of
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.slice_ends import SliceExpiry
@@ -67,7 +67,7 @@ class Closing:
         """Begin a new slice of served equals that stay on a sharable RC where another slice was ended (rule 5)."""
         for ended, rc in self._decision.ended:
             for arc in [*self._schedule.state.rcs[rc].holders]:
-                if rc in arc.shares and arc.served(self._decision.now_s) and not rank(arc.path, ended.path):
+                if rc in arc.shares and arc.served(self._decision.now_s) and not rank_of(arc, ended):
                     self._transitions.renew(arc)
 
     def _expect(self) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from backbone.scheduling.events import Instruction
-from backbone.scheduling.priority import Level, Path, rank
+from backbone.scheduling.priority import Level, Path, rank_of
 from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
 from backbone.scheduling.streams import Stream
 
@@ -89,7 +89,7 @@ class ArcEntry:
         uses: RC → its use; the chosen alternative.
         place_in_tree: Names from the root to its owner.
         path: The same names, each with its present number.
-        level: Its parent's path and its own number, one object for all siblings with that number, which are equals.
+        level: Its level, one object for all siblings with its number.
         minimum_s: Run time it needs to be served, counted from the grant.
         length_s: Time from the beginning of settling to the end of its minimum run time.
         maximum_s: End of all extensions, counted from the grant.
@@ -167,7 +167,7 @@ class ArcEntry:
 
     def goes_before(self, other: ArcEntry) -> bool:
         """Return whether its owner is strictly higher than the other's."""
-        return self.level is not other.level and rank(self.path, other.path) > 0
+        return self.level is not other.level and rank_of(self, other) > 0
 
     @property
     def understates(self) -> bool:

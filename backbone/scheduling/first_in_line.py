@@ -6,12 +6,32 @@ Rule of this file: nothing changes. Source: decision 0011.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
 from backbone.scheduling.table import Table
 
 LOOK_AHEAD = 3  # chosen: length of a chain of first ARCs that wait for each other; beyond it only holders count
+
+
+_Line = list[tuple[ArcEntry, bool]]
+"""The other ARCs that are first in line at the RCs of an ARC and leave it no room; whether each is higher."""
+
+
+@dataclass(slots=True, frozen=True)
+class _Around:
+    """What surrounds an ARC at its RCs.
+
+    Attributes:
+        version: Sum of the versions of its RCs, and of their service, at that time.
+        holders: The other ARCs that hold its RCs and leave it no room.
+        line: Its line.
+    """
+
+    version: int
+    holders: list[ArcEntry]
+    line: _Line
 
 
 class FirstInLine:
@@ -26,8 +46,13 @@ class FirstInLine:
         self._table = table
         self._state = table.state
         self._slack_s = slack_s
+        self._looked = -1
+        """Version of the state for which the next is known."""
+        self._present: dict[ArcEntry, tuple[float, _Line]] = {}
+        """ARC → end of its holders' slices, and its line."""
         self._reserved: dict[ArcEntry, float] = {}
         self._firsts: dict[str, tuple[int, ArcEntry | None]] = {}
+        self._around: dict[ArcEntry, _Around] = {}
 
     def at(self, rc: str) -> ArcEntry | None:
         """Return the first ARC in the order of the RC's queue; None if it is empty."""
@@ -46,21 +71,36 @@ class FirstInLine:
             holders: The other ARCs that hold an RC of it.
             now_s: Time of its start.
         """
-        table, end_s = self._table, self._must_be_done_s(arc, now_s)
+        if self._looked != self._state.version:
+            self._looked = self._state.version
+            self._present.clear()
         self._reserved.clear()  # its reservations were computed for another candidate
-        users = dict.fromkeys(user for rc in arc.uses for user in self._state.users[rc])
-        higher_ones = [one for one in users if one.queued and one.level is not arc.level and one.goes_before(arc)]
         at = {rc: self.at(rc) for rc in arc.uses}
-        # Equality is not transitive: two ARCs can each be first at a common RC. The lower one then waits.
-        ahead = set() if any(map(table.usable, higher_ones)) else {rc for rc, first in at.items() if first is arc}
-        firsts = [first for first in dict.fromkeys(at.values()) if first and ahead.isdisjoint(first.uses)]
-        shared = arc.touches & ~arc.excludes
-        crowd = [holder for holder in holders if holder.touches & shared and table.fits(arc, [holder])]
+        firsts = dict.fromkeys(first for first in at.values() if first is not None)
+        if arc not in firsts and self._takes_from(firsts, arc, holders, now_s):
+            return True  # most candidates end here
+        higher_ones = self._higher_than(arc)
+        if arc in firsts:
+            # Equality is not transitive: two ARCs can each be first at a common RC. The lower one then waits.
+            is_last = any(map(self._table.usable, higher_ones))
+            ahead = set() if is_last else {rc for rc, first in at.items() if first is arc}
+            if self._takes_from([first for first in firsts if ahead.isdisjoint(first.uses)], arc, holders, now_s):
+                return True
+        return self._takes_from([one for one in higher_ones if one not in firsts], arc, holders, now_s)
+
+    def _takes_from(self, others: Iterable[ArcEntry], arc: ArcEntry, holders: Sequence[ArcEntry], now_s: float) -> bool:
+        """Return whether the run of the ARC, beside those holders that leave it room, would delay one of the others."""
+        fits, end_s, shared = self._table.fits, self._must_be_done_s(arc, now_s), arc.touches & ~arc.excludes
+        crowd = [holder for holder in holders if holder.touches & shared and fits(arc, [holder])]
         return any(
             self._reserved_s(other, now_s, (arc,)) < end_s
-            for other in dict.fromkeys((*firsts, *higher_ones))
-            if other is not arc and not table.fits(arc, [other, *crowd]) and table.usable(other)
+            for other in others
+            if other is not arc and not fits(arc, [other, *crowd]) and self._table.usable(other)
         )
+
+    def _higher_than(self, arc: ArcEntry) -> list[ArcEntry]:
+        users = dict.fromkeys(user for rc in arc.uses for user in self._state.users[rc])
+        return [one for one in users if one.queued and one.level is not arc.level and one.goes_before(arc)]
 
     def _must_be_done_s(self, arc: ArcEntry, start_s: float) -> float:
         """Return when others may need the RCs of an ARC that starts then; hand-overs may use up the slack."""
@@ -76,19 +116,39 @@ class FirstInLine:
         known_s = self._reserved.get(arc)
         if known_s is not None:
             return known_s
-        table = self._table
-        in_the_way = [holder for holder in table.holders(arc) if not table.fits(arc, [holder])]
-        start_s = max([now_s, *(table.stands_until_s(holder, arc, now_s) for holder in in_the_way)])
-        if len(behind) > LOOK_AHEAD:
+        start_s, line = self._present.get(arc) or self._look_at(arc, now_s)
+        if len(behind) > LOOK_AHEAD or start_s == math.inf:
             return start_s
-        for rc in arc.uses if start_s < math.inf else ():
-            first = self.at(rc)
-            if first is None or first is arc or first in behind or table.fits(arc, [first]):
+        for first, is_higher in line:
+            if first in behind:
                 continue
-            if arc.reservation is not None and not first.goes_before(arc):
-                continue  # RCs freed for it by force are its own; only a higher ARC may need them first
             first_s = self._reserved_s(first, now_s, (*behind, arc))
             if first_s < self._must_be_done_s(arc, start_s):
-                start_s = math.inf if first.goes_before(arc) else max(start_s, first_s + first.length_s)
+                start_s = math.inf if is_higher else max(start_s, first_s + first.length_s)
         self._reserved[arc] = start_s
         return start_s
+
+    def _look_at(self, arc: ArcEntry, now_s: float) -> tuple[float, _Line]:
+        around, until_s = self._around_of(arc), self._table.stands_until_s
+        found = max([now_s, *[until_s(holder, arc, now_s) for holder in around.holders]]), around.line
+        self._present[arc] = found
+        return found
+
+    def _around_of(self, arc: ArcEntry) -> _Around:
+        """Return what surrounds the ARC at its RCs; it is collected anew when one of them has changed."""
+        versions = self._state.rc_versions
+        version = self._state.service_version + sum([versions.get(rc, 0) for rc in arc.uses])
+        known = self._around.get(arc)
+        if known is None or known.version != version:
+            if len(self._around) > 2 * len(self._state.arcs):
+                self._around.clear()  # it may hold ARCs that left
+            known = self._around[arc] = self._collected(arc, version)
+        return known
+
+    def _collected(self, arc: ArcEntry, version: int) -> _Around:
+        table = self._table
+        holders = [holder for holder in table.holders(arc) if not table.fits(arc, [holder])]
+        firsts = [first for first in map(self.at, arc.uses) if first is not None and first is not arc]
+        line = [(first, first.goes_before(arc)) for first in firsts if not table.fits(arc, [first])]
+        # RCs freed for it by force are its own; only a higher ARC may need them first.
+        return _Around(version, holders, [one for one in line if arc.reservation is None or one[1]])

@@ -15,7 +15,7 @@ from collections.abc import Collection, Iterable, Sequence
 from backbone.scheduling.entries import CONNECTED, INSTANT_S, ArcEntry
 from backbone.scheduling.planner import Hold, Slot, Turn
 from backbone.scheduling.preemption import in_the_way, must_let_higher_go_first
-from backbone.scheduling.priority import rank
+from backbone.scheduling.priority import rank_of
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
@@ -169,7 +169,7 @@ class Plan:
                 continue
             if not (self._among_equals or self._binds(begin_s, other, arc)):
                 continue
-            if other.level is not arc.level and rank(other.path, arc.path) > 0:
+            if other.level is not arc.level and rank_of(other, arc) > 0:
                 return math.inf
             if end_s > start_s:
                 start_s = end_s
@@ -182,7 +182,7 @@ class Plan:
         """Return whether the reservation of the other binds the ARC."""
         if begin_s <= self._now_s + INSTANT_S or other.reservation is not None:
             return True
-        return rank(other.path, arc.path) != 0
+        return rank_of(other, arc) != 0
 
     def _against(self, arc: ArcEntry, place: int) -> list[Hold]:
         """Return the ARCs at a common RC that prevent an earlier start, by the state of the search for its place."""
@@ -204,7 +204,7 @@ class Plan:
     def _earliest_in_a_crowd_s(self, arc: ArcEntry, from_s: float, length_s: float, against: Sequence[Hold]) -> float:
         """Return the first time at which the sharable RCs have room for the ARC's streams, too."""
         lasting = [
-            (other, begin_s, math.inf if begin_s > -math.inf and rank(other.path, arc.path) > 0 else end_s)
+            (other, begin_s, math.inf if begin_s > -math.inf and rank_of(other, arc) > 0 else end_s)
             for other, begin_s, end_s in against
         ]
         times = sorted({from_s, *(end_s for _, _, end_s in lasting if from_s < end_s < math.inf)})

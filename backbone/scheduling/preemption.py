@@ -14,7 +14,7 @@ from operator import attrgetter
 
 from backbone.scheduling.entries import CONNECTED, INSTANT_S, ArcEntry
 from backbone.scheduling.precedence import by_precedence
-from backbone.scheduling.priority import rank
+from backbone.scheduling.priority import rank_of
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
@@ -44,7 +44,7 @@ def in_the_way(
     holders = [holder for holder in group if holder.state in CONNECTED and holder.touches & arc.touches]
     movable = [holder for holder in holders if table.stands_until_s(holder, arc, now_s) <= now_s + INSTANT_S]
     staying = [holder for holder in holders if holder not in movable] + [p for p in pending if p.touches & arc.touches]
-    equals = [holder for holder in movable if holder.level is arc.level or not rank(holder.path, arc.path)]
+    equals = [holder for holder in movable if holder.level is arc.level or not rank_of(holder, arc)]
     return left_over(table, arc, staying, [holder for holder in movable if holder not in equals], equals)
 
 

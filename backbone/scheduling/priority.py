@@ -10,11 +10,41 @@ mission's root.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from typing import Protocol
+
 Path = tuple[tuple[str, int], ...]
 """Nodes from the root to the owner, each with its number among its siblings."""
 
-Level = tuple[Path, int]
-"""Path of a parent, and a number of its children; the children with this number are equals."""
+
+@dataclass(slots=True, eq=False)
+class Level:
+    """Siblings with the same number, which are equals: one object for all of them.
+
+    Attributes:
+        depth: Length of their paths.
+        ranks: Other level of the same depth → ``rank`` of any of these and any of those, as far as it is known.
+    """
+
+    depth: int
+    ranks: dict[Level, int] = field(default_factory=dict)
+
+    def __deepcopy__(self, _memo: object) -> Level:
+        """Return the level itself: copies of the schedule share it, because the ranks never change."""
+        return self
+
+
+class Placed(Protocol):
+    """Has a place in the order of priorities.
+
+    Attributes:
+        path: Its path.
+        level: The level of that path.
+    """
+
+    path: Path
+    level: Level
+
 
 CONSOLE = "console "  # a legal node name has no space, so a console is never mistaken for a node of the tree
 
@@ -38,3 +68,13 @@ def rank(a: Path, b: Path) -> int:
         if node_a is not node_b and node_a[0] != node_b[0]:
             return (node_a[1] > node_b[1]) - (node_a[1] < node_b[1])
     return (len(a) < len(b)) - (len(a) > len(b))
+
+
+def rank_of(a: Placed, b: Placed) -> int:
+    """Return the ``rank`` of two paths; it is computed once for each pair of levels."""
+    known = a.level.ranks.get(b.level)
+    if known is None:
+        known = rank(a.path, b.path)
+        if a.level.depth == b.level.depth:  # else one of the two may be above the other
+            a.level.ranks[b.level] = known
+    return known

@@ -29,6 +29,7 @@ from backbone.scheduling.groups import Group, Groups
 from backbone.scheduling.large_group import LargeGroupPlanner
 from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.packet_times import PacketTimes
+from backbone.scheduling.priority import Level
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
@@ -43,7 +44,7 @@ from backbone.scheduling.trace_writer import TraceWriter
 from backbone.scheduling.transitions import Transitions
 from backbone.scheduling.whole_group import WholeGroupPlanner
 
-FORM = 3
+FORM = 4
 """Grows when snapshots of an earlier release can no longer be read."""
 _OBJECTS: dict[str, type[Any]] = {
     kind.__name__: kind
@@ -71,6 +72,7 @@ _OBJECTS: dict[str, type[Any]] = {
             OpenDecision,
             ArcEntry,
             RcEntry,
+            Level,
         ),
     )
 }
@@ -85,6 +87,8 @@ _ENUMS: dict[str, type[Enum]] = {kind.__name__: kind for kind in (requests.Reque
 _CACHES = {
     "WholeGroupPlanner": {"_plans"},
     "Compatibility": {"_usable", "_admitted"},
+    "FirstInLine": {"_present", "_reserved", "_around"},
+    "Level": {"ranks"},
     "TraceWriter": {"_story"},
     "OpenDecision": {"instructions", "ended"},
 }

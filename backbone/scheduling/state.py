@@ -14,7 +14,7 @@ from backbone.scheduling.entries import HOLDING, Afterwards, ArcEntry, RcEntry
 from backbone.scheduling.events import RcKnown
 from backbone.scheduling.fairness import Discipline, EqualTime, Fairness, Turns
 from backbone.scheduling.groups import Group, Groups
-from backbone.scheduling.priority import Level, Path, rank
+from backbone.scheduling.priority import Level, Path, rank_of
 from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
 from backbone.scheduling.response_time import Analysis
 from backbone.scheduling.streams import stream
@@ -63,7 +63,7 @@ class ScheduleState:
         self.changed: dict[str, None] = {}
         self.bits: dict[str, int] = {}
         self._epochs_of_removed: dict[str, int] = {}
-        self._levels: dict[Level, Level] = {}
+        self._levels: dict[tuple[Path, int], Level] = {}
         self.held_alone = 0
 
     # Changes.
@@ -271,7 +271,7 @@ class ScheduleState:
     def rivals(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the equals that cannot run beside the ARC."""
         fits = self.compatibility.fits
-        return [other for other in self.beside(arc) if not rank(other.path, arc.path) and not fits(arc, [other])]
+        return [other for other in self.beside(arc) if not rank_of(other, arc) and not fits(arc, [other])]
 
     def group_of(self, arc: ArcEntry) -> Sequence[ArcEntry]:
         """Return the ARC's group; empty if the ARC is not active."""
@@ -286,5 +286,4 @@ class ScheduleState:
         return list(members.values())
 
     def _level_of(self, path: Path) -> Level:
-        level = (path[:-1], path[-1][1])
-        return self._levels.setdefault(level, level)
+        return self._levels.setdefault((path[:-1], path[-1][1]), Level(len(path)))

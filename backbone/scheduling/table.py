@@ -20,7 +20,7 @@ from operator import attrgetter
 from backbone.scheduling.entries import INSTANT_S, SOON_S, ArcEntry
 from backbone.scheduling.planner import Turn
 from backbone.scheduling.precedence import by_precedence
-from backbone.scheduling.priority import rank
+from backbone.scheduling.priority import rank_of
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.state import ScheduleState
 
@@ -79,7 +79,7 @@ class Table:
         """Return how long the holder, or the ARC itself while its RCs are being freed, blocks the ARC."""
         if holder.state is RequestState.REVOKING:
             return max(now_s + SOON_S, holder.since_s + holder.release_s)
-        before = 0 if holder.level is arc.level else rank(holder.path, arc.path)
+        before = 0 if holder.level is arc.level else rank_of(holder, arc)
         if before:
             return math.inf if before > 0 else now_s
         if holder.state is RequestState.CONNECTING:  # its slice begins with its grant, so it cannot be over yet
@@ -127,5 +127,5 @@ class Table:
 
     def runs_on(self, turn: Turn) -> bool:
         """Return whether the discipline prefers one of the blocking equals to the ARC whose turn it would be."""
-        equals = [holder for holder in turn.in_the_way if not rank(holder.path, turn.arc.path)]
+        equals = [holder for holder in turn.in_the_way if not rank_of(holder, turn.arc)]
         return any(self.state.runs_on(holder) for holder in equals)

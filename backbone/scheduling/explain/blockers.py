@@ -17,7 +17,7 @@ from backbone.scheduling.master_schedule import MasterSchedule
 from backbone.scheduling.plan import meeting
 from backbone.scheduling.planner import Slot
 from backbone.scheduling.preemption import left_over
-from backbone.scheduling.priority import higher, rank
+from backbone.scheduling.priority import higher, rank_of
 from backbone.scheduling.requests import RequestState
 
 FEWEST_OF = 24  # chosen: each costs one more plan; a longer list is not reduced
@@ -108,7 +108,7 @@ class Blockers:
         return [holder for holder in self._table.holders(arc) if self._stays(holder, arc, now_s)]
 
     def _stays(self, holder: ArcEntry, arc: ArcEntry, now_s: float) -> bool:
-        if not self._in_turns and not rank(holder.path, arc.path):
+        if not self._in_turns and not rank_of(holder, arc):
             return True  # whether its slice ends for this ARC depends on more than time
         return self._table.stands_until_s(holder, arc, now_s) > now_s + INSTANT_S
 
@@ -130,9 +130,7 @@ class Blockers:
     def _older_equals(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return equals that are behind the ARC only while an ARC waits that is higher than they are."""
         return [
-            one
-            for one in self._state.beside(arc)
-            if one.queued and one.stamp < arc.stamp and not rank(one.path, arc.path)
+            one for one in self._state.beside(arc) if one.queued and one.stamp < arc.stamp and not rank_of(one, arc)
         ]
 
     def _higher_ones(self, arc: ArcEntry) -> Iterator[ArcEntry]:

@@ -99,7 +99,7 @@ FAULTS = [
     Planted(
         "a lower ARC overlaps what a higher one reserved",
         "plan.py",
-        "if other.level is not arc.level and rank(other.path, arc.path) > 0:",
+        "if other.level is not arc.level and rank_of(other, arc) > 0:",
         "if False:",
     ),
     Planted(
@@ -197,8 +197,8 @@ FAULTS = [
     Planted(
         "the first in line of a large group is overtaken",
         "first_in_line.py",
-        "dict.fromkeys((*firsts, *higher_ones))",
-        "higher_ones",
+        "if arc not in firsts and self._takes_from(",
+        "if False and self._takes_from(",
     ),
     Planted(
         "two equals of a large group, each first where both want to be, wait for each other",
@@ -209,8 +209,8 @@ FAULTS = [
     Planted(
         "RCs freed by force in a large group stay free although a higher ARC needs one of them first",
         "first_in_line.py",
-        "if arc.reservation is not None and not first.goes_before(arc):",
-        "if arc.reservation is not None:",
+        "if arc.reservation is None or one[1]]",
+        "if arc.reservation is None]",
     ),
     Planted(
         "a slice ends although it is awaited by none",

@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from backbone.scheduling.precedence import by_precedence
-from backbone.scheduling.priority import higher
+from backbone.scheduling.priority import higher, rank, rank_of
 from backbone.scheduling.priority_tree import PriorityTree
-from backbone.scheduling.requests import PathNode
+from backbone.scheduling.requests import PathNode, SchedulingRequest
+from backbone.scheduling.state import ScheduleState
 
 Tree = dict[str, tuple[str | None, int]]  # node → (parent, number)
 
@@ -56,6 +57,20 @@ def test_higher_is_what_walking_up_to_the_common_parent_says(tree):
     for a in tree:
         for b in tree:
             assert higher(path(tree, a), path(tree, b)) == higher_by_walking_up(tree, a, b)
+
+
+@settings(max_examples=share(100))
+@given(trees())
+def test_ranks_of_arcs_are_those_of_their_owners_paths_also_when_they_are_known(tree):
+    state = ScheduleState(discipline="turns", admission="exact", tolerance_s=0.05, exact_up_to=64)
+    arcs = []
+    for node in tree:
+        way = path(tree, node)
+        request = SchedulingRequest(node, node, [PathNode(*one) for one in way], False, [{}], 1.0)
+        arcs.append(state.add_arc(request, {}, tuple(name for name, _ in way), way, 0.0, 0.0))
+    for _again in range(2):
+        for a in arcs:
+            assert [rank_of(a, b) for b in arcs] == [rank(a.path, b.path) for b in arcs]
 
 
 @settings(max_examples=share(100))
