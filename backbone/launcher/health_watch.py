@@ -19,6 +19,7 @@ from backbone.printable import printable_all
 from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope
 
+MOMENT_S = 0.01  # chosen: a rest shorter than the clock's rounding would never pass; machine seconds
 REST_S = 5.0  # chosen: heartbeats, tokens and states show every fault but one: a service that beats without answering
 
 
@@ -117,8 +118,8 @@ class HealthWatch:
         return health(others, missed, self._clock.now_s(), self._clock.rate)
 
     def _due_in_s(self) -> float:
-        """Return how long the last published health suffices if nothing changes. Machine seconds."""
-        return max(0.0, SAY_EVERY_S - (self._clock.now_s() - self._said_s) / self._clock.rate)
+        """Return how long the last published health suffices if nothing changes, at least ``MOMENT_S``."""
+        return max(MOMENT_S, SAY_EVERY_S - (self._clock.now_s() - self._said_s) / self._clock.rate)
 
     def _say(self) -> None:
         said, now_s = self._health(), self._clock.now_s()
