@@ -82,8 +82,8 @@ class FirstInLine:
         higher_ones = self._higher_than(arc)
         if arc in firsts:
             # Equality is not transitive: two ARCs can each be first at a common RC. The lower one then waits.
-            is_last = any(map(self._table.usable, higher_ones))
-            ahead = set() if is_last else {rc for rc, first in at.items() if first is arc}
+            higher_waits = any(map(self._table.usable, higher_ones))
+            ahead = set() if higher_waits else {rc for rc, first in at.items() if first is arc}
             if self._takes_from([first for first in firsts if ahead.isdisjoint(first.uses)], arc, holders, now_s):
                 return True
         return self._takes_from([one for one in higher_ones if one not in firsts], arc, holders, now_s)

@@ -34,7 +34,7 @@ class Level:
         return self
 
 
-class Placed(Protocol):
+class Ranked(Protocol):
     """Has a place in the order of priorities.
 
     Attributes:
@@ -70,7 +70,7 @@ def rank(a: Path, b: Path) -> int:
     return (len(a) < len(b)) - (len(a) > len(b))
 
 
-def rank_of(a: Placed, b: Placed) -> int:
+def rank_of(a: Ranked, b: Ranked) -> int:
     """Return the ``rank`` of two paths; it is computed once for each pair of levels."""
     known = a.level.ranks.get(b.level)
     if known is None:

@@ -1,4 +1,4 @@
-"""A Ctrl-C is not lost, whatever Python does when it comes."""
+"""A Ctrl-C ends the program, also while Python imports a module or runs a callback."""
 
 from __future__ import annotations
 
