@@ -252,7 +252,8 @@ class _Shade:
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
         self._colors = model.geom_rgba.copy()
-        self._roots = np.unique(model.body_rootid[(model.body_weldid != 0) | (model.body_mocapid >= 0)])
+        moves = (model.body_weldid != 0) | (model.body_mocapid >= 0)
+        self._roots = np.array(sorted(set(model.body_rootid[moves])))  # np.unique would import numpy.ma, 2 MB
         self._root_of_geom = model.body_rootid[model.geom_bodyid]
         sites = [site for site in range(model.nsite) if model.site(site).name.startswith(_DARK)]
         self._low_m = model.site_pos[sites] - model.site_size[sites]
