@@ -19,6 +19,8 @@ from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
 from backbone.scheduling.response_time import Analysis
 from backbone.scheduling.streams import stream
 
+MOST_EMPTY_LEVELS = 64  # chosen: they are forgotten long before they cost memory, and seldom
+
 
 class ScheduleState:
     """The present state.
@@ -205,6 +207,7 @@ class ScheduleState:
         """Set the places of these ARCs in the tree, and their numbers."""
         for arc, place, path in paths:
             arc.place_in_tree, arc.path, arc.level = place, path, self._level_of(path)
+        self._forget_levels()
         self._service_changed([*self.rcs])
 
     def raise_to(self, arc: ArcEntry, levels: int) -> None:
@@ -287,3 +290,12 @@ class ScheduleState:
 
     def _level_of(self, path: Path) -> Level:
         return self._levels.setdefault((path[:-1], path[-1][1]), Level(len(path)))
+
+    def _forget_levels(self) -> None:
+        """Forget levels without ARCs, and their ranks, when they are the majority."""
+        if len(self._levels) <= MOST_EMPTY_LEVELS + 2 * len(self.arcs):
+            return
+        present = {arc.level for arc in self.arcs.values()}
+        self._levels = {place: level for place, level in self._levels.items() if level in present}
+        for level in present:
+            level.ranks = {other: known for other, known in level.ranks.items() if other in present}

@@ -1,5 +1,7 @@
 """Context switches, wishes and faults, as the schedule manager decides on them."""
 
+import gc
+
 import pytest
 from simulated_switches import REPAIR_S, Bench, all_of, ask, load, manager, sharable, states, unit
 
@@ -306,6 +308,19 @@ def test_a_changed_priority_decides_at_once():
     bench.run(20.0)
     assert bench.runs("a") == [(0, 7)]
     assert bench.runs("b") == [(7, None)]
+    assert bench.verdict() == []
+
+
+def test_priorities_set_to_ever_other_numbers_take_no_memory():
+    bench = Bench(manager(), unit("v"))
+    bench.tell(ask("a", "v"))
+    bench.tell(ask("b", "v"))
+    for number in range(1000):
+        bench.tell(PriorityChanged(f"owner-{'ab'[number % 2]}", 10 + number))
+        bench.run(bench.now_s + 0.1)
+    levels = [bench.manager.master_schedule.state.arcs[arc].level for arc in ("a", "b")]
+    reached = gc.get_referrers(*levels)
+    assert max(len(one) for one in reached if isinstance(one, dict)) < 100
     assert bench.verdict() == []
 
 
