@@ -44,6 +44,7 @@ MAX_MESSAGE_BYTES = 8 * 1024 * 1024  # chosen: a 1080p colour frame (6.2 MB) fit
 MAX_LARGE_MESSAGE_BYTES = (
     64 * 1024 * 1024
 )  # chosen: a 4K picture in color is 25 MB; of ``LARGE`` conversations on a host
+LONGEST_QUOTED = 100  # chosen: a name and the first words of a sentence, in a refusal
 
 
 class Message(
@@ -121,10 +122,14 @@ class OversizedMessage(Refusal):
 
 
 class UnwritableMessage(Refusal):
-    """The message has a whole number of more than 64 bits, which MessagePack cannot encode."""
+    """The message has a number or a text that MessagePack cannot encode.
+
+    These are whole numbers of more than 64 bits, and texts with a lone surrogate, which Python makes of bytes that are
+    not UTF-8.
+    """
 
     code = "wire.unwritable"
-    remedy = "Give a smaller number."
+    remedy = "Give a smaller number, or a text in UTF-8."
 
 
 class UnknownMessage(Refusal):
@@ -157,12 +162,15 @@ def write(envelope: Envelope[Message], most_bytes: int = MAX_MESSAGE_BYTES) -> b
 
     Raises:
         OversizedMessage: The message is longer than ``most_bytes``.
-        UnwritableMessage: A whole number in it has more than 64 bits.
+        UnwritableMessage: A whole number in it has more than 64 bits, or a text has a lone surrogate.
     """
     try:
         raw = _encoder.encode(envelope)
     except OverflowError as error:
         raise UnwritableMessage(f"{type(envelope.body).__name__} has a whole number of more than 64 bits") from error
+    except UnicodeEncodeError as error:
+        what = f"{type(envelope.body).__name__} has a text that is not UTF-8"
+        raise UnwritableMessage(f"{what}: {error.object!a:.{LONGEST_QUOTED}}") from error
     if len(raw) > most_bytes:
         refuse_oversized(len(raw), most_bytes, type(envelope.body).__name__)
     return raw

@@ -38,6 +38,7 @@ from backbone.component.story import StoryBook, feedback_of
 from backbone.component.unreadable_keys import UnreadableKeys
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
+from backbone.printable_text import printable
 from backbone.waiting import bug_of, first_of
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 
@@ -238,7 +239,8 @@ class Component(Generic[P_co]):
         return task
 
     def report(self, feedback: str) -> None:
-        """Set the feedback, one line for people; it is published soon if it has changed."""
+        """Set the feedback, which is made one printable line for people; it is published soon if it has changed."""
+        feedback = printable(feedback)
         if feedback != self.feedback:
             self.feedback = feedback
             self.changed()

@@ -10,6 +10,7 @@ from backbone.bus.interface import Clock, current_cause
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.naming import component_of
 from backbone.printable import printable_all
+from backbone.printable_text import printable
 from backbone.ranges import LONGEST_MENTION
 
 LENGTH = 512  # chosen: some minutes of a busy component, under 100 kB
@@ -68,5 +69,5 @@ def _spoken_of(name: str) -> re.Pattern[str]:
 
 
 def feedback_of(bug: BaseException) -> str:
-    """Return a bug as one line of a component's feedback."""
-    return f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]
+    """Return a bug as one printable line of a component's feedback; any program can write its text."""
+    return printable(f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH])

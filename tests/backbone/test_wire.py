@@ -39,6 +39,15 @@ def test_a_number_that_no_message_can_say_is_refused_with_a_remedy(number: int) 
     assert refused.value.remedy
 
 
+@pytest.mark.parametrize("word", ["w\udcffchter", "\ud800", "a" * 300_000 + "\udcff"], ids=["name", "half", "long"])
+def test_a_text_that_no_message_can_say_is_refused_with_a_remedy(word: str) -> None:
+    """Python reads such a text from a command line, a file name or JSON."""
+    with pytest.raises(UnwritableMessage, match="Stop has a text that is not UTF-8") as refused:
+        write(Envelope(WIRE_VERSION, SOURCE, 1, 0.0, "", Stop(word)))
+    assert "UTF-8" in refused.value.remedy
+    write(Envelope(WIRE_VERSION, SOURCE, 1, 0.0, "", Refused.of(refused.value)))
+
+
 class Sighting(Message, frozen=True, tag="Sighting/3"):
     """A message of a later version than the first."""
 

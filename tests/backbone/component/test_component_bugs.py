@@ -8,12 +8,14 @@ import logging
 import pytest
 from component_stage import TOWER, Poke, Poked, Stage, TooSteep, live
 
+from backbone.component.component import CALM_S
 from backbone.component.messages import (
     LifeState,
 )
 from backbone.component.story import MAX_FEEDBACK_LENGTH
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
+from backbone.wire import WIRE_VERSION, Envelope, write
 
 # Bugs
 
@@ -136,6 +138,27 @@ def test_a_refusal_is_no_bug() -> None:
         assert (await stage.ask(Poke("x"), Poked)).count == 2
         stage.walker.end("enough")
         await life
+
+    live(law())
+
+
+def test_a_complaint_about_a_file_whose_name_is_not_utf8_is_told() -> None:
+    """Python names such a file with lone surrogates, which no message can contain."""
+
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        stage.walker.report("reads w\udce4ge.png")
+        await stage.clock.sleep_s(CALM_S + 0.1)
+        stage.walker.fail(FileNotFoundError("w\udce4ge.png"))
+        with pytest.raises(FileNotFoundError):
+            await life
+        await stage.clock.sleep_s(0.1)
+        told = [state.feedback for state in stage.states if state.feedback]
+        assert told[0] == r"reads w\udce4ge.png"
+        assert told[-1] == r"FileNotFoundError: w\udce4ge.png"
+        for state in stage.states:
+            write(Envelope(WIRE_VERSION, TOWER, 1, 0.0, "", state))
 
     live(law())
 
