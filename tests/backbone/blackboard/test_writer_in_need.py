@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from taking import WITHIN_S, Count
@@ -51,6 +52,31 @@ async def test_without_descriptors_a_newcomer_waits_and_its_writer_does_not_spin
     writer.close()
     if thread is not None:
         await asyncio.to_thread(thread.join, WITHIN_S)
+
+
+async def test_a_newcomer_is_admitted_although_the_timer_of_the_loop_is_early(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As those of uvloop, which count whole milliseconds: here the machine's clock does not go on at all."""
+    accept, refusals, now_s = sealed_memory.accept, list[int](), time.monotonic()
+
+    def refuse_once(listening: socket.socket) -> socket.socket:
+        if not refusals:
+            refusals.append(1)
+            raise OSError(errno.EMFILE, "no descriptors")
+        return accept(listening)
+
+    monkeypatch.setattr(writers, "ACCEPT_AGAIN_S", 0.05)
+    monkeypatch.setattr(writers, "time", SimpleNamespace(monotonic=lambda: now_s))
+    monkeypatch.setattr(sealed_memory, "accept", refuse_once)
+    writer = BlackboardWriter(folder, "room")
+    writer.serve_in_loop()
+    writer.put(b"first")
+    for reader in (BlackboardReader(folder, "room"), BlackboardReader(folder, "room")):
+        assert bytes((await asyncio.wait_for(reader.next(), WITHIN_S)).data) == b"first"
+        reader.close()
+    assert refusals
+    writer.close()
 
 
 def test_a_writer_that_is_closed_while_its_thread_looks_ends_that_thread(
