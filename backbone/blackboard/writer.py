@@ -112,7 +112,7 @@ class BlackboardWriter:
         directory: Folder of the boards; made if there is none. Only this user may be able to enter it.
         name: A legal name.
         most_bytes: Longest value.
-        keeps: False: without a reader nothing is kept, so a newcomer never gets an old value.
+        keeps: False: a value is for the present readers, so a newcomer never gets an old one.
         each: True: a reader gets each value put after its coming, in order; a value that its full socket does not admit
             is lost.
 
@@ -136,7 +136,7 @@ class BlackboardWriter:
             raise NoBlackboard("sealed memory files need Linux")
         self._directory, self._name, self._most, self._each = directory, name, most_bytes, each
         self.keeps = keeps
-        """False: without a reader nothing is kept; settable."""
+        """False: a value is for the present readers; settable."""
         self._socket_name, self._lock_name = files_of(name)
         held = sealed_memory.lock(directory, self._lock_name)
         if held is None:
@@ -185,12 +185,12 @@ class BlackboardWriter:
             self._newest = sent
             for descriptor in tuple(self._readers):
                 self._send_to(descriptor, sent)
-            if self._each:
+            if self._each or not self.keeps:
                 self._forget()
         return self.number
 
     def serve(self) -> None:
-        """Admit new readers, which get the newest value at once, and remove readers that have ended. Never waits."""
+        """Admit new readers, which get the newest value at once if it is kept, and remove ended ones. Never waits."""
         with self._guard:
             if self._is_open and time.monotonic() >= self._accept_again_s:
                 self._accept_again_s = math.inf
@@ -200,8 +200,6 @@ class BlackboardWriter:
                     self._accept()
                 elif descriptor in self._readers:
                     self._hear(descriptor)
-            if not (self.keeps or self._readers):
-                self._forget()
 
     def serve_in_loop(self) -> None:
         """Call ``serve`` when readers come or go, in the running event loop; close the writer there."""
@@ -284,7 +282,7 @@ class BlackboardWriter:
         except OSError:
             self._let_go(descriptor)
             return
-        if self._newest is not None:
+        if self.keeps and self._newest is not None:
             self._send_to(descriptor, self._newest)
 
     def _send_to(self, descriptor: int, sent: _Outgoing) -> None:

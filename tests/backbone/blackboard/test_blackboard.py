@@ -113,6 +113,26 @@ def test_without_readers_nothing_is_kept_if_so_asked(folder: Path) -> None:
     writer.close()
 
 
+def test_a_newcomer_gets_no_old_value_beside_another_reader_either_if_so_asked(
+    folder: Path, descriptors: Count
+) -> None:
+    writer = BlackboardWriter(folder, "room", keeps=False)
+    first = BlackboardReader(folder, "room")
+    writer.put(b"a" * 200_000)
+    assert taken(first).number == 1
+    before = descriptors()
+    second = BlackboardReader(folder, "room")
+    writer.serve()
+    assert second.newest() is None
+    writer.put(b"b" * 200_000)
+    assert (taken(first).number, taken(second).number) == (2, 2)
+    second.close()
+    writer.serve()
+    assert descriptors() == before
+    writer.close()
+    first.close()
+
+
 def test_a_value_stays_as_long_as_it_is_looked_at(folder: Path, descriptors: Count) -> None:
     before = descriptors()
     writer = BlackboardWriter(folder, "room")

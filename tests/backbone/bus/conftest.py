@@ -23,7 +23,7 @@ from bus_laws import (
 )
 from free_ports import free_endpoint
 
-from backbone.bus import host_boards
+from backbone.bus import host_boards, zenoh_outlets
 from backbone.bus.clock import MissionClock, VirtualClock, VirtualLoop
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
@@ -46,7 +46,7 @@ def on_bus(request: pytest.FixtureRequest, folder: Path, monkeypatch: pytest.Mon
         network = LocalNetwork("conformance")
         await run_and_close(law, Net(network.join, VirtualClock()))
 
-    monkeypatch.setattr(host_boards, "LARGE_BYTES", 0)
+    monkeypatch.setattr(zenoh_outlets, "LARGE_BYTES", 0)
 
     async def on_zenoh(law: Law, directory: str) -> None:
         endpoint = free_endpoint()

@@ -109,6 +109,27 @@ def test_latest_ends_with_the_newest_of_a_burst(on_bus: Runner) -> None:
     on_bus(law)
 
 
+def test_a_newcomer_hears_nothing_from_before_also_if_another_listener_heard_it(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, first, second = net.join(SERVER), net.join(ASKER), net.join(THIRD)
+        early, late, sent = Heard(), Heard(), 20
+        first.subscribe(SERVER, Conversation.FRAMES, News, early, latest=True)
+        await until_known(first, source)
+        for number in range(sent):
+            source.publish(SERVER, Conversation.FRAMES, News(number))
+            await net.clock.sleep_s(0.01)  # so that the first listener has found its way to the sender
+        await early.until(lambda all_: all_[-1].body.number == sent - 1, "the newest of the early ones")
+        second.subscribe(SERVER, Conversation.FRAMES, News, late, latest=True)
+        await until_known(second, source)
+        await net.clock.sleep_s(0.1)
+        source.publish(SERVER, Conversation.FRAMES, News(sent))
+        for heard in (early, late):
+            await heard.until(lambda all_: bool(all_) and all_[-1].body.number == sent, "the next one")
+        assert late.numbers() == [sent]
+
+    on_bus(law)
+
+
 def test_a_publication_of_an_unexpected_schema_is_counted_and_skipped(on_bus: Runner) -> None:
     async def law(net: Net) -> None:
         source, listener = net.join(SERVER), net.join(ASKER)
