@@ -90,7 +90,7 @@ class HostCopies:
         self._is_full = False
         self._look_again_s = -math.inf
         self.dropped = 0
-        """Copies that were dropped because the recorder was too slow."""
+        """Copies that were dropped because the present recorder, or else the last one, was too slow."""
         self.reach_mission = False
         """Whether the copies go to the recorder of the mission, not to that of one of its other hosts."""
         self._connect()
@@ -133,7 +133,7 @@ class HostCopies:
             except OSError:
                 made.close()
             else:
-                self._socket, self.reach_mission = made, name == MISSION_SOCKET
+                self._socket, self.reach_mission, self.dropped = made, name == MISSION_SOCKET, 0
                 self._loop.add_reader(made, self._ended)
                 return
 

@@ -122,6 +122,24 @@ async def test_a_recorder_that_begins_right_after_another_has_ended_gets_the_fir
     copies.close()
 
 
+async def test_a_recorder_counts_no_copies_that_were_dropped_before_it_began(folder: Path) -> None:
+    first, second = Heard(), Heard()
+    async with listening(folder, first) as ear:
+        copies = HostCopies(folder)
+        for _ in range(100):  # without a turn for the recorder
+            copies.send(KEY, bytes(100_000))
+        await until(lambda: len(first) == 100 - copies.dropped, "what was not dropped came")
+        copies.send(KEY, b"after")
+        await until(lambda: ear.dropped > 0, "the first recorder knows that some were dropped")
+    async with listening(folder, second) as ear:
+        await asyncio.sleep(0.01)  # the system reports the end of the first at once
+        assert copies.find_recorder()
+        copies.send(KEY, b"2")
+        await until(lambda: second == [(KEY, b"2")], "the second recorder heard it")
+        assert ear.dropped == 0
+    copies.close()
+
+
 async def test_a_process_knows_whether_its_copies_reach_the_recorder_of_the_mission(folder: Path) -> None:
     async with listening(folder, Heard(), is_of_mission=False):
         of_host = HostCopies(folder)
