@@ -82,6 +82,8 @@ class BusBase(ABC):
             act(*arguments)
         except Exception as bug:
             self.on_bug(bug)
+        except asyncio.CancelledError:  # as of the result of a cancelled task; nobody can cancel a callback
+            self.on_bug(RuntimeError(f"a callback of {self.source} raised CancelledError"))
         finally:
             current_cause.reset(token)
 

@@ -72,6 +72,30 @@ def test_a_bug_in_a_listener_goes_to_on_bug_and_does_not_stop_the_others(on_bus:
     on_bus(law)
 
 
+def test_a_listener_that_takes_the_result_of_a_cancelled_task_has_a_bug_like_others(on_bus: Runner) -> None:
+    async def law(net: Net) -> None:
+        source, listener, work = net.join(SERVER), net.join(ASKER), asyncio.get_running_loop().create_future()
+        heard, lives, bugs = Heard(), Heard(), Heard()
+        listener.on_bug = bugs
+        work.cancel()
+
+        def stumble(*_what: Any) -> None:
+            work.result()
+
+        for listen in (stumble, heard):
+            listener.subscribe(SERVER, Conversation.EVENTS, News, listen)
+            listener.watch_alive("resource_pool/*", stumble if listen is stumble else lives)
+        await until_known(listener, source)
+        source.publish(SERVER, Conversation.EVENTS, News(1))
+        source.declare_alive("resource_pool/scout1")
+        await heard.until_count(1)
+        await lives.until_count(1)
+        await bugs.until_count(2)
+        assert [str(bug) for bug in bugs.all] == [f"a callback of {ASKER} raised CancelledError"] * 2
+
+    on_bus(law)
+
+
 def test_what_passed_is_counted(on_bus: Runner) -> None:
     async def law(net: Net) -> None:
         async def answer(asked: Envelope[Any]) -> Message:
