@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import socket
 import struct
 from collections import deque
@@ -109,6 +110,7 @@ class HostLine:
         self._waiting: deque[bytes] = deque()
         self._waiting_bytes = 0
         self._is_full = False
+        self._most_at_once: float = MOST_AT_ONCE  # without limit once the peer has ended: uvloop reports an error once
         self.is_open = True
         self._loop.add_reader(connected, self._read)
 
@@ -137,12 +139,17 @@ class HostLine:
             self._ended(self)
 
     def _read(self) -> None:
-        for _packet in range(MOST_AT_ONCE):
+        count = 0
+        while count < self._most_at_once:
+            count += 1
             try:
                 packet = self._socket.recv(MOST_PACKET_BYTES)
                 message = self._came.take(packet) if packet else None
             except BlockingIOError:
                 return
+            except ConnectionResetError:  # the peer ended and left a message unread: what it had sent comes now
+                self._most_at_once = math.inf
+                continue
             except (OSError, ValueError) as error:
                 log.info("a line to a process of this host ends: %s", error)
                 packet, message = b"", None
@@ -163,6 +170,11 @@ class HostLine:
             if not self._is_full:
                 self._is_full = True
                 self._loop.add_writer(self._socket, self._send_waiting)
+        except (BrokenPipeError, ConnectionResetError):  # the peer has ended: ``_read`` closes after its last answers
+            self._most_at_once = math.inf
+            self._waiting.clear()
+            self._waiting_bytes = 0
+            self._loop.remove_writer(self._socket)
         except OSError as error:
             log.info("a line to a process of this host ends: %s", error)
             self.close()

@@ -12,12 +12,14 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 
 import pytest
+import uvloop
 from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus import host_lines
 from backbone.bus.answers import Came, NoInbox
 from backbone.bus.host_lines import (
+    MOST_AT_ONCE,
     MOST_PACKET_BYTES,
     Gathering,
     HostLines,
@@ -181,6 +183,44 @@ async def test_the_end_of_a_process_ends_its_open_questions_after_the_answers_th
     assert await slow is None
     assert lost == [way]
     assert asker.way(server.name, INBOX, lost.append) is None
+
+
+@pytest.mark.parametrize("make_loop", [asyncio.new_event_loop, uvloop.new_event_loop], ids=["asyncio", "uvloop"])
+@pytest.mark.parametrize("when", ["before", "after"])
+@pytest.mark.parametrize("count", [1, 2 * MOST_AT_ONCE])
+def test_answers_of_a_process_that_ended_come_although_it_left_a_question_unread(
+    count: int, when: str, make_loop: Callable[[], asyncio.AbstractEventLoop]
+) -> None:
+    """The question came before the end, or after it. The system reports its loss before it gives the answers."""
+
+    async def law() -> None:
+        loop, (listening, name), asker = asyncio.get_running_loop(), local_sockets.listen(), HostLines()
+        way = way_from(asker, name)
+        peer = local_sockets.accept(listening)
+
+        async def ask_if_open(payload: bytes) -> Came:
+            return await way.ask(payload, loop.create_future()) if way.is_open else None
+
+        asked = [loop.create_task(ask_if_open(b"%d" % number)) for number in range(count)]
+        if when == "before":
+            asked.append(loop.create_task(ask_if_open(b"unread")))
+        await asyncio.sleep(0.01)
+        for _ in range(count):
+            question = Gathering().take(peer.recv(MOST_PACKET_BYTES))
+            assert question is not None
+            [answer] = packets_of(question[0], Kind.ANSWER, b"here")
+            peer.send(answer)
+        peer.close()
+        if when == "after":
+            asked.append(loop.create_task(ask_if_open(b"unread")))
+        async with asyncio.timeout(DEADLINE_S):
+            assert await asyncio.gather(*asked) == [*[b"here"] * count, None]
+        assert not way.is_open
+        listening.close()
+        asker.close()
+
+    with asyncio.Runner(loop_factory=make_loop) as runner:
+        runner.run(law())
 
 
 async def test_a_peer_that_takes_nothing_costs_little(
