@@ -42,6 +42,7 @@ from backbone.rc_manager.messages import (
     Withdraw,
 )
 from backbone.scheduling.requests import Usage
+from backbone.waiting import set_within
 from backbone.wire import Accepts, Envelope, Message, kinds_of
 from resource_pool.arc_commands import ArcCommands
 from resource_pool.arc_request import ROBOT, ArcParameters, request_of, require_runtime
@@ -322,15 +323,14 @@ class AggregateResourceController(Component[ArcParameters]):
             self._offering = self.start_task(self._slice.offer(noted), "offer more")
 
     async def _close(self, order: CloseGate) -> GateClosed:
+        closing = self._gate.epochs
         if order.deadline_s > 0 and self._gate.is_open:
             notice = Suspending(self.name, order.reason, order.by, order.deadline_s)
             within_s = order.deadline_s / self.clock.rate
-            try:
-                async with asyncio.timeout(within_s):
-                    await self._notices.notify(notice, within_s).wait()
-            except TimeoutError:
+            if not await set_within(self._notices.notify(notice, within_s), within_s):
                 self.story.note(self._owner, "was not ready when its time to stop cleanly was over")
-        self._shut(order.reason, order.by, order.expected_s)
+        if self._gate.epochs == closing:  # the RC manager may not have waited, and have connected the ARC anew
+            self._shut(order.reason, order.by, order.expected_s)
         return GateClosed()
 
     def _shut(self, reason: str, by: str, expected_s: float) -> None:

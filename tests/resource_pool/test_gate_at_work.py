@@ -10,7 +10,7 @@ from pool_on_local_network import Pool, a_pool
 from pool_orders import ROBOTS, at, connect, connect_robot
 
 from backbone.bus.clock import run_virtual
-from backbone.errors import Refusal
+from backbone.errors import Refusal, ReplyTimeout
 from backbone.rc_manager.messages import CloseGate, GateClosed, GateOpens, OpenGate
 from backbone.wire import Envelope
 from resource_pool.messages import LoadPacket, PacketLoaded, SwappedOut
@@ -36,6 +36,31 @@ def test_a_close_before_the_set_has_settled_wins(local_mission: Any) -> None:
             with pytest.raises(SwappedOut):
                 await arc.drive(1.0, 1.0)
             assert "Resumed" not in owner.heard()
+            await pool.kill(arc.arc)
+
+    run_virtual(main())
+
+
+def test_a_close_that_is_late_does_not_shut_the_next_connection(local_mission: Any) -> None:
+    """The owner takes all its time to stop; the RC manager no longer waits for that, and connects the ARC anew."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ROBOTS, manager=False) as pool:
+            arc = await waiting_arc(pool, "drive")
+            owner, manager = pool.running["watcher"], pool.manager_voice
+            for epoch in (1, 2):
+                epochs = {"scout1": epoch, "radio": epoch}
+                await connect_robot(pool, arc.arc, epoch)
+                await manager.ask(arc.address, OpenGate(epochs, 0.0, 10.0), GateOpens, within_s=2)
+                if epoch == 1:
+                    await pool.clock.sleep_s(0.1)
+                    owner.slow_s = 1.0
+                    close = CloseGate("slice", "other", 0.2, -1.0)
+                    with pytest.raises(ReplyTimeout):
+                        await manager.ask(arc.address, close, GateClosed, within_s=0.15)
+            await pool.clock.sleep_s(1.5)
+            assert (await arc.state()).epochs == epochs
+            assert (await arc.drive(1.0, 1.0)).epoch == 2
             await pool.kill(arc.arc)
 
     run_virtual(main())
