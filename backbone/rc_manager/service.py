@@ -281,6 +281,9 @@ class RcManager(Component[RcManagerParameters]):
         for at_s, event in adopted:
             self._arcs.remember(event.request.arc)
             self.happened(event, at_s)
+        for _, event in adopted:
+            if event.request.idle:  # it sent that while no RC manager answered
+                self.happened(Idled(event.request.arc))
         for arc, current in found.arcs.items():
             if not found.holds_rightly(arc):
                 self.admit_again(current)

@@ -127,6 +127,29 @@ def test_who_wanted_to_be_idle_is_idle_for_the_next_rc_manager_too(local_mission
     run_virtual(main())
 
 
+def test_an_arc_that_wants_to_be_idle_while_no_rc_manager_answers_frees_its_rcs_at_the_next_one(
+    local_mission: Any,
+) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ROBOTS) as pool:
+            owner, arc = await granted(pool)
+            await pool.kill("rc_manager")
+            with pytest.raises(Refusal, match="no answer"):
+                await arc.idle()
+            await pool.manager()
+            await pool.clock.sleep_s(0.5)
+            assert owner.heard() == ["Resumed", "Suspended"]
+            _, other = await pool.console("other", "drive", "scout1", priority=1)
+            await pool.clock.sleep_s(0.5)
+            assert other.granted is not None
+            await pool.end(other.arc)
+            await arc.idle(False)
+            await pool.clock.sleep_s(0.5)
+            assert owner.heard() == ["Resumed", "Suspended", "Resumed"]
+
+    run_virtual(main())
+
+
 def test_run_times_that_were_changed_are_those_the_next_rc_manager_hears(local_mission: Any) -> None:
     async def main() -> None:
         async with a_pool(local_mission, ROBOTS) as pool:

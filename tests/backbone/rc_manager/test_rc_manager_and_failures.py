@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from rc_manager_at_work import HARDWARE, PlainArc, request
 from trace_checker import check
@@ -254,6 +255,27 @@ def test_the_trace_after_a_restart_shows_the_slice_that_goes_on_as_it_was(pool: 
     grant = next(line for line in lines if line["ev"] == "grant")
     assert (grant["arc"], grant["t"]) == ("one", pytest.approx(granted_s))
     assert [line["arc"] for line in lines if line["ev"] == "grant"] == ["one", "two"]
+    assert check(lines) == []
+
+
+def test_the_trace_after_a_restart_shows_that_an_adopted_arc_wants_no_time_now(pool: Any) -> None:
+    async def main() -> Path:
+        async with pool() as here:
+            one, two = await here.arc("one"), await here.arc("two")
+            async with here.beside(here.manager()):
+                await one.ask_for(request("one", "left", "radio"))
+                await two.ask_for(request("two", "left", "radio"))
+                await here.clock.sleep_s(2.0)
+            assert one.request is not None
+            one.request = msgspec.structs.replace(one.request, idle=True)
+            async with here.beside(here.manager()):
+                await here.clock.sleep_s(1.0)
+                assert (one.is_open, two.is_open) == (False, True)
+            return here.trace
+
+    lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
+    lines = lines[[line["ev"] for line in lines].index("meta", 1) :]
+    assert [line["ev"] for line in lines if line.get("arc") == "one"][-3:] == ["idle", "revoke", "free"]
     assert check(lines) == []
 
 
