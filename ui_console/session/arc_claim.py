@@ -57,7 +57,7 @@ class ArcClaim:
         self._last: tuple[str, dict[str, object]] | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._frames: Subscription | None = None
-        self._giving_back, self._takes_next = asyncio.Lock(), False
+        self._giving_back, self._releases, self._takes_next = asyncio.Lock(), 0, False
         self._decided = asyncio.Event()
         self._grants = 0
         self._kinds = KindFinder(console, controls.know)
@@ -87,8 +87,8 @@ class ArcClaim:
 
     # ------------------------------------------------------------------ claim
     def take(self) -> None:
-        """Claim the robot unless it is claimed; if a release is in progress, claim it right afterwards."""
-        if self._giving_back.locked():
+        """Claim the robot unless it is claimed; if releases are in progress, claim it right after the last one."""
+        if self._releases:
             self._takes_next = True
             self._decided.clear()
             return
@@ -165,11 +165,16 @@ class ArcClaim:
             for_good: End the ARC even if it could rest.
             wanted: False if the operator did not request the release.
         """
-        async with self._giving_back:
-            self._kinds.cancel()
-            if self._arc is not None and (self.is_asking or for_good):
-                await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
-        if self._takes_next and self._console.state is LifeState.READY:
+        self._takes_next = False  # this release is newer than a claim that waits
+        self._releases += 1
+        try:
+            async with self._giving_back:
+                self._kinds.cancel()
+                if self._arc is not None and (self.is_asking or for_good):
+                    await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
+        finally:
+            self._releases -= 1
+        if self._takes_next and not self._releases and self._console.state is LifeState.READY:
             self._takes_next = False
             self.take()
 

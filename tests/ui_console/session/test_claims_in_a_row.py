@@ -1,0 +1,32 @@
+"""Claims and releases that follow each other faster than the placer answers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from driven_console import console, grant_at_once
+from fake_resource_pool import FakePlacer
+
+
+@pytest.mark.parametrize(
+    ("pressed", "is_held"), [("rrt", True), ("rt", True), ("rtr", False), ("rtrt", True), ("trr", False), ("rtt", True)]
+)
+def test_of_releases_and_claims_in_a_row_the_last_one_counts(
+    placer_world: Any, beside: Any, pressed: str, is_held: bool
+) -> None:
+    """All are pressed while the first release waits for the placer."""
+
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, lambda event: None)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            placer.stop_takes_s = dict.fromkeys(placer.arcs, 0.5)
+            for key in pressed:
+                driven.take() if key == "t" else driven.begin_release()
+                await placer.clock.sleep_s(0.05)
+            await placer.clock.sleep_s(3.0)
+            assert driven.is_held == is_held
+            assert bool(placer.arcs) == is_held
+
+    placer_world(scene)
