@@ -1,6 +1,6 @@
-"""Closing: the last step of a decision.
+"""Closing: the last steps of a decision.
 
-ARCs that stay begin new slices, revoked ones get their expected times, and the alarm is set.
+ARCs that stay begin new slices. When no turn is left, revoked ARCs get their expected times, and the alarm is set.
 """
 
 from __future__ import annotations
@@ -45,13 +45,27 @@ class Closing:
         self._has_aging = rules.aging_s > 0
         self.wake_s: float | None = None
 
+    def renew_slices(self) -> bool:
+        """Begin a new slice of served equals that stay on a sharable RC where another slice was ended (rule 5).
+
+        Returns:
+            Whether a slice began: then the plan has changed, and a turn may have come.
+        """
+        decision, renewed = self._decision, False
+        for ended, rc in decision.ended:
+            for arc in [*self._schedule.state.rcs[rc].holders]:
+                if rc in arc.shares and arc.served(decision.now_s) and not rank_of(arc, ended):
+                    self._transitions.renew(arc)
+                    renewed = True
+        decision.ended = []
+        return renewed
+
     def close(self, *, rang: bool) -> None:
         """Add the last instructions of a decision.
 
         Args:
             rang: True if the last alarm has just rung; it is then set again, even for the same time.
         """
-        self._renew_slices()
         self._expect()
         times_s = [self._ends.check(self._decision.now_s)]
         if self._arcs.retrying:
@@ -62,13 +76,6 @@ class Closing:
         if rang or wake_s != self.wake_s:
             self.wake_s = wake_s
             self._decision.instructions.append(WakeAt(wake_s))
-
-    def _renew_slices(self) -> None:
-        """Begin a new slice of served equals that stay on a sharable RC where another slice was ended (rule 5)."""
-        for ended, rc in self._decision.ended:
-            for arc in [*self._schedule.state.rcs[rc].holders]:
-                if rc in arc.shares and arc.served(self._decision.now_s) and not rank_of(arc, ended):
-                    self._transitions.renew(arc)
 
     def _expect(self) -> None:
         """Add the predicted next grants of revoked ARCs to the instructions."""

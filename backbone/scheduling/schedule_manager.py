@@ -151,7 +151,9 @@ class ScheduleManager:
             self._priorities.age()
         if self._arcs.understating:
             self._arcs.ask_anew_where_late()
-        while turn := self.master_schedule.due(decision.now_s):
+        while (turn := self.master_schedule.due(decision.now_s)) or self._closing.renew_slices():
+            if turn is None:
+                continue  # slices that began anew changed the plan
             if turn.in_the_way:
                 self._switching.make_way(turn)
             elif not (self._arcs.understating and self._arcs.ask_anew_beside(turn.arc)):

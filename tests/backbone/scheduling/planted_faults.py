@@ -74,7 +74,18 @@ FAULTS = [
         "higher(arc.path, other.path) for",
     ),
     Planted("an overridden ARC has time to stop", "transitions.py", 'if why == "slice" and not', "if not"),
-    Planted("those that stay begin no new slice", "closing.py", "        self._renew_slices()\n", ""),
+    Planted(
+        "those that stay begin no new slice",
+        "closing.py",
+        "                    self._transitions.renew(arc)\n                    renewed = True\n",
+        "                    pass\n",
+    ),
+    Planted(
+        "a new slice lets a turn be forgotten",
+        "schedule_manager.py",
+        "                continue  # slices that began anew changed the plan\n",
+        "                break\n",
+    ),
     Planted("a revoked ARC hears no expected time", "closing.py", "        self._expect()\n", ""),
     Planted(
         "who is overridden goes before whose slice is over",

@@ -111,6 +111,21 @@ def test_a_lone_arc_runs_on_and_hears_nothing():
     assert bench.runs("a") == [(0, None)]
 
 
+def test_a_new_slice_of_one_that_stays_lets_a_small_one_start_in_the_same_decision():
+    """``whole`` now waits for the end of the new slice; until then ``small`` fits beside all others."""
+    bench = Bench(manager(), sharable("r", disconnect_s=0.25))
+    for arc in ("first", "second", "stays"):
+        bench.tell(ask(arc, {"r": load(0.3)}))
+    bench.at(1.0, ask("next", {"r": load(0.55)}, run_s=1.0))
+    bench.at(2.0, ask("whole", {"r": load(0.95)}))
+    bench.at(4.0, ask("small", {"r": load(0.1)}, run_s=2.5))
+    bench.run(8.0)
+    assert [(line["arc"], line["t"]) for line in bench.trace if line["ev"] == "slice"] == [("stays", 5.0)]
+    assert bench.runs("small")[0][0] == 5.0
+    assert bench.runs("next")[0][0] == 5.25
+    assert bench.verdict() == []
+
+
 def test_it_asks_to_be_woken_for_a_slice_end_only_if_somebody_waits():
     bench = Bench(manager(), unit("v"))
     bench.tell(ask("a", "v"))
