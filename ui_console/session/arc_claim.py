@@ -138,7 +138,7 @@ class ArcClaim:
         rests, self.rests = self.rests, False
         try:
             if rested is not None and not rests:
-                await rested.release("asks otherwise")
+                await _end(rested, "asks otherwise")
             await arc.keep(self._console.clock, kind, parameters, rests=rests)
         except Refusal as refusal:
             self._controls.disconnect()
@@ -200,12 +200,7 @@ class ArcClaim:
             else:
                 self.rests = True
                 return True
-        confirmed = True
-        try:
-            await arc.release(reason)
-        except LinkError as error:
-            log.info("the release was not confirmed: %s", error)
-            confirmed = False
+        confirmed = await _end(arc, reason)
         self._controls.disconnect()
         self._arc, self.rests = None, False
         return confirmed
@@ -284,3 +279,13 @@ class ArcClaim:
         if self._see is not None:
             self._console.show(events.PictureSeen(self._console.clock.now_s(), frame.captured_s, frame.robot))
             self._see(frame)
+
+
+async def _end(arc: ArcClient, reason: str) -> bool:
+    """End the ARC; return whether that was confirmed."""
+    try:
+        await arc.release(reason)
+    except LinkError as error:
+        log.info("the release of %s was not confirmed: %s", arc.arc, error)
+        return False
+    return True

@@ -8,6 +8,8 @@ import pytest
 from driven_console import console, grant_at_once
 from fake_resource_pool import FakePlacer
 
+from backbone.component.messages import Parameters, SetParameter
+
 
 @pytest.mark.parametrize(
     ("pressed", "is_held"), [("rrt", True), ("rt", True), ("rtr", False), ("rtrt", True), ("trr", False), ("rtt", True)]
@@ -28,5 +30,25 @@ def test_of_releases_and_claims_in_a_row_the_last_one_counts(
             await placer.clock.sleep_s(3.0)
             assert driven.is_held == is_held
             assert bool(placer.arcs) == is_held
+
+    placer_world(scene)
+
+
+def test_a_console_outlives_a_placer_that_does_not_confirm_the_end_of_an_arc_that_rested(
+    placer_world: Any, beside: Any
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, lambda event: None, keeps_arc=True)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            await driven.give_back()
+            await placer.bus.ask(driven.address, SetParameter("priority", 7, "anna"), Parameters, within_s=1)
+            placer.silence()
+            driven.take()
+            await placer.clock.sleep_s(1.0)
+            placer.speak()
+            await placer.wait(lambda: driven.is_held)
+            [arc] = placer.arcs.values()
+            assert arc.parameters["path"] == [["console-7", 7]]
 
     placer_world(scene)
