@@ -3,9 +3,9 @@
 Rules of this file:
 
 * All or nothing: if one step of a connection fails, the switch undoes all of it before it reports the failure.
-* If an RC without another holder does not confirm its disconnection in time, the switch does not wait for it. The
-  caller counts it as down until it has confirmed. If an RC has other holders, the switch waits until its lease is
-  over. The next holder of a unit RC may be late, but there are never two. After a death the successor confirms
+* If an RC without another holder refuses its disconnection, or does not confirm it in time, the switch does not wait
+  for it. The caller counts it as down until it has confirmed. If an RC has other holders, the switch waits until its
+  lease is over. The next holder of a unit RC may be late, but there are never two. After a death the successor confirms
   (decision 0006).
 * An ARC that does not answer delays no other ARC: its epoch ends with the disconnection of its RCs.
 
@@ -189,7 +189,8 @@ class ContextSwitch:
                 complain(rc, f"did not confirm its disconnection from {arc}: {error}")
                 complain = _keep_quiet
                 does_not_obey = isinstance(error, Refusal)  # its hardware stops by itself if at all
-            if free_by_s < math.inf and self._may_leave(rc, arc) and self._real_s(free_by_s) < ASK_AGAIN_S:
+            is_late = free_by_s < math.inf and (does_not_obey or self._real_s(free_by_s) < ASK_AGAIN_S)
+            if is_late and self._may_leave(rc, arc):
                 self._left[rc][hold] = lease_until_s
                 return False
             pause_s = left_s if does_not_obey else min(ASK_AGAIN_S, left_s)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import Counter
 from collections.abc import Coroutine, Iterable
 from typing import Protocol
 
@@ -80,6 +81,7 @@ class RcWatch:
         self.resources: dict[str, Resource] = {}
         self.up: set[str] = set()
         self._failing: set[str] = set()
+        self._meeting: Counter[str] = Counter()
         self._faults: dict[str, str] = {}
         self._doubted: set[str] = set()
         self._starts: dict[str, asyncio.Task[None]] = {}
@@ -133,7 +135,12 @@ class RcWatch:
         """Check an RC that appeared or published; if it is not up afterwards, check it again later."""
 
         async def again() -> None:
-            if not await self.meet(rc):
+            self._meeting[rc] += 1
+            try:
+                is_up = await self.meet(rc)
+            finally:
+                self._meeting[rc] -= 1
+            if not is_up:
                 self.meet_in_a_while(rc)
 
         self._service.start_task(again(), f"meet {rc}")
@@ -167,7 +174,9 @@ class RcWatch:
         if rc not in self.resources:
             return False
         if rc not in self.up:
-            if rc not in self._failing:
+            if (
+                rc not in self._failing and not self._meeting[rc]
+            ):  # a check makes an RC that does not obey publish again
                 self.meet_again(rc)
             return False
         if contradiction(state, self.resources[rc], service.clock.now_s(), service.manager.epoch_of(rc)):

@@ -80,6 +80,7 @@ def test_after_a_hardware_fault_the_rc_manager_waits_out_the_lease(local_mission
             pool.radio_driver.breaks = False
             await console.wait_granted()
             assert 1.9 <= pool.clock.now_s() - taken_s <= 2.6
+            assert pool.running["radio"].statistics()["safety_faults"] <= 3, "it is not asked again and again"
             assert pool.audit["stale_packets"] == 0
 
     run_virtual(main())

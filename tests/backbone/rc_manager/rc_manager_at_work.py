@@ -48,6 +48,7 @@ from backbone.scheduling.requests import (
     Usage,
 )
 from backbone.wire import Envelope, Message
+from resource_pool.drivers.interface import HardwareFault
 
 HARDWARE = [
     Resource("left", "scout"),
@@ -68,7 +69,7 @@ class PlainRc(Component[Any]):
         self.holders: dict[str, int] = {}
         self.last_epoch = 0
         self.log: list[tuple[str, str]] = []
-        self.hangs = False
+        self.hangs = self.does_not_obey = False
         self.tells: Callable[[RcState], RcState] = lambda state: state
 
     async def answer(self, asked: Envelope[Any]) -> Message:
@@ -84,6 +85,8 @@ class PlainRc(Component[Any]):
                 self.holders[arc] = epoch
                 self.log.append(("connect", arc))
                 return Connected(epoch)
+            case Disconnect() if self.does_not_obey:
+                raise HardwareFault(f"{self.name} is not safe")
             case Disconnect(arc=arc):
                 self.holders.pop(arc, None)
                 self.log.append(("disconnect", arc))

@@ -193,6 +193,26 @@ def test_an_rc_that_does_not_confirm_in_time_and_has_no_other_holder_is_down_unt
     assert check(lines) == []
 
 
+def test_the_other_rcs_of_an_arc_do_not_wait_for_one_whose_hardware_does_not_obey(pool: Any) -> None:
+    async def main() -> Path:
+        async with pool() as here, here.beside(here.manager()):
+            one, two = await here.arc("one"), await here.arc("two")
+            await one.ask_for(request("one", "left", "video"))
+            await here.clock.sleep_s(1.0)
+            here.rcs["left"].does_not_obey = True
+            await two.ask_for(request("two", "video", priority=100))
+            await here.clock.sleep_s(0.2 + 0.05 + 0.3)  # grace, tolerance, settling
+            assert two.is_open
+            here.rcs["left"].does_not_obey = False
+            await here.clock.sleep_s(2 * LEASE_S)
+            await two.bus.ask(RC_MANAGER, SetIdle("two", True), Done, within_s=1)
+            await here.clock.sleep_s(0.5)
+            assert one.is_open, "it counts as up again as soon as it obeys"
+            return here.trace  # type: ignore[no-any-return]
+
+    assert check([json.loads(line) for line in run_virtual(main()).read_text().splitlines()]) == []
+
+
 def test_a_set_that_cannot_be_connected_whole_is_given_back_whole(pool: Any) -> None:
     async def main() -> None:
         async with pool() as here, here.beside(here.manager()):
