@@ -14,15 +14,27 @@ from backbone.errors import LinkError, Refusal
 from backbone.rc_manager.arc_switches import ArcSwitches
 from backbone.rc_manager.beats import Beats
 from backbone.rc_manager.context_switch import in_pool
-from backbone.rc_manager.messages import AskRequest, Beat, CurrentRequest, Done, TakePath
+from backbone.rc_manager.messages import (
+    AskRequest,
+    Beat,
+    ChangeRuntime,
+    CurrentRequest,
+    Done,
+    Extend,
+    NotThatArc,
+    SetIdle,
+    TakePath,
+    Withdraw,
+)
 from backbone.rc_manager.recovery import Recovery
 from backbone.scheduling.events import Departed, Event
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest
 from backbone.scheduling.views import RequestAttributes
-from backbone.wire import Envelope
+from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
+OF_AN_ARC = (SchedulingRequest, Withdraw, SetIdle, ChangeRuntime, Extend)
 ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; without an answer it hangs or is gone
 
 
@@ -60,6 +72,17 @@ class ArcWatch:
         self._beats = Beats(service.clock.rate)
         self._requesting: Counter[str] = Counter()
 
+    def require_sender(self, asked: Envelope[Message]) -> None:
+        """Check that a request of an ARC, or a change of it, comes from this ARC.
+
+        Raises:
+            NotThatArc: Another component sent it.
+        """
+        if isinstance(asked.body, OF_AN_ARC) and asked.source != in_pool(asked.body.arc):
+            what = f"{type(asked.body).__name__} for {asked.body.arc}"
+            self._service.story.note(asked.body.arc, f"{asked.source} was refused: {what}")
+            raise NotThatArc(f"the RC manager does not take {what} from {asked.source}", source=asked.source)
+
     @contextlib.contextmanager
     def choosing(self, arc: str) -> Iterator[None]:
         """Count a request of this ARC as one for which RCs are being chosen."""
@@ -93,8 +116,10 @@ class ArcWatch:
             self._service.happened(Departed(arc, "silent"))
 
     def heard_beat(self, envelope: Envelope[Beat]) -> None:
-        """Record a beat; ask an unknown ARC for its request."""
+        """Record a beat of the ARC itself; ask an unknown ARC for its request."""
         arc = envelope.body.arc
+        if envelope.source != in_pool(arc):
+            return
         if arc in self._beats.heard_s:
             self._beats.heard(arc, self._service.clock.now_s())
         elif arc not in self._switches and not self._requesting[arc]:

@@ -330,6 +330,13 @@ class FixedRules(Refusal):
     remedy = "Change the parameters of the rc_manager in the mission file, and bring the mission up again."
 
 
+class NotThatArc(Refusal):
+    """Only an ARC itself sends, changes and withdraws its request. Nothing is changed."""
+
+    code = "scheduling.not_that_arc"
+    remedy = "Tell the ARC what its owner wants: it tells the RC manager."
+
+
 class StaleEpoch(Refusal):
     """The epoch is older than the RC's, or the ARC does not hold it: nothing was applied."""
 

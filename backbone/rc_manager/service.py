@@ -165,6 +165,7 @@ class RcManager(Component[RcManagerParameters]):
     # ------------------------------------------------------------------ questions
     async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ARCs, consoles and tools."""
+        self._arcs.require_sender(asked)
         match asked.body:
             case SchedulingRequest() as request:
                 return await self.request(request)

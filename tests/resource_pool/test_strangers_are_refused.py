@@ -1,4 +1,4 @@
-"""RCs and ARCs accept from each component only the messages of its role."""
+"""RCs, ARCs and the RC manager accept from each component only the messages of its role."""
 
 from __future__ import annotations
 
@@ -7,23 +7,30 @@ from typing import Any
 import pytest
 from pool_on_local_network import Pool, a_pool
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import (
     AskRc,
     AskRequest,
+    ChangeRuntime,
     CloseGate,
     Connect,
     Connected,
     CurrentRequest,
     Disconnect,
     Disconnected,
+    Done,
+    Extend,
     GateClosed,
     GateOpens,
+    NotThatArc,
     OpenGate,
     RcState,
+    SetIdle,
+    Withdraw,
 )
-from backbone.scheduling.requests import RcUse, Usage
+from backbone.scheduling.requests import RcUse, Scheduled, Usage
 from backbone.wire import Message
 from resource_pool.commands import Drive, Tune
 from resource_pool.messages import Applied, LoadPacket, NotFromYou, PacketLoaded
@@ -135,5 +142,25 @@ def test_only_the_rc_manager_opens_and_shuts_a_gate_and_asks_for_the_request(loc
             state = await arc.state()
             assert (state.granted, state.epochs) == (True, granted.epochs)
             assert (await arc.drive(1.0, 1.0)).epoch == granted.epochs["scout1"]
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize("stranger", ["mission_control/watcher", "ui_console/console", "resource_pool/scout1"])
+def test_only_an_arc_itself_sends_changes_and_withdraws_its_request(local_mission: Any, stranger: str) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio"]) as pool:
+            owner = await pool.owner("watcher")
+            arc = await pool.arc(owner, "drive", "scout1")
+            await arc.wait_granted()
+            current = await pool.manager_voice.ask(arc.address, AskRequest(), CurrentRequest, within_s=1)
+            name = arc.arc
+            for order in (SetIdle(name, True), ChangeRuntime(name, 0.1), Extend(name, 9e3), Withdraw(name)):
+                with pytest.raises(NotThatArc):
+                    await pool.voice_of(stranger).ask(RC_MANAGER, order, Done, within_s=1)
+            with pytest.raises(NotThatArc):
+                await pool.voice_of(stranger).ask(RC_MANAGER, current.request, Scheduled, within_s=1)
+            await pool.clock.sleep_s(1.0)
+            assert owner.heard() == ["Resumed"]
 
     run_virtual(main())

@@ -14,9 +14,11 @@ from trace_checker import check
 from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import NameTaken
+from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.placer.messages import Start
 from backbone.rc_manager.messages import (
+    Beat,
     Done,
     SetIdle,
 )
@@ -53,6 +55,22 @@ def test_an_arc_that_no_longer_beats_loses_its_rcs(pool: Any) -> None:
             await here.clock.sleep_s(1.0)
             hung.beats = False
             await here.clock.sleep_s(3.0)
+            assert waiting.is_open
+
+    run_virtual(main())
+
+
+def test_beats_of_another_component_do_not_keep_an_arc_that_hangs(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            hung, waiting = await here.arc("hung"), await here.arc("waiting")
+            await hung.ask_for(request("hung", "left", "radio", minimum_runtime_s=60.0))
+            await waiting.ask_for(request("waiting", "left", "radio"))
+            await here.clock.sleep_s(1.0)
+            hung.beats = False
+            for _ in range(6):
+                waiting.bus.publish(waiting.address, Conversation.BEAT, Beat("hung"))
+                await here.clock.sleep_s(0.5)
             assert waiting.is_open
 
     run_virtual(main())
