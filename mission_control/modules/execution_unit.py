@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import msgspec
 
-from backbone.errors import Refusal
-from backbone.exchange_course import ExchangePhase
+from backbone.errors import Refusal, complaint
+from backbone.exchange_course import UNPROVED, ExchangePhase
 from mission_control.modules.exchange import Exchange, handed_over
 from mission_control.modules.exchangeable import judge_of, kinds_made
 from mission_control.modules.graph import Graph, Member
@@ -267,10 +267,12 @@ class ExecutionUnit:
         began_s = self._stopwatch()
         try:
             outputs = seat.module.update(seat.module.Inputs(**given))
-        except (Exception, SystemExit, KeyboardInterrupt):
+        except UNPROVED as error:
+            if isinstance(error, StopIteration):  # no future can hold it, and a unit with a thread would be still
+                raise _as_bug(seat.name, error) from error
             raise
         except BaseException as error:  # CancelledError: a task ends by it without a bug, and the unit would be still
-            raise RuntimeError(f"update of {seat.name} raised {type(error).__name__}") from error
+            raise _as_bug(seat.name, error) from error
         seat.times = seat.times.with_run(self._stopwatch() - began_s)
         return seat.values(outputs)
 
@@ -334,3 +336,8 @@ class ExecutionUnit:
             dict(self._overwritten),
             {seat.name: seat.times for seat in self._seats},
         )
+
+
+def _as_bug(module: str, error: BaseException) -> RuntimeError:
+    """Return an exception that ends a task or a thread as a bug, with the place in the module's code."""
+    return RuntimeError(f"update of {module} raised {complaint(error)}")

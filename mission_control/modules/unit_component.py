@@ -101,7 +101,7 @@ class UnitComponent(Component[UnitParameters]):
             self.bus.declare_quality(output_address(self.address, key), Conversation.OUTPUTS, qualities[key])
         self._deadlines = self._new_deadlines()
         if self.parameters.own_thread:
-            self._thread = UnitThread(self._unit, self.clock, self._publish)
+            self._thread = UnitThread(self._unit, self.clock, self._publish, self.fail)
             self._place = await self._thread.place(self.parameters.nice, self.parameters.cpus)
             self.report(self._thread_text())
         for key, kind in self._into.items():

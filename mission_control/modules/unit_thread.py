@@ -53,13 +53,20 @@ class UnitThread:
 
     Args:
         produced: Called in the event loop with the time of each round and the produced values.
+        failed: Called in the event loop with an exception of ``produced``.
 
     Attributes:
         lost: Number of rounds whose outputs were dropped, because too many waited for the event loop.
     """
 
-    def __init__(self, unit: ExecutionUnit, clock: Clock, produced: Callable[[float, list[Produced]], None]) -> None:
-        self._unit, self._clock, self._produced = unit, clock, produced
+    def __init__(
+        self,
+        unit: ExecutionUnit,
+        clock: Clock,
+        produced: Callable[[float, list[Produced]], None],
+        failed: Callable[[BaseException], None],
+    ) -> None:
+        self._unit, self._clock, self._produced, self._failed = unit, clock, produced, failed
         self._loop = asyncio.get_running_loop()
         self._pool: ThreadPoolExecutor | None = None
         if not isinstance(self._loop, VirtualLoop):
@@ -164,7 +171,10 @@ class UnitThread:
         """Pass the outputs of one round on; the next round follows in a separate step, so that listeners get both."""
         with self._news:
             done, has_more = self._waiting.popleft(), len(self._waiting) > 0
-        self._hand_on(done)
+        try:
+            self._hand_on(done)
+        except Exception as bug:  # the event loop would only log it
+            self._failed(bug)
         if has_more:
             self._loop.call_soon(self._hand_next_on)
 

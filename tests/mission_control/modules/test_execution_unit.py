@@ -223,6 +223,7 @@ class Faulty(Module):
         (Faulty.Outputs("text"), "update of faulty returned builtins:str as number, not"),  # type: ignore[arg-type]
         (Faulty.Outputs(Trigger(1.0)), "Trigger as number, not"),  # type: ignore[arg-type]
         (asyncio.CancelledError(), "update of faulty raised CancelledError"),
+        (StopIteration(), r"update of faulty raised StopIteration: \(.*test_execution_unit.py, line"),
     ],
 )
 def test_what_is_no_output_goes_to_nobody_and_is_a_bug_with_the_name_of_its_module(returned: object, told: str) -> None:

@@ -22,12 +22,18 @@ from backbone.component.messages import AskStatistics, Statistics
 from backbone.debug_views import ListViews, Views
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
+from backbone.waiting import end_tasks
+from backbone.wire import OversizedMessage
 from mission_control.modules import unit_thread
 from mission_control.modules.arrangement import GivenKey, UnitOrder, arranged
+from mission_control.modules.execution_unit import ExecutionUnit, Produced
+from mission_control.modules.graph import Graph, Member
 from mission_control.modules.module import Module
 from mission_control.modules.orders import ModuleOrder, Source, UnitParameters
 from mission_control.modules.os_threads import ThreadRefused, place_thread
 from mission_control.modules.unit_component import UnitComponent
+from mission_control.modules.unit_schedule import Trigger
+from mission_control.modules.unit_thread import UnitThread
 
 TESTER = "ui_console/tester"
 WITHIN_S = 20.0
@@ -198,6 +204,45 @@ async def test_a_bug_in_the_thread_ends_the_unit(local_mission: Any, beside: Any
 
     with pytest.raises(ArithmeticError):
         await until_it_ends()
+
+
+class Reading(Passing):
+    """Looks for what is not there."""
+
+    def update(self, inputs: Passing.Inputs) -> Passing.Outputs:
+        return self.Outputs(next(one for one in [Number(1.0)] if one.value == inputs.number.value))
+
+
+async def test_a_stop_iteration_in_the_thread_ends_the_unit_too(local_mission: Any, beside: Any) -> None:
+    gone = asyncio.Event()
+    order = UnitOrder(name="one", modules=[ModuleOrder("reading", f"{__name__}:Reading")], own_thread=True)
+
+    async def until_it_ends() -> None:
+        async with units(local_mission, beside, [order], "same") as (bus, _heard), asyncio.timeout(WITHIN_S):
+            bus.watch_alive("mission_control/one", lambda _address, alive: None if alive else gone.set())
+            bus.publish(TESTER, Conversation.EVENTS, Number(2.0))
+            await gone.wait()
+
+    with pytest.raises(RuntimeError, match="update of reading raised StopIteration"):
+        await until_it_ends()
+
+
+async def test_an_output_that_cannot_be_sent_is_a_bug_of_the_unit_and_does_not_hold_up_the_next() -> None:
+    clock, bugs = MissionClock.started_now(), asyncio.Queue[BaseException]()
+    graph = Graph({"one": [Member("ticking", Ticking.ports())]})
+    unit = ExecutionUnit("one", graph, {"ticking": Ticking()}, Trigger(100.0), clock.now_s())
+
+    def send(_now_s: float, _produced: Sequence[Produced]) -> None:
+        raise OversizedMessage("too long")
+
+    keeping = asyncio.create_task(UnitThread(unit, clock, send, bugs.put_nowait).keep())
+    try:
+        async with asyncio.timeout(WITHIN_S):
+            await bugs.get()
+            time.sleep(0.1)  # noqa: ASYNC251  so that several rounds wait
+            assert [type(await bugs.get()) for _ in range(3)] == [OversizedMessage] * 3
+    finally:
+        await end_tasks(keeping)
 
 
 async def test_a_unit_runs_where_and_as_urgently_as_it_was_told(local_mission: Any, beside: Any) -> None:
