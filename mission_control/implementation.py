@@ -113,11 +113,11 @@ def made_beside(old: Implementation, asked: SwapClass, kind: type[Implementation
             f"{asked.class_path} answers other questions than {class_path_of(old)}",
             remedy="Accept the same messages, or change the mission file.",
         )
-    has = {one.encode_name for one in msgspec.structs.fields(kind.parameters_type)}
-    kept = {name: value for name, value in msgspec.to_builtins(old.parameters).items() if name in has}
-    launch = msgspec.structs.replace(old.launch, class_path=asked.class_path, parameters={**kept, **asked.parameters})
-    gate = GatedBus(old.gate.bus, is_first=False)
+    had, gate = msgspec.to_builtins(old.parameters), GatedBus(old.gate.bus, is_first=False)
     try:
+        has = {one.encode_name for one in msgspec.structs.fields(kind.parameters_type)}
+        values = {name: value for name, value in had.items() if name in has} | asked.parameters
+        launch = msgspec.structs.replace(old.launch, class_path=asked.class_path, parameters=values)
         new = kind(launch, gate, old.clock)
     except WrongParameter as wrong:
         raise WrongParameter(

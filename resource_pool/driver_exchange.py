@@ -202,13 +202,13 @@ class DriverExchanges:
                 remedy=f"Give it the methods of {class_path_of(old)}.",
             )
         options_type = getattr(kind, "options_type", NoOptions)
-        has = {one.encode_name for one in msgspec.structs.fields(options_type)}
-        options: dict[str, object] = getattr(rc.parameters, "options", {})
-        kept = {name: value for name, value in options.items() if name in has}
-        changed = {rc.driver_field: asked.class_path, "options": {**kept, **asked.parameters}}
-        parameters = msgspec.structs.replace(rc.parameters, **changed)
-        site = dataclasses.replace(rc.driver_site(), parameters=parameters)
+        had: dict[str, object] = getattr(rc.parameters, "options", {})
         try:
+            has = {one.encode_name for one in msgspec.structs.fields(options_type)}
+            options = {name: value for name, value in had.items() if name in has} | asked.parameters
+            changed = {rc.driver_field: asked.class_path, "options": options}
+            parameters = msgspec.structs.replace(rc.parameters, **changed)
+            site = dataclasses.replace(rc.driver_site(), parameters=parameters)
             site.options(options_type)
             new = self.made(kind, site)
         except WrongParameter as wrong:

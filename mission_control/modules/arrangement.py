@@ -10,7 +10,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import msgspec
 
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
+from backbone.exchange_course import UNPROVED
 from backbone.mission.arranged import CLASS, Arranged, UnitFault, UnitsQuestion
 from backbone.naming import Subsystem, address, did_you_mean
 from backbone.quality import OutputQuality, Quality
@@ -209,6 +210,9 @@ def _of_class(order: ModuleOrder) -> Iterator[UnitFault]:
     except Refusal as refusal:
         about = next((name for name in _NAMED.findall(refusal.detail) if name in order.parameters), CLASS)
         yield UnitFault(refusal.detail, refusal.remedy, module=order.name, port=about)
+    except UNPROVED as error:  # a class that is being written raises anything
+        told = f"{order.name} ({order.class_path}) cannot be made: {complaint(error)}"
+        yield UnitFault(told, "Mend the class where the message points", module=order.name, port=CLASS)
 
 
 def _of_given(key: str, declared: GivenKey) -> Iterator[UnitFault]:

@@ -88,8 +88,14 @@ def ports_of(declared: type[Ports]) -> tuple[Port, ...]:
     """Return the ports that a struct declares, in the order of its fields.
 
     Raises:
-        WrongDeclaration: A field's annotation is not a class, or its key is not a legal name.
+        WrongDeclaration: It is no ``Ports``, a field's annotation is not a class, or its key is not a legal name.
     """
+    given: object = declared  # a class that is being written has anything in this place
+    if not (isinstance(given, type) and issubclass(given, Ports)):
+        raise WrongDeclaration(
+            f"{type_name(declared)} declares no ports",
+            remedy="Derive it: 'class Inputs(Module.Inputs)', or 'class Outputs(Module.Outputs)'.",
+        )
     hints = _hints(declared)
     return tuple(_port(declared, field, hints[field.name]) for field in msgspec.structs.fields(declared))
 
@@ -115,8 +121,8 @@ def type_name(kind: object) -> str:
 def _hints(declared: type[Ports]) -> dict[str, object]:
     try:
         return typing.get_type_hints(declared, include_extras=True)
-    except NameError as error:
-        raise WrongDeclaration(f"{type_name(declared)}: {error}") from error
+    except Exception as error:  # an annotation is code, so it may raise any exception
+        raise WrongDeclaration(f"{type_name(declared)}: {type(error).__name__}: {error}") from error
 
 
 def _port(declared: type[Ports], field: msgspec.structs.FieldInfo, hint: object) -> Port:

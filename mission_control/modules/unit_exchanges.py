@@ -115,20 +115,10 @@ class UnitExchanges:
 
     async def _candidate(self, asked: SwapModule, kind: type[Module]) -> _Candidate:
         [before] = [one for one in self._component.parameters.modules if one.name == asked.module]
-        has = {one.encode_name for one in msgspec.structs.fields(kind.Parameters)}
-        kept = {name: value for name, value in before.parameters.items() if name in has}
-        ports = kind.ports()
-        order = ModuleOrder(
-            asked.module,
-            asked.class_path,
-            {**kept, **asked.parameters},
-            {name: key for name, key in before.inputs.items() if name in {one.name for one in ports.inputs}},
-            {name: key for name, key in before.outputs.items() if name in {one.name for one in ports.outputs}},
-        )
         try:
-            new = await in_thread_within(partial(_made, order), READ_WITHIN_S)
+            order, new = await in_thread_within(partial(_made, asked, before, kind), READ_WITHIN_S)
         except TimeoutError:
-            told = f"{order.class_path} is not made within {READ_WITHIN_S:g} s"
+            told = f"{asked.class_path} is not made within {READ_WITHIN_S:g} s"
             raise WrongModule(told, remedy=HANGS) from None
         return _Candidate(asked, before, self._modules[asked.module], order, new)
 
@@ -183,18 +173,33 @@ class UnitExchanges:
         self._component.report(f"{asked.module}: {what}")
 
 
-def _made(order: ModuleOrder) -> Module:
-    """Return the module.
+def _made(asked: SwapModule, before: ModuleOrder, kind: type[Module]) -> tuple[ModuleOrder, Module]:
+    """Return the new module and its order.
 
     Raises:
+        WrongDeclaration: A port of the class cannot be read from its declaration.
         WrongModule: The module refuses its parameters, or cannot be created.
     """
     try:
-        return order.load()
+        order = _order(asked, before, kind)
+        return order, order.load()
     except Refusal:
         raise
     except UNPROVED as error:
-        raise WrongModule(f"{order.class_path} cannot be made: {complaint(error)}") from error
+        raise WrongModule(f"{asked.class_path} cannot be made: {complaint(error)}") from error
+
+
+def _order(asked: SwapModule, before: ModuleOrder, kind: type[Module]) -> ModuleOrder:
+    has = {one.encode_name for one in msgspec.structs.fields(kind.Parameters)}
+    kept = {name: value for name, value in before.parameters.items() if name in has}
+    ports = kind.ports()
+    return ModuleOrder(
+        asked.module,
+        asked.class_path,
+        {**kept, **asked.parameters},
+        {name: key for name, key in before.inputs.items() if name in {one.name for one in ports.inputs}},
+        {name: key for name, key in before.outputs.items() if name in {one.name for one in ports.outputs}},
+    )
 
 
 def _unless_closed(loop: asyncio.AbstractEventLoop, changed: asyncio.Event) -> None:

@@ -55,6 +55,11 @@ ACT = "    async def act"
 BROKEN = {
     "in its text": ("class Turner(", "class Turner((", "SyntaxError"),
     "when it is made": ("self.turns = 0", "self.turns = 1 / 0", "ZeroDivisionError"),
+    "in its parameters": (
+        "    parameters_type = TurnerParameters",
+        "    class parameters_type(TurnerParameters, frozen=True):\n        pace: 'flaot' = 1.0\n",
+        "name 'flaot' is not defined",
+    ),
     "when it starts": (
         "    async def act",
         "    async def start(self):\n        raise OSError('dark')\n\n    async def act",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
+import msgspec
 from driver_bench import Bench
 
 from resource_pool.drivers.interface import DriverSite, HardwareFault
@@ -65,6 +66,11 @@ class FirstBeside(First):
 
 class SecondBeside(Second):
     opens_beside = True
+
+
+class Mistyped(Second):
+    class options_type(msgspec.Struct):  # noqa: N801  its name in a driver
+        gamma: flaot = 1.0  # type: ignore[name-defined]  # noqa: F821
 
 
 class NoLamp:

@@ -121,6 +121,8 @@ def test_refusals_change_nothing(local_mission: Any) -> None:
     async def scene(pool: Pool) -> None:
         with pytest.raises(WrongClass, match="lacks close, open, set_brightness"):
             await swap(pool, "NoLamp")
+        with pytest.raises(WrongClass, match="name 'flaot' is not defined"):
+            await swap(pool, "Mistyped")
         with pytest.raises(UnknownDriver):
             await swap(pool, "simulated")
         with pytest.raises(Refusal, match="no_such"):

@@ -47,11 +47,29 @@ class Nowhere(Ports):
     missing: NotThere  # type: ignore[name-defined]  # noqa: F821
 
 
+class HalfWritten(Ports):
+    number: Number.NotThere  # type: ignore[name-defined]
+
+
+class NoPorts:
+    number: Number
+
+
 class MarkInside(Ports):
     number: Annotated[Number, LATEST] | None = None
 
 
-@pytest.mark.parametrize(("declared", "word"), [(Choice, "choice"), (BadKey, "Not A Name"), (Nowhere, "NotThere")])
+@pytest.mark.parametrize(
+    ("declared", "word"),
+    [
+        (Choice, "choice"),
+        (BadKey, "Not A Name"),
+        (Nowhere, "NotThere"),
+        (HalfWritten, "HalfWritten: AttributeError: .*NotThere"),
+        (NoPorts, "NoPorts declares no ports"),
+        (None, "None declares no ports"),
+    ],
+)
 def test_a_declaration_that_cannot_be_read_is_refused(declared: type[Ports], word: str) -> None:
     with pytest.raises(WrongDeclaration, match=word):
         ports_of(declared)

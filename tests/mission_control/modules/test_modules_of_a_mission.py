@@ -202,7 +202,28 @@ def test_every_fault_has_its_place(tmp_path: Path, text: str, told: list[str]) -
         assert any(line.startswith(expected) for line in found), found
 
 
-def test_a_module_that_cannot_be_imported_is_a_fault_at_its_class(
+HALF_WRITTEN = """
+from mission_control.modules.module import Module
+
+class NoPorts(Module):
+    class Outputs:
+        number: float
+
+class Mistyped(Module):
+    class Parameters(Module.Parameters, frozen=True):
+        gain: "flaot" = 1.0
+
+class Dark(Module):
+    def reset(self):
+        raise OSError("no camera")
+
+class Leaving(Module):
+    def reset(self):
+        raise SystemExit(3)
+"""
+
+
+def test_a_module_that_cannot_be_imported_or_made_is_a_fault_at_its_class(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)
@@ -210,6 +231,15 @@ def test_a_module_that_cannot_be_imported_is_a_fault_at_its_class(
     (tmp_path / "dying_module.py").write_text("import os\nos._exit(3)\nclass Dying: ...\n")
     [broken] = faults(tmp_path, mission(unit("one", module("broken", "broken_module:Broken"))))
     assert broken == "5:23 broken_module:Broken: RuntimeError: being written"
+    (tmp_path / "written_module.py").write_text(HALF_WRITTEN)
+    for name, told in (
+        ("NoPorts", "5:20 written_module:NoPorts.Outputs declares no ports"),
+        ("Mistyped", "5:20 one (written_module:Mistyped) cannot be made: NameError: name 'flaot' is not defined"),
+        ("Dark", "5:20 one (written_module:Dark) cannot be made: OSError: no camera (" + str(tmp_path)),
+        ("Leaving", "5:20 one (written_module:Leaving) cannot be made: SystemExit: 3"),
+    ):
+        [written] = faults(tmp_path, mission(unit("one", module("one", f"written_module:{name}"))))
+        assert written.startswith(told)
     [dying] = faults(tmp_path, mission(unit("one", module("dying", "dying_module:Dying"))))
     assert "the modules' classes cannot be asked" in dying
 

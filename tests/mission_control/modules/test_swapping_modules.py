@@ -37,6 +37,7 @@ from backbone.wire import Envelope, Message
 from mission_control.modules.arrangement import UnitOrder, arranged
 from mission_control.modules.graph import GraphRefused
 from mission_control.modules.orders import ModuleOrder, UnitParameters, WrongModule
+from mission_control.modules.ports import WrongDeclaration
 from mission_control.modules.unit_component import UnitComponent
 
 UNIT = "mission_control/one"
@@ -217,6 +218,11 @@ def test_a_hundred_swaps_at_thirty_hertz_lose_nothing_and_double_nothing(stage: 
         ("class Counter(Module):", "import sys\nsys.exit(3)\nclass Counter(Module):", "SystemExit: 3"),
         ("    def update", "    def reset(self):\n        raise OSError('no camera')\n\n    def update", "no camera"),
         ("class Counter(Module):", "class Counter:\n    pass\nclass Old(Module):", "is no module"),
+        ("        step: int = 1", "        step: 'nit' = 1", "name 'nit' is not defined"),
+        ("class Parameters(Module.Parameters, frozen=True):", "class Parameters:", "with a struct type"),
+        ("        count: Count", "        count: 'Count.Nope'", "has no attribute 'Nope'"),
+        ("        count: Count", "        count: 'Annotated[Count]'", "Annotated"),
+        ("class Outputs(Module.Outputs):\n        count", "class Outputs:\n        count", "Outputs"),
     ],
 )
 def test_a_class_that_cannot_be_made_is_refused_and_nothing_changes(
@@ -225,7 +231,7 @@ def test_a_class_that_cannot_be_made_is_refused_and_nothing_changes(
     async def scene() -> None:
         before = sys.modules[stage.name]
         stage.edit(old, new)
-        with pytest.raises(WrongModule, match=cause):
+        with pytest.raises((WrongModule, WrongDeclaration), match=cause):
             await stage.swap()
         assert sys.modules[stage.name] is before
         await VirtualClock().sleep_s(0.5)
