@@ -15,6 +15,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from backbone.printable_text import printable
+
 Fact = str | int | float | bool
 
 
@@ -83,17 +85,17 @@ def code_of(refusal: Refusal) -> str:
 
 
 def complaint(error: BaseException) -> str:
-    """Return an exception as one line, with the place in the code if it has one.
+    """Return an exception as one printable line of bounded length, with the place in the code if it has one.
 
     Example:
         >>> complaint(ValueError("no picture"))
         'ValueError: no picture'
     """
-    told, trace = " ".join(f"{type(error).__name__}: {error}".split()), error.__traceback__
+    told, trace = printable(" ".join(f"{type(error).__name__}: {error}".split())), error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     where = "" if trace is None else f" ({trace.tb_frame.f_code.co_filename}, line {trace.tb_lineno})"
-    return told + where
+    return told + printable(where)
 
 
 class LinkError(BackboneError):

@@ -9,6 +9,7 @@ from typing import Annotated, TypeGuard
 import msgspec
 
 from backbone.keys import Conversation
+from backbone.printable_text import printable
 from backbone.quality import Quality
 from backbone.ranges import Values
 from backbone.reading_anew import WrongClass
@@ -136,7 +137,8 @@ def load_at(class_path: str) -> object:
     try:
         return operator.attrgetter(name)(importlib.import_module(file))
     except Exception as error:  # a file that is just being written may raise any exception
-        raise WrongModule(f"{class_path}: {type(error).__name__}: {error}", class_path=class_path) from error
+        told = printable(f"{class_path}: {type(error).__name__}: {error}")
+        raise WrongModule(told, class_path=class_path) from error
 
 
 def load_module_class(class_path: str) -> type[Module]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 
+import msgspec
 import pytest
 from component_stage import TOWER, Poke, Poked, Stage, TooSteep, live
 
@@ -171,6 +172,19 @@ def test_a_long_complaint_is_cut_in_the_feedback() -> None:
         with pytest.raises(ValueError, match="xxx"):
             await life
         assert len(stage.states[-1].feedback) == MAX_FEEDBACK_LENGTH
+
+    live(law())
+
+
+def test_a_bug_that_quotes_a_lone_surrogate_is_the_one_that_is_told() -> None:
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        stage.walker.fail(ValueError("no model caf\udce9"))
+        with pytest.raises(ValueError, match="no model"):
+            await life
+        assert stage.states[-1].feedback == "ValueError: no model caf\\udce9"
+        msgspec.msgpack.encode(stage.states[-1])
 
     live(law())
 

@@ -15,6 +15,7 @@ from sample_modules import Number
 
 from backbone.errors import complaint
 from backbone.exchange_course import ExchangePhase, ExchangeRules
+from backbone.ranges import LONGEST_LINE
 from mission_control.modules.exchange import Exchange, Turned, handed_over
 from mission_control.modules.exchangeable import judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
@@ -291,6 +292,12 @@ def test_a_complaint_names_the_line() -> None:
     with pytest.raises(msgspec.DecodeError) as raised:
         msgspec.json.decode(b"{")
     assert f"{__file__}, line " in complaint(raised.value)
+
+
+def test_a_complaint_can_be_sent_whatever_the_exception_says() -> None:
+    told = complaint(ValueError("caf\udce9 \x1b[2J" + "x" * 300_000))
+    assert told.startswith(r"ValueError: caf\udce9 \x1b[2Jxxx")
+    assert len(told) < LONGEST_LINE
 
 
 def test_a_reset_ends_an_exchange() -> None:

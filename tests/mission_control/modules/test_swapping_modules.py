@@ -254,6 +254,7 @@ def test_a_class_that_cannot_be_made_is_refused_and_nothing_changes(
         ("return self.Outputs(Level(1.0))", "Level as count, not"),
         ("import sys; sys.exit(3)", "SystemExit: 3"),
         ("raise KeyboardInterrupt", "KeyboardInterrupt"),
+        (r"raise ValueError('no model caf\udce9')", r"no model caf\udce9"),
         ("return self.Outputs(None)", "not ready within"),
     ],
 )
@@ -271,6 +272,7 @@ def test_a_new_one_that_fails_gives_way_to_the_old_one_and_the_cause_is_named(
         stage.count_on()
         assert {one.who for one in stage.counts} == {"first"}
         assert cause in await stage.feedback()
+        msgspec.msgpack.encode([swapped, await stage.feedback()])
         level, what = (await stage.story())[-1]
         assert (level, cause in what) == (LogLevel.WARNING, True)
         assert "uses the present file" in swapped.remark
