@@ -124,8 +124,8 @@ class ExchangeCourse:
         ended_s = now_s if self.ended_s is None else self.ended_s
         switched_s = ended_s if self.switched_s is None else self.switched_s
         is_proved = self.phase is ExchangePhase.PROVED
-        times = switched_s - self.began_s, ended_s - switched_s
-        return Swapped(is_proved, self.cause, self.keeps_state, *times, self.rounds, remark)
+        warming_s = max(0.0, switched_s - self.began_s)  # the round that began it may be older than the request
+        return Swapped(is_proved, self.cause, self.keeps_state, warming_s, ended_s - switched_s, self.rounds, remark)
 
     def outcome(self, old: str, new: str) -> str:
         """Return the outcome as a sentence for people.

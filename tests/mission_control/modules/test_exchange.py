@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 import msgspec
@@ -14,8 +15,10 @@ from hypothesis import strategies as st
 from sample_modules import Number
 
 from backbone.errors import complaint
+from backbone.exchange import Swapped
 from backbone.exchange_course import ExchangePhase, ExchangeRules
 from backbone.ranges import LONGEST_LINE
+from backbone.wire import WIRE_VERSION, Envelope, Reader, write
 from mission_control.modules.exchange import Exchange, Turned, handed_over
 from mission_control.modules.exchangeable import judge_of, kinds_made
 from mission_control.modules.execution_unit import ExecutionUnit, WantedExchange
@@ -298,6 +301,18 @@ def test_a_complaint_can_be_sent_whatever_the_exception_says() -> None:
     told = complaint(ValueError("caf\udce9 \x1b[2J" + "x" * 300_000))
     assert told.startswith(r"ValueError: caf\udce9 \x1b[2Jxxx")
     assert len(told) < LONGEST_LINE
+
+
+def test_the_answer_can_be_sent_although_the_round_is_older_than_the_request() -> None:
+    old = Tally()
+    old.state.got = Lock()  # type: ignore[assignment]  # it cannot be copied
+    unit, exchange = unit_of(old), Exchange(ExchangeRules(1.0, 1.0), lambda: True, lambda: None, 10.5)
+    unit.exchange(WantedExchange(GRAPH, "tally", Tally(), exchange, lambda _outputs: None))
+    unit.run(10.0)  # it began at 10.0 and ends after the request
+    assert "cannot pickle" in exchange.cause
+    told = exchange.answer(11.0)
+    sent = write(Envelope(WIRE_VERSION, "kit/kit", 0, 0.0, "", told))
+    assert Reader(Swapped).read(sent).body == told
 
 
 def test_a_reset_ends_an_exchange() -> None:
