@@ -128,7 +128,7 @@ class DriverExchanges:
         if going.is_beside:
             self._put_back(going)
         elif not going.back.is_set():
-            going.slot.shut()
+            going.slot.shut(has_device=False)
         return going.back
 
     def _put_back(self, going: _DriverExchange) -> None:
@@ -227,7 +227,7 @@ class DriverExchanges:
         if not hasattr(going.new, "open"):
             return
         if not going.is_beside:
-            going.slot.shut()
+            going.slot.shut(has_device=False)
             await going.slot.wait_quiet()
             await self._close(going.old)
         within_s = going.asked.ready_within_s / self._rc.clock.rate
@@ -258,9 +258,12 @@ class DriverExchanges:
         self._tell(f"{going.asked.class_path} works, and has to prove itself", LogLevel.INFO)
 
     async def _brought_up(self, going: _DriverExchange) -> None:
+        """Let the RC restore the state of a driver that has taken over."""
+        if going.course.switched_s is not None:
+            await self._restored(going)
+
+    async def _restored(self, going: _DriverExchange) -> None:
         """Let the RC restore the driver's state; a fault during that counts as a fault of the working driver."""
-        if going.course.switched_s is None:
-            return
         try:
             await self._rc.driver_exchanged()
         except HardwareFault as fault:
@@ -279,7 +282,8 @@ class DriverExchanges:
         self._put_back(going)
         old, new = class_path_of(going.old), going.asked.class_path
         self._tell(going.course.outcome(old, new), LogLevel.WARNING)
-        await self._brought_up(going)
+        if going.course.switched_s is not None or not going.is_beside:
+            await self._restored(going)
         if going.is_beside:
             await self._close(going.new)
         return remark_on_file(self._rc.name, old, new)

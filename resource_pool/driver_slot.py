@@ -3,7 +3,8 @@
 Rules of this file:
 
 * At any instant exactly one driver works: all calls go to this driver, and only its callbacks arrive.
-* A new driver takes over while no call is in progress. Calls wait while no device is open.
+* A new driver takes over while no call is in progress. While no device is open, asynchronous calls wait, and what
+synchronous calls raise is dropped, because the RC repeats its settings afterwards.
 * While a driver is on trial, its bugs and hardware faults, and calls that hang, reach the RC only if the old driver
   cannot do the same call.
 """
@@ -33,12 +34,13 @@ class DriverSlot:
             otherwise an event that is set when the old driver works again.
         calls: Calls that were answered.
         is_tried: True: the driver that works is on trial.
+        has_device: False: no device is open, until the gate is opened.
     """
 
     def __init__(self, driver: object) -> None:
         self.works = driver
         self.on_trial: Callable[[BaseException], asyncio.Event | None] = lambda _error: None
-        self.calls, self.is_tried = 0, False
+        self.calls, self.is_tried, self.has_device = 0, False, True
         self._opened, self._quiet = asyncio.Event(), asyncio.Event()
         self._opened.set()
         self._quiet.set()
@@ -49,12 +51,18 @@ class DriverSlot:
         return found
 
     # ------------------------------------------------------------------ for the exchange
-    def shut(self) -> None:
-        """Make calls wait from now on."""
+    def shut(self, *, has_device: bool = True) -> None:
+        """Make asynchronous calls wait from now on.
+
+        Args:
+            has_device: False: no device stays open.
+        """
+        self.has_device = self.has_device and has_device
         self._opened.clear()
 
     def open_gate(self) -> None:
         """Pass calls to the working driver from now on."""
+        self.has_device = True
         self._opened.set()
 
     async def wait_open(self) -> None:
@@ -72,6 +80,8 @@ class DriverSlot:
         try:
             done: object = getattr(driver, name)(*(self._while_works(driver, one) for one in arguments), **named)
         except UNPROVED as error:
+            if not self.has_device and not _is_no_fault(error):
+                return None
             back = None if _is_no_fault(error) else self.on_trial(error)
             if back is None:
                 raise

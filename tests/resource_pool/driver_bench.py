@@ -12,9 +12,12 @@ class Bench:
     shone: ClassVar[list[tuple[str, float]]] = []
     most_open: ClassVar[int] = 0
     fault: ClassVar[str] = ""
+    tuned: ClassVar[dict[str, str]] = {}
+    """Open camera → its frequency."""
 
     @classmethod
     def clear(cls) -> None:
         cls.opened.clear()
         cls.shone.clear()
+        cls.tuned.clear()
         cls.most_open, cls.fault = 0, ""

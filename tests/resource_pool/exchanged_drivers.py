@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 
 import msgspec
 from driver_bench import Bench
 
-from resource_pool.drivers.interface import DriverSite, HardwareFault
+from resource_pool.drivers.interface import DriverSite, HardwareFault, Picture
 from resource_pool.drivers.simulated import SimulatedScoutProtocol
 
 
@@ -71,6 +72,42 @@ class SecondBeside(Second):
 class Mistyped(Second):
     class options_type(msgspec.Struct):  # noqa: N801  its name in a driver
         gamma: flaot = 1.0  # type: ignore[name-defined]  # noqa: F821
+
+
+class FirstCamera:
+    """A camera that can be opened once, and knows nothing while it is closed."""
+
+    def __init__(self, site: DriverSite) -> None:
+        self.site, self.who = site, type(self).__name__
+
+    async def open(self) -> None:
+        await asyncio.sleep(0.5)
+        if Bench.fault == "open" and self.who == "SecondCamera":
+            raise HardwareFault("no such device")
+        Bench.tuned[self.who] = ""
+
+    def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
+        self._set(frequency)
+
+    def stop(self) -> None:
+        self._set("")
+
+    async def close(self) -> None:
+        Bench.tuned.pop(self.who, None)
+
+    def _set(self, frequency: str) -> None:
+        if self.who not in Bench.tuned:
+            raise HardwareFault("the device is not open")
+        Bench.tuned[self.who] = frequency
+
+
+class SecondCamera(FirstCamera):
+    """Another one, which fails as the test says."""
+
+    def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
+        super().tune(frequency, deliver)
+        if Bench.fault == "task":
+            self.site.fail(OSError("pulled"))
 
 
 class NoLamp:

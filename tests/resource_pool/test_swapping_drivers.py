@@ -17,6 +17,7 @@ from pool_orders import command, connect_robot
 
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import AskParameters, Parameters, WrongParameter
+from backbone.dependency_database.messages import Resource
 from backbone.errors import Refusal
 from backbone.exchange import ExchangeRunning, SwapClass, Swapped
 from backbone.keys import Conversation
@@ -232,6 +233,50 @@ def test_a_grabber_delivers_on_and_only_once(local_mission: Any) -> None:
 
     with the_pool_is_read_anew():
         run_virtual(main())
+
+
+def a_camera(local_mission: Any, scene: Callable[[Pool], Awaitable[None]]) -> None:
+    """Let an ARC hold a camera that can be opened once, and play the scene."""
+    camera = Resource("camera", "framegrabber", driver=f"{DRIVERS}:FirstCamera", links={"video_frequency": ["video"]})
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["camera"], manager=False, hardware=[camera]) as pool:
+            await held_and_tuned(pool, 1)
+            await scene(pool)
+
+    run_virtual(main())
+
+
+async def held_and_tuned(pool: Pool, epoch: int) -> None:
+    at = "resource_pool/camera"
+    await pool.manager_voice.ask(at, Connect("one", epoch, 30.0, RcUse(), {}), Connected, within_s=1)
+    await pool.voice("one").ask(at, Tune("video", "").under("one", epoch), Applied, within_s=1)
+
+
+def test_a_camera_that_is_opened_again_delivers_as_before(local_mission: Any) -> None:
+    async def scene(pool: Pool) -> None:
+        assert Bench.tuned == {"FirstCamera": "video"}
+        Bench.fault = "open"
+        swapped = await swap(pool, "SecondCamera", at="resource_pool/camera")
+        assert "no such device" in swapped.cause
+        assert Bench.tuned == {"FirstCamera": "video"}
+
+    a_camera(local_mission, scene)
+
+
+@pytest.mark.parametrize(("fault", "closed_s"), [("", 0.3), ("open", 0.3), ("task", 0.8)])
+def test_a_grant_may_pass_on_while_no_camera_is_open(local_mission: Any, fault: str, closed_s: float) -> None:
+    async def scene(pool: Pool) -> None:
+        Bench.fault = fault
+        swapping = asyncio.create_task(swap(pool, "SecondCamera", at="resource_pool/camera"))
+        await pool.clock.sleep_s(closed_s)
+        assert Bench.tuned == {}
+        await pool.manager_voice.ask("resource_pool/camera", Disconnect("one", 1), Disconnected, within_s=1)
+        await held_and_tuned(pool, 2)
+        assert (await swapping).is_proved is (fault == "")
+        assert Bench.tuned == {"FirstCamera" if fault else "SecondCamera": "video"}
+
+    a_camera(local_mission, scene)
 
 
 def test_a_protocol_is_exchanged_under_the_robot_s_name(local_mission: Any) -> None:
