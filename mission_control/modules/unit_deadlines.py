@@ -10,6 +10,8 @@ from backbone.deadlines import Deadlines
 from backbone.ranges import LONGEST_MENTION
 from mission_control.modules.orders import UnitParameters
 
+LEAST_PAUSE_S = 0.02  # chosen: a person sees no delay, and fifty looks a second cost nothing; seconds of the machine
+
 
 class UnitDeadlines:
     """Watches the deadlines of one unit; create it when the unit subscribes.
@@ -47,14 +49,15 @@ class UnitDeadlines:
 
     async def watch(self) -> None:
         """Publish an event as soon as a key is late; return if there are no deadlines."""
+        clock = self._component.clock
         while self._within_s:
-            now_s = self._component.clock.now_s()
+            now_s = clock.now_s()
             for key in self._deadlines.newly_missed(now_s):
                 told = f"no value from {self._sources[key].address} within {self._within_s[key]:g} s"
                 self._component.publish_event(key, told, LogLevel.WARNING)
                 self._changed()
-            look_again_s = now_s + min(self._within_s.values())  # for keys that are late now and arrive again
-            await self._component.clock.sleep_until_s(min(self._deadlines.next_s, look_again_s))
+            pause_s = max(LEAST_PAUSE_S * clock.rate, min(self._within_s.values()))  # for late keys that arrive again
+            await clock.sleep_until_s(min(self._deadlines.next_s, now_s + pause_s))
 
     def statistics(self) -> dict[str, float]:
         """Return the number of misses of each deadline, by the key on the bus."""

@@ -26,7 +26,7 @@ from backbone.component.messages import (
     StoryEvent,
     WrongParameter,
 )
-from backbone.deadlines import FIRST_S
+from backbone.deadlines import FIRST_S, Deadlines
 from backbone.debug_views import ListViews, Views
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
@@ -38,6 +38,7 @@ from mission_control.modules.graph import GraphRefused
 from mission_control.modules.module import Module
 from mission_control.modules.orders import ModuleOrder, Source, UnitParameters, WrongModule
 from mission_control.modules.unit_component import UnitComponent
+from mission_control.modules.unit_deadlines import LEAST_PAUSE_S
 
 TESTER = "ui_console/tester"
 NUMBERS = {"number": GivenKey("sample_modules:Number", Source(TESTER, Conversation.EVENTS))}
@@ -179,6 +180,31 @@ def test_a_missed_deadline_is_told_once_and_so_is_its_end(local_mission: Any, be
 
     deadline = {"number": OutputQuality(deadline_s=0.25).quality}
     play(local_mission, beside, arranged(orders(ARRANGEMENTS[1], own_thread), NUMBERS, deadline), scene)
+
+
+def test_a_late_source_costs_little_until_it_speaks_again(
+    local_mission: Any, beside: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    look, looks = Deadlines.newly_missed, itertools.count(1)
+
+    def seldom(deadlines: Deadlines, now_s: float) -> list[str]:
+        assert next(looks) < 70.0 / LEAST_PAUSE_S
+        return look(deadlines, now_s)
+
+    monkeypatch.setattr(Deadlines, "newly_missed", seldom)
+
+    async def scene(bus: Bus, started: dict[str, UnitComponent]) -> None:
+        told: list[str] = []
+        bus.subscribe("mission_control/first", Conversation.LOG, StoryEvent, lambda one: told.append(one.body.what))
+        bus.publish(TESTER, Conversation.EVENTS, Number(1.0))
+        await VirtualClock().sleep_s(60.0)
+        bus.publish(TESTER, Conversation.EVENTS, Number(2.0))
+        await VirtualClock().sleep_s(1.0)
+        late, again = f"no value from {TESTER} within 1e-09 s", "comes again, 60.000 s late"
+        assert told == [late, again, late]
+
+    deadline = {"number": OutputQuality(deadline_s=1e-9).quality}
+    play(local_mission, beside, arranged(orders(ARRANGEMENTS[1]), NUMBERS, deadline), scene)
 
 
 def test_a_source_that_never_speaks_is_told_when_a_mission_could_be_up(local_mission: Any, beside: Any) -> None:
