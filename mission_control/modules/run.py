@@ -51,6 +51,7 @@ def run(
 
     Raises:
         GraphRefused: They cannot be connected; it says everything at once.
+        NothingToHear: No module produces a key of ``listen``.
     """
     clock = MissionClock.started_now()
     units = connected(*modules, frequency_hz=frequency_hz, start_s=clock.now_s())

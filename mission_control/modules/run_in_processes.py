@@ -37,7 +37,7 @@ from mission_control.modules.module import Module, default_name
 from mission_control.modules.orders import ModuleOrder, UnitParameters, is_message, output_address
 from mission_control.modules.ports import kinds_of_ports
 from mission_control.modules.unit_component import UnitComponent
-from mission_control.modules.units_together import Listener
+from mission_control.modules.units_together import Listener, check_heard
 
 MISSION = "modules"
 READY_WITHIN_S = 20.0  # chosen: a busy machine opens a session in a second
@@ -87,9 +87,13 @@ def run_in_processes(
     Raises:
         GraphRefused: The modules cannot be connected, or exchange values that are not messages; the error lists all
             faults.
+        NothingToHear: No module produces a key of ``listen``, or its values are no messages.
         ModuleProcessFell: A process ended before the time was over.
     """
     units = _units(modules, frequency_hz)
+    published = {key for one in units.values() for key in one.published}
+    for key in listen or {}:
+        check_heard(key, published)
     clock = MissionClock.started_now()
     with tempfile.TemporaryDirectory(prefix="scout-") as folder, ExitStack() as stack:
         children: list[_Child] = []

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
+from backbone.errors import Refusal
+from backbone.naming import did_you_mean
 from mission_control.modules.execution_unit import ExecutionUnit, Stopwatch, UnitStatistics
 from mission_control.modules.graph import Graph
 from mission_control.modules.module import Module
@@ -17,6 +19,23 @@ from mission_control.modules.unit_schedule import Trigger
 
 Listener = Callable[[Any], None]
 """Called with each value of a key; it takes values of that key's class."""
+
+
+class NothingToHear(Refusal):
+    """A listener of a key that no module produces would never be called."""
+
+    code = "module.listener"
+    remedy = "Name the key of an output."
+
+
+def check_heard(key: str, produced: Collection[str]) -> None:
+    """Return if values of this key are produced.
+
+    Raises:
+        NothingToHear: They are not.
+    """
+    if key not in produced:
+        raise NothingToHear(f"nothing produces {key!r} for a listener{did_you_mean(key, produced)}")
 
 
 class UnitsTogether:
@@ -43,6 +62,8 @@ class UnitsTogether:
             name: ExecutionUnit(name, graph, modules, given.get(name, Trigger()), start_s, stopwatch)
             for name in graph.units
         }
+        members = [member for of in graph.units.values() for member in of]
+        self._produced = {key for member in members for key, _port in member.keyed_outputs}
         self._consumers: dict[str, list[ExecutionUnit]] = defaultdict(list)
         for one in graph.connections:
             self._consumers[one.key].append(self._units[one.consumer])
@@ -54,7 +75,12 @@ class UnitsTogether:
         return min((unit.due_s for unit in self._units.values()), default=float("inf"))
 
     def listen(self, key: str, listener: Listener) -> None:
-        """Call the listener with each produced value of this key."""
+        """Call the listener with each produced value of this key.
+
+        Raises:
+            NothingToHear: No module produces it.
+        """
+        check_heard(key, self._produced)
         self._listeners[key].append(listener)
 
     def feed(self, key: str, value: object, now_s: float) -> None:

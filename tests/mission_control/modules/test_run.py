@@ -6,6 +6,7 @@ import re
 import runpy
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from mission_control.modules.graph import GraphRefused, NoProducer
 from mission_control.modules.ports import type_name
 from mission_control.modules.run import UNIT, connected, run, run_units
+from mission_control.modules.run_in_processes import run_in_processes
+from mission_control.modules.units_together import NothingToHear
 
 TOP = Path(__file__).parents[3]
 PAIR, GUIDE = TOP / "docs/examples/pair.py", TOP / "docs/how-to/write-a-module.md"
@@ -48,6 +51,12 @@ def test_what_cannot_be_connected_is_refused_before_anything_runs() -> None:
     with pytest.raises(GraphRefused) as refused:
         run(Doubler(), for_s=1.0)
     assert [type(one) for one in refused.value.faults] == [NoProducer]
+
+
+@pytest.mark.parametrize("runs", [run, run_in_processes])
+def test_a_listener_of_what_nobody_makes_is_refused_before_anything_runs(runs: Callable[..., object]) -> None:
+    with pytest.raises(NothingToHear, match="did you mean 'twice'"):
+        runs(Doubler(), Counter(), for_s=0.1, listen={"twise": print})
 
 
 @pytest.mark.processes
