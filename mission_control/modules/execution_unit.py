@@ -62,7 +62,7 @@ class UnitStatistics(msgspec.Struct, frozen=True):
 
     Attributes:
         rounds: Number of rounds.
-        rate_hz: Recent rate of rounds, Hz.
+        rate_hz: Recent rate of rounds, Hz; it falls while no round begins.
         ticks: Rounds that the frequency began.
         missed: Ticks without a round, because an earlier round was too late.
         mean_late_s: Mean delay of the rounds of the frequency.
@@ -323,12 +323,16 @@ class ExecutionUnit:
                 one.seen = 0
         self._begin(start_s)
 
-    def statistics(self) -> UnitStatistics:
-        """Return the unit's statistics."""
+    def statistics(self, now_s: float = 0.0) -> UnitStatistics:
+        """Return the unit's statistics.
+
+        Args:
+            now_s: The recent rate falls if no round begins up to this time.
+        """
         schedule = self._schedule
         return UnitStatistics(
             schedule.rounds,
-            schedule.rate_hz,
+            schedule.rate_hz(now_s),
             schedule.ticks,
             schedule.missed,
             schedule.late_s / schedule.ticks if schedule.ticks else 0.0,

@@ -163,7 +163,7 @@ class UnitComponent(Component[UnitParameters]):
 
     def statistics(self) -> dict[str, float]:
         """Return rates, delays and missed rounds of the unit, and the run times of each module."""
-        told = self._unit.statistics()
+        told = self._unit.statistics(self.clock.now_s())
         own = {name: float(getattr(told, name)) for name in told.__struct_fields__ if name not in _TABLES}
         missed = {f"overwritten_{key}": float(count) for key, count in told.overwritten.items()}
         times = {

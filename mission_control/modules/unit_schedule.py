@@ -17,6 +17,7 @@ from typing import Annotated
 import msgspec
 
 RATE_OVER = 64  # chosen: covers a third of a second at the highest rate, a minute at one round a second
+OVERDUE = 3.0  # chosen: mean periods without a round; the rounds of an input that jitters are no farther apart
 MOST_HZ = 1000.0  # chosen: the resolution of an event loop's timers is a millisecond
 
 
@@ -101,8 +102,15 @@ class UnitSchedule:
         self.rounds += 1
         self._rounds_s.append(now_s)
 
-    @property
-    def rate_hz(self) -> float:
-        """Rate over the last ``RATE_OVER`` rounds, Hz; 0 before the second round."""
-        span_s = self._rounds_s[-1] - self._rounds_s[0] if self._rounds_s else 0.0
-        return (len(self._rounds_s) - 1) / span_s if span_s > 0 else 0.0
+    def rate_hz(self, now_s: float) -> float:
+        """Return the rate over the last ``RATE_OVER`` rounds, Hz; it falls while no round begins.
+
+        It is 0 before the second round.
+        """
+        periods = len(self._rounds_s) - 1
+        if periods < 1:
+            return 0.0
+        first_s, last_s = self._rounds_s[0], self._rounds_s[-1]
+        is_overdue = (now_s - last_s) * periods > OVERDUE * (last_s - first_s)
+        span_s = (now_s if is_overdue else last_s) - first_s
+        return periods / span_s if span_s > 0 else 0.0

@@ -44,7 +44,19 @@ def test_who_is_always_on_time_misses_nothing_and_has_the_rate_that_was_asked_fo
         assert schedule.tick(now_s)
         schedule.began(now_s)
     assert (schedule.missed, schedule.most_late_s, schedule.ticks) == (0, 0.0, rounds)
-    assert rounds == 1 or math.isclose(schedule.rate_hz, frequency_hz, rel_tol=1e-6)
+    for late in (0.0, 1.0, 2.0):
+        rate_hz = schedule.rate_hz(now_s + late / frequency_hz)
+        assert rounds == 1 or math.isclose(rate_hz, frequency_hz, rel_tol=1e-6)
+
+
+def test_the_rate_of_a_unit_that_stands_still_falls() -> None:
+    schedule = UnitSchedule(Trigger(), ("picture",), 0.0)
+    for number in range(300):
+        schedule.began(number / 30.0)
+    assert math.isclose(schedule.rate_hz(10.0), 30.0)
+    rates = [schedule.rate_hz(10.0 + seconds) for seconds in range(3600)]
+    assert rates == sorted(rates, reverse=True)
+    assert rates[-1] < 0.02
 
 
 @given(st.sets(st.sampled_from("abc")), st.lists(st.sampled_from("abcd"), max_size=40))
