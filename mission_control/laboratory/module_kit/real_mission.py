@@ -20,6 +20,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import escape
 
 import psutil
 
@@ -37,6 +38,9 @@ DOWN_WITHIN_S = 30.0  # chosen: same
 GONE_WITHIN_S = 3.0  # chosen: a killed process is gone at once, on a busy machine a moment later
 JsonObject = dict[str, Any]
 
+FILES = re.compile(r"""(?:\bmjcf|\bname\s*=\s*["']floor_plan["']\s+value)\s*=\s*["'](?=[^/"'])""")
+"""Begin of an attribute that names a file relative to the mission file."""
+QUOTES = {'"': "&quot;", "'": "&apos;"}
 LAST_LINES, LAST_OF_A_LOG = 60, 15  # chosen: a person reads no more of a failure
 
 
@@ -189,7 +193,7 @@ def mission_up(
     """Bring a mission up, yield it when it is ready, and afterwards end everything that is left of it.
 
     Args:
-        mission: Path of a mission file, or its text.
+        mission: Path of a mission file, or its text; relative paths in a text refer to the working directory.
         options: Further arguments for ``up``.
         name: Name of the mission; left out: a unique name.
         change: Texts to replace in the file.
@@ -199,7 +203,7 @@ def mission_up(
     name = name or f"test-{mark[:8]}"
     with tempfile.TemporaryDirectory(prefix="scout-test-") as folder:
         file = Path(folder) / "mission.xml"
-        file.write_text(_renamed(mission, name, change or {}))
+        file.write_text(mission_text(mission, name, change or {}))
         runtime = folder if beside is None else beside.environment["XDG_RUNTIME_DIR"]
         environment = {**os.environ, "XDG_RUNTIME_DIR": runtime, MARK: mark}
         words = [str(BIN / "scout-backbone"), "up", str(file), "--headless", *options]
@@ -223,15 +227,20 @@ def mission_up(
                 reader.join(5)
 
 
-def _renamed(mission: Path | str, name: str, change: Mapping[str, str]) -> str:
-    """Return the mission's text with this name and these texts replaced."""
+def mission_text(mission: Path | str, name: str, change: Mapping[str, str]) -> str:
+    """Return the mission's text with this name and these texts replaced, for a file in any folder.
+
+    Relative paths of rooms and floor plans become absolute; in a text they are relative to the working directory.
+    """
     text = mission if is_text(mission) else Path(mission).read_text()
     text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', rf"\g<1>{name}", text, count=1)
     for old, new in change.items():
         if old not in text:
             raise AssertionError(f"{old!r} is not in {mission}")
         text = text.replace(old, new)
-    return text
+    folder = Path.cwd() if is_text(mission) else Path(mission).resolve().parent
+    begin = escape(f"{folder}/", QUOTES)
+    return FILES.sub(lambda found: found[0] + begin, text)
 
 
 def _started(words: Sequence[str], environment: Mapping[str, str]) -> subprocess.Popen[str]:
