@@ -13,7 +13,6 @@ from typing import Protocol
 
 from backbone.bus.interface import Clock
 from backbone.errors import LinkError
-from backbone.reading_anew import WrongClass
 from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.child_keeper import AGAIN_AFTER_S, end_task
 from mission_control.gated_bus import GatedBus
@@ -90,10 +89,6 @@ class Acting:
                 return None
             except LinkError as error:
                 log.info("%s acts again: %s", self._actor.name, error)
-            except (SystemExit, KeyboardInterrupt) as left:
-                if self._actor.gate.is_first:
-                    raise
-                raise WrongClass(f"{type(left).__name__}: {left}") from left  # of a class that has not proved itself
             except EmergencyStopped as stopped:
                 await self._wait_until_it_may_move(arc, stopped)
                 continue

@@ -37,7 +37,7 @@ from mission_control.child_keeper import end_by_placer
 from mission_control.children import Children, Decision
 from mission_control.children_loop import ChildrenLoop
 from mission_control.debug_views import DebugViews
-from mission_control.gated_bus import GatedBus
+from mission_control.gated_bus import GatedBus, without_exit
 from mission_control.keeper_reports import KeeperReports
 from mission_control.messages import (
     AskBehavior,
@@ -209,6 +209,14 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Run this class and every class that replaces it; see ``Component.run``."""
         life = super().run()
         await (self.exchanges.run(life) if self.gate.is_first else life)
+
+    def start_task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
+        """Run the coroutine beside ``serve``; an exit of a class that has replaced another one is its bug."""
+        if self.gate.is_first:
+            return super().start_task(work, name)
+        task = super().start_task(without_exit(work), name)
+        task.add_done_callback(lambda _ended: work.close())  # it may be cancelled before it begins
+        return task
 
     def end(self, reason: str) -> None:
         """End the component in good order."""

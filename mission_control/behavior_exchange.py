@@ -34,9 +34,10 @@ from backbone.exchange_course import (
 from backbone.launcher.messages import TakeBranch
 from backbone.placer.messages import ReviseStart
 from backbone.placer.revising import revise_start
-from backbone.reading_anew import ReadAnew, WrongClass, read_anew
+from backbone.reading_anew import ReadAnew, read_anew
 from backbone.waiting import end_tasks
 from backbone.wire import Envelope, Message
+from mission_control.gated_bus import without_exit
 from mission_control.implementation import (
     Implementation,
     Load,
@@ -209,7 +210,7 @@ class BehaviorExchanges:
         rules = ExchangeRules(asked.prove_s, asked.ready_within_s)
         course = ExchangeCourse(rules, self._changed, old.clock.now_s())
         going = self._exchange = _BehaviorExchange(asked, old, new, course)
-        self._begin(new, _survived(new.run()))
+        self._begin(new, without_exit(new.run()))
         await self._until_over(going)
         remark = await (self._proved(going) if course.phase is ExchangePhase.PROVED else self._returned(going, anew))
         return course.answer(old.clock.now_s(), remark)
@@ -273,11 +274,3 @@ class BehaviorExchanges:
     def _tell(self, what: str, level: LogLevel = LogLevel.NOTICE) -> None:
         self.present.publish_event(self.present.launch.name, what, level)
         self.present.report(what)
-
-
-async def _survived(life: Coroutine[object, None, None]) -> None:
-    """Run; if the class calls for an exit, that is its failure, and the process continues."""
-    try:
-        await life
-    except (SystemExit, KeyboardInterrupt) as error:
-        raise WrongClass(complaint(error)) from error

@@ -11,8 +11,9 @@ Rules of this file:
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
-from typing import cast
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import TypeVar, cast
 
 from backbone.bus.interface import (
     Answer,
@@ -27,19 +28,39 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.component.messages import Register, Registered
-from backbone.errors import Refusal
+from backbone.errors import Refusal, complaint
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.quality import Quality
 from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from resource_pool.arc_client import SwappedOut
 
+T = TypeVar("T")
+EXITS = (SystemExit, KeyboardInterrupt)
+"""Of a class that has replaced another one they are a bug; the process does not end at once."""
 READS = ("Ask", "List")
 POOL = f"{Subsystem.RESOURCE_POOL}/"
 
 
 async def _unready(asked: Envelope[Message]) -> Message:
     raise UnknownMessage(f"{type(asked.body).__name__} comes before its start is over")
+
+
+def as_bug(left: BaseException) -> RuntimeError:
+    """Return an exit as an exception that ends only the implementation."""
+    return RuntimeError(complaint(left))
+
+
+async def without_exit(work: Awaitable[T]) -> T:
+    """Return the result of the work; an exit becomes a bug."""
+    try:
+        return await work
+    except EXITS as left:
+        raise as_bug(left) from left
+
+
+async def _answer_without_exit(answer: Answer, asked: Envelope[Message]) -> Message:
+    return await without_exit(answer(asked))
 
 
 class GatedBus:
@@ -146,7 +167,7 @@ class GatedBus:
     # ------------------------------------------------------------------ what is heard
     def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to the component while in charge; see ``Bus.serve``."""
-        self.answer = answer
+        self.answer = answer if self.is_first else partial(_answer_without_exit, answer)
         if self.is_first:
             return self.bus.serve(address, accepts, self.route or answer)
         return NoDeclaration()
@@ -227,6 +248,10 @@ class GatedBus:
                 listener(*what)
             except Exception as bug:
                 self.on_bug(bug)
+            except EXITS as left:
+                if self.is_first:
+                    raise
+                self.on_bug(as_bug(left))
 
         return heard
 

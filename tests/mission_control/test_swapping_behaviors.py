@@ -55,11 +55,7 @@ ACT = "    async def act"
 BROKEN = {
     "in its text": ("class Turner(", "class Turner((", "SyntaxError"),
     "when it is made": ("self.turns = 0", "self.turns = 1 / 0", "ZeroDivisionError"),
-    "in its parameters": (
-        "    parameters_type = TurnerParameters",
-        "    class parameters_type(TurnerParameters, frozen=True):\n        pace: 'flaot' = 1.0\n",
-        "name 'flaot' is not defined",
-    ),
+    "in a field": ("    hands", "    class parameters_type(TurnerParameters):\n        p: 'it' = 1\n    hands", "'it'"),
     "when it starts": (
         "    async def act",
         "    async def start(self):\n        raise OSError('dark')\n\n    async def act",
@@ -68,6 +64,7 @@ BROKEN = {
     "when it says whether it is ready": (ACT, f"    def is_ready(self):\n        raise OSError('dim')\n\n{ACT}", "dim"),
     "when it acts": ("self.turns += 1", "raise ValueError('planted')", "planted"),
     "by an exit": ("self.turns += 1", "raise SystemExit(3)", "SystemExit"),
+    "by an exit at a grant": (ACT, f"    async def resumed(self, _):\n        raise SystemExit\n\n{ACT}", "SystemExit"),
     "by an interruption": ("self.turns += 1", "raise KeyboardInterrupt", "KeyboardInterrupt"),
     "by its own report": (
         "self.turns += 1",
