@@ -4,7 +4,7 @@ Rules of this file:
 
 * At any instant exactly one driver works: all calls go to this driver, and only its callbacks arrive.
 * A new driver takes over while no call is in progress. While no device is open, asynchronous calls wait, and what
-synchronous calls raise is dropped, because the RC repeats its settings afterwards.
+  synchronous calls raise is dropped, because the RC repeats its settings afterwards.
 * While a driver is on trial, its bugs and hardware faults, and calls that hang, reach the RC only if the old driver
   cannot do the same call.
 """
