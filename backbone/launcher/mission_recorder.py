@@ -29,6 +29,8 @@ BEGUN_WITHIN_S = 20.0  # chosen: as long as a component has to become ready
 ENDED_WITHIN_S = 10.0  # chosen: writing the index of an hour takes less than a second
 AGAIN_AFTER_S = 1.0  # chosen: the cause of its end may be over by then; seconds of the machine
 NAME = "recorder"
+BEGUN = "records to"
+"""Begin of the line that a recorder prints when it listens."""
 
 log = logging.getLogger(__name__)
 
@@ -121,9 +123,9 @@ class MissionRecorder:
         except TimeoutError:
             said = f"it did not begin within {BEGUN_WITHIN_S:g} s"
         self._reading = asyncio.create_task(_last_line(process), name="what the recorder says")
-        if not said.startswith("records to"):
+        if not said.startswith(BEGUN):
             await self.end()
-            raise RecorderFailed(f"the recorder did not begin: {said.strip() or 'it ended without a word'}")
+            raise RecorderFailed(f"the recorder did not begin: {said or 'it ended without a word'}")
         assert process.stdout is not None  # noqa: S101  a pipe
         self._watching = asyncio.create_task(watch(process.stdout, self._silent), name="whether the recorder responds")
 
@@ -162,9 +164,10 @@ class MissionRecorder:
         self._process = None
 
     async def _tell_facts(self, process: Process) -> str:
-        """Write the facts of the mission to the recorder; return the first line that the recorder prints.
+        """Write the facts of the mission to the recorder; return its line that it records, or else the last line.
 
-        Without facts the recorder's input stays open. When this process ends, that input closes, and the recorder ends.
+        Other lines may come first, because a module of the mission may print when it is imported. Without facts the
+        recorder's input stays open. When this process ends, that input closes, and the recorder ends.
         """
         assert process.stdin is not None and process.stderr is not None  # noqa: S101, PT018  both are pipes
         if self._facts:
@@ -172,7 +175,10 @@ class MissionRecorder:
                 process.stdin.write(self._facts)
                 await process.stdin.drain()
             process.stdin.close()
-        return (await process.stderr.readline()).decode(errors="replace")
+        said = ""
+        while not said.startswith(BEGUN) and (line := await process.stderr.readline()):
+            said = _text(line) or said
+        return said
 
     async def _ended(self) -> str:
         """Return the last line that it said, or its exit code, when it has ended."""
@@ -205,7 +211,12 @@ async def _last_line(process: Process) -> str:
     assert process.stderr is not None  # noqa: S101  a pipe
     last = ""
     async for line in process.stderr:
-        last = line.decode(errors="replace").strip()
-        log.info("recorder: %s", last)
+        last = _text(line)
     await process.wait()
     return last
+
+
+def _text(line: bytes) -> str:
+    text = line.decode(errors="replace").strip()
+    log.info("recorder: %s", text)
+    return text

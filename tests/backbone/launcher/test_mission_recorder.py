@@ -1,4 +1,4 @@
-"""A recorder whose begin is broken off leaves no process behind, and its end goes well."""
+"""A recorder begins, whatever it prints before. If its begin is broken off, no process is left; its end goes well."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 
 from backbone.bus.clock import MissionClock
 from backbone.launcher import mission_recorder
-from backbone.launcher.mission_recorder import MissionRecorder
+from backbone.launcher.mission_recorder import MissionRecorder, RecorderFailed
 from backbone.waiting import end_tasks
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(60)]
@@ -28,6 +28,7 @@ trap '' TERM
 touch hangs
 while :; do sleep 0.1; done
 """
+WARNS = "echo 'old.py:2: UserWarning: this module is old' >&2"
 FALLS_ONCE = "test -e fell || { touch fell; echo records to night.mcap >&2; echo the disc is gone >&2; exit 1; }"
 
 
@@ -79,3 +80,21 @@ async def test_one_that_fell_and_whose_next_begin_is_broken_off(
         await recorder.end()
     finally:
         assert left(tmp_path) == []
+
+
+async def test_one_that_prints_a_warning_first_has_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = played(tmp_path, f"{WARNS}; echo records to night.mcap >&2", monkeypatch)
+    try:
+        await recorder.begin()
+        assert recorder.absence() is None
+    finally:
+        await recorder.end()
+        assert left(tmp_path) == []
+
+
+async def test_of_one_that_cannot_begin_the_last_line_is_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder = played(tmp_path, f"{WARNS}; echo night.mcap cannot be written >&2; exit 5", monkeypatch)
+    with pytest.raises(RecorderFailed, match=r"did not begin: night\.mcap cannot be written"):
+        await recorder.begin()
