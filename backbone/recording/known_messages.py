@@ -25,16 +25,16 @@ def message_classes(modules: Iterable[str] = ()) -> dict[str, type[Message]]:
     Message classes that these modules import are included.
 
     Args:
-        modules: Further modules, such as those of the mission's component types; a module that is not installed here is
-            skipped.
+        modules: Further modules, such as those of the mission's component types; a module that cannot be imported here
+            is skipped.
     """
     for entry in entry_points(group=GROUP):
         entry.load()
     for module in modules:
         try:
             importlib.import_module(module)
-        except ImportError as error:
-            log.warning("messages of %s are recorded without names: %s", module, error)
+        except Exception as error:  # a module that is being written raises anything
+            log.warning("messages of %s are recorded without names: %s: %s", module, type(error).__name__, error)
     return {schema_of(kind): kind for kind in _derived(Message)}
 
 
