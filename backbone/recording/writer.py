@@ -53,7 +53,7 @@ class RecordingWriter:
         self._hearing = Hearing(classes, keys)
         self._schemas: dict[type[Message], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
-        self._end_s = math.inf
+        self._end_s, self._is_finished = math.inf, False
         self.written = 0
         """Number of messages so far."""
         self._writer.start(profile=PROFILE, library=PROFILE)
@@ -92,8 +92,10 @@ class RecordingWriter:
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     def finish(self) -> None:
-        """Write the index, which lets readers begin anywhere; afterwards nothing more can be written."""
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        """Write the index, which lets readers begin anywhere; afterwards nothing more can be written. Idempotent."""
+        if not self._is_finished:
+            self._is_finished = True
+            self._writer.finish()  # type: ignore[no-untyped-call]
 
     def _channel_and_data(self, key: str, message: Translated) -> tuple[int, bytes]:
         """Return the number of the message's channel, and its data; if channels are scarce, with key and sender."""

@@ -199,3 +199,25 @@ def test_a_long_recording_goes_on_in_further_files(
     else:
         assert (found[0], held) == (1, written[0])
         assert len(paths) > 3
+
+
+def test_if_no_further_file_can_be_opened_it_ends_with_a_whole_file_and_says_so(
+    tmp_path: Path, local_mission: Any
+) -> None:
+    path = tmp_path / f"{'n' * 250}.mcap"  # the longest name; that of the second file is too long
+
+    async def play() -> None:
+        clock = VirtualClock()
+        async with local_mission("local") as network:
+            bus, scout = network.join("backbone/recorder", clock), network.join("resource_pool/scout1", clock)
+            recorder = Recorder(bus, clock, files=RecordingFiles(path), split_s=1.0, classes=CLASSES, about={})
+            running = asyncio.create_task(recorder.run())
+            await clock.sleep_s(0.5)
+            scout.publish(scout.source, Conversation.LOG, event(1))
+            await running
+            assert "too long" in recorder.full
+            await bus.close()
+
+    run_virtual(play())
+    with path.open("rb") as file:
+        assert "event 1" in [one.body["what"] for one in Recording(file).messages() if one.source.endswith("scout1")]
