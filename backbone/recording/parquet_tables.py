@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pyarrow as pa
 from pyarrow import parquet
@@ -16,6 +17,8 @@ _NO_KIND = (pa.ArrowInvalid, pa.ArrowTypeError, OverflowError)
 
 class ParquetTables:
     """Parquet files in a folder, one for each table; each ``write`` makes a row group.
+
+    Each file is open only while rows are written, because there may be hundreds.
 
     A column whose values have no type in common, such as numbers and texts, holds them as JSON texts.
     """
@@ -39,13 +42,28 @@ class ParquetTables:
         arrays = [_array([row.get(column) for row in rows], kind) for column, kind in kinds.items()]
         batch = pa.Table.from_arrays(arrays, names=list(kinds))
         if table not in self._writers:
-            self._writers[table] = parquet.ParquetWriter(self._folder / f"{table}.parquet", batch.schema)
+            file = _FileToAppend(self._folder / f"{table}.parquet")
+            self._writers[table] = parquet.ParquetWriter(file, batch.schema)
         self._writers[table].write_table(batch)
 
     def close(self) -> None:
         """Write the ends of the files; without them no file is readable."""
         for writer in self._writers.values():
             writer.close()
+
+
+class _FileToAppend(io.RawIOBase):
+    """A file that is open only while it is written."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: Any) -> int:
+        with self._path.open("ab") as file:
+            return file.write(data)
 
 
 def _common_kind(known: pa.DataType | None, values: list[object]) -> pa.DataType | None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import os
+import resource
 import tempfile
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +20,7 @@ from pyarrow import parquet
 
 from backbone.recording.parquet_tables import ParquetTables
 
+MORE_FILES = 10
 LARGE = 2**63  # no integer of 64 bits
 leaves = (
     st.none() | st.booleans() | st.integers(-(2**53), LARGE) | st.floats(allow_nan=False) | st.text("aä☃", max_size=3)
@@ -79,3 +84,27 @@ def test_a_column_has_the_type_of_its_values(tmp_path: Path, column: list[Any], 
     read = found.schema_arrow.field("it").type
     assert str(read).replace("element", "item") == str(kind).replace("element", "item")
     assert found.num_row_groups == len(column)
+
+
+@contextmanager
+def few_files() -> Iterator[None]:
+    """Let this process open only a few more files while the block runs."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    is_open = set(map(int, os.listdir("/proc/self/fd")))
+    free = (number for number in itertools.count() if number not in is_open)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (next(itertools.islice(free, MORE_FILES, None)), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_there_may_be_more_tables_than_files_that_a_process_may_open(tmp_path: Path) -> None:
+    names, rows = [f"table{number}" for number in range(5 * MORE_FILES)], [{"x": 1}, {"x": 2}]
+    with few_files(), closing(ParquetTables(tmp_path)) as tables:
+        for name in names:
+            tables.learn(name, rows)
+        for row in rows:
+            for name in names:
+                tables.write(name, [row])
+    assert all(parquet.read_table(tmp_path / f"{name}.parquet").to_pylist() == rows for name in names)
