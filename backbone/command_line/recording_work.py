@@ -35,10 +35,8 @@ from backbone.launcher.messages import AskTree, Tree
 from backbone.launcher.recorder_beats import RecorderBeats, address_of_recorder
 from backbone.launcher.recorder_signs import RecorderSigns
 from backbone.mission_log.lines import event_json, story_lines
-from backbone.mission_log.log import MissionLog
+from backbone.mission_log.log import FOR_EVER_S, AskLog, MissionLog
 from backbone.mission_log.operators import OperatorActed, login_name
-from backbone.mission_log.question import LogQuestion
-from backbone.moments import Now
 from backbone.operating_system.own_process import go_behind_others
 from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
@@ -295,18 +293,16 @@ async def print_messages(
 
 
 async def print_events(path: Path, name: str, since_s: float, until_s: float | None, *, as_json: bool) -> ExitCode:
-    """Print the events about a name, as the live mission would."""
-    log = MissionLog()
+    """Print all events about a name, as the live mission would print those that it keeps."""
     with opened(path) as recording:
+        most = recording.contents().messages
+        log = MissionLog(kept=most)
         for message in recording.messages((f"*/{Conversation.LOG}", f"*/{Conversation.OPERATORS}")):
             if message.schema == "StoryEvent/1":
                 log.add(revived(StoryEvent, message.body))
             elif message.schema == "OperatorActed/1":
                 log.add(revived(OperatorActed, message.body).event(message.source, message.cause))
-        end_s = recording.contents().end_s
-    until = f"{until_s if until_s is not None else end_s + 1}"
-    asked = LogQuestion(robot=name, since=f"{since_s}", until=until).asked(Now(end_s, datetime.now()))
-    events = log.answer(asked).events
+    events = log.answer(AskLog(since_s, FOR_EVER_S if until_s is None else until_s, name, most=most)).events
     show([json.dumps(event_json(event)) for event in events] if as_json else story_lines(events))
     if not events:
         say(f"no event about {name}" if name else "no event")
