@@ -7,6 +7,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -128,14 +129,19 @@ class Recording:
         self._summary: Summary = summary
 
     def contents(self) -> Contents:
-        """Return the summary, from the index alone."""
+        """Return the summary, from the index and the facts about the mission alone.
+
+        Raises:
+            NoRecording: The facts are damaged.
+        """
         statistics = self._summary.statistics
         assert statistics is not None  # noqa: S101  checked when it was opened
         counted = statistics.channel_message_counts
         counts = [
             KeyCount(*_named(channel), counted.get(number, 0)) for number, channel in self._summary.channels.items()
         ]
-        about = next((one.metadata for one in self._reader.iter_metadata() if one.name == ABOUT), {})
+        with _refusing_damage():
+            about = next((one.metadata for one in self._reader.iter_metadata() if one.name == ABOUT), {})
         return Contents(
             dict(about),
             statistics.message_start_time / NS,
@@ -145,10 +151,15 @@ class Recording:
         )
 
     def mission_xml(self) -> str:
-        """Return the mission file; empty: the recorder did not have it."""
-        files = (one for one in self._reader.iter_attachments() if one.name == "mission.xml")
-        found = next(files, None)
-        return found.data.decode() if found is not None else ""
+        """Return the mission file; empty: the recorder did not have it.
+
+        Raises:
+            NoRecording: The mission file is damaged.
+        """
+        with _refusing_damage():
+            files = (one for one in self._reader.iter_attachments() if one.name == "mission.xml")
+            found = next(files, None)
+            return found.data.decode() if found is not None else ""
 
     def messages(
         self,
@@ -193,13 +204,19 @@ class Recording:
         end_ns = None if until_s is None else round(until_s * NS)
         begin_ns = max(0, round(since_s * NS))
         found = self._reader.iter_messages(topics, starting_at=begin_ns, ending_at=end_ns, reverse=newest_first)
-        try:
+        with _refusing_damage():
             for schema, channel, message in found:
                 recorded = _recorded(channel, message)
                 if (not patterns or is_meant(recorded.key, patterns)) and source in ("", recorded.source):
                     yield schema, channel, message, recorded
-        except DAMAGED as error:
-            raise NoRecording(f"the recording is damaged: {error}") from error
+
+
+@contextmanager
+def _refusing_damage() -> Iterator[None]:
+    try:
+        yield
+    except DAMAGED as error:
+        raise NoRecording(f"the recording is damaged: {error}") from error
 
 
 def open_file(path: Path) -> IO[bytes]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -110,6 +111,17 @@ def test_damage_never_reads_as_something_else(data: st.DataObject) -> None:
     except NoRecording:
         return
     assert found == read(whole)[: len(found)]
+
+
+@given(st.data())
+def test_of_a_damaged_file_facts_and_mission_file_are_read_or_refused(data: st.DataObject) -> None:
+    whole, _ = recorded([0, 1])
+    begin = whole.index(b"<mission/>") + len(b"<mission/>")  # facts and mission file come before the messages
+    at = data.draw(st.integers(0, begin - 1))
+    broken = whole[:at] + bytes([whole[at] ^ data.draw(st.integers(1, 255))]) + whole[at + 1 :]
+    for read_part in (Recording.contents, Recording.mission_xml):
+        with suppress(NoRecording):
+            read_part(Recording(io.BytesIO(broken)))
 
 
 @pytest.mark.parametrize("data", [b"", b"RIFF" * 100, bytes(1000)])
