@@ -1,9 +1,11 @@
-"""Event loop: runs a command's coroutine to its end."""
+"""Event loop: runs a command's coroutine to its end, or to Ctrl-C."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import signal
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 
 import uvloop
 
@@ -24,3 +26,20 @@ def exit_code_of(work: Callable[[], Awaitable[int]]) -> int:
         line, code = complaint_of(error)
         say(line)
         return int(code)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C end the block at once, although it awaits nothing.
+
+    By default Ctrl-C only cancels the coroutine, which notices that when it awaits, and so after its work.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if not callable(before):  # ignored, as in the background of a shell
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from backbone.command_line.event_loop import interruptible
 from backbone.command_line.unusable_file import FileUnusable
 from backbone.launcher.endings import ExitCode, say
 from backbone.recording.clock_offsets import ClockOffsets, Offset
@@ -23,7 +24,7 @@ async def join_to(paths: Sequence[Path], to: Path) -> ExitCode:
         NoRecording: A recording is damaged, or its recorder was killed.
         OtherMission: The recordings are of different missions or starts.
     """
-    with ExitStack() as stack:
+    with interruptible(), ExitStack() as stack:
         recordings = {str(path): _opened(path, stack) for path in paths}
         joined = _join(recordings, to)
     copies = f"; {joined.left_out} that several recorders heard stand once" if joined.left_out else ""

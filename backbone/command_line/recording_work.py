@@ -20,6 +20,7 @@ from backbone.addresses import LAUNCHER, NAMESERVER
 from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
+from backbone.command_line.event_loop import interruptible
 from backbone.command_line.joining import clock_lines, clocks_json
 from backbone.command_line.message_lines import message_json, message_line
 from backbone.command_line.options import DISTRIBUTION
@@ -210,7 +211,8 @@ def _new_files(path: Path, keep: int) -> Iterator[RecordingFiles]:
 async def recover_to(path: Path, to: Path) -> ExitCode:
     """Write all readable messages to a new file, read it back, and print their number."""
     try:
-        done = recover_file(path, to)
+        with interruptible():
+            done = recover_file(path, to)
     except FileExistsError as error:
         raise FileUnusable(f"{to} exists", remedy="Name a new file.") from error
     except OSError as error:
@@ -326,7 +328,7 @@ def _size(path: Path) -> int:
 
 @contextmanager
 def opened(path: Path) -> Iterator[Recording]:
-    """Yield the recording in this file.
+    """Yield the recording in this file; Ctrl-C ends the block at once, because reading may take minutes.
 
     Raises:
         FileUnusable: The file cannot be read.
@@ -336,5 +338,5 @@ def opened(path: Path) -> Iterator[Recording]:
         file = open_file(path)
     except OSError as error:
         raise FileUnusable(f"{path} cannot be read: {error.strerror or error}") from error
-    with file:
+    with file, interruptible():
         yield Recording(file)

@@ -153,9 +153,8 @@ async def _play_in(
         raise NoSuchTime(f"the recording ends at {found.end_s:.3f} s")
     endpoint, clock = socket_endpoint(directory), PunctualClock(time.monotonic() - since_s / wanted.speed, wanted.speed)
     bus = await ZenohBus.open_when_up(name, f"{Subsystem.BACKBONE}/{REPLAY}", clock, hub_config([endpoint]))
-    ended = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, ended.set)
+    ended, loop = asyncio.Event(), asyncio.get_running_loop()
+    loop.add_signal_handler(signal.SIGTERM, ended.set)
     player = Player(
         bus,
         clock,
@@ -169,6 +168,7 @@ async def _play_in(
     player.announces = partial(_announce, bus, clock, f"plays {path.name} from {since_s:.3f} s on")
     try:
         player.catch_up()
+        loop.add_signal_handler(signal.SIGINT, ended.set)  # before, Ctrl-C ends the reading of earlier messages
         player.begin()
         gc.collect()
         gc.freeze()  # collecting all imported objects takes tens of milliseconds (measured)
