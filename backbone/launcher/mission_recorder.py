@@ -24,13 +24,15 @@ from backbone.errors import Refusal
 from backbone.launcher.endings import ExitCode
 from backbone.launcher.recorder_signs import watch
 from backbone.mission.model import MissionDescription
+from backbone.ranges import LONGEST_LINE
 
 BEGUN_WITHIN_S = 20.0  # chosen: as long as a component has to become ready
 ENDED_WITHIN_S = 10.0  # chosen: writing the index of an hour takes less than a second
 AGAIN_AFTER_S = 1.0  # chosen: the cause of its end may be over by then; seconds of the machine
 NAME = "recorder"
 BEGUN = "records to"
-"""Begin of the line that a recorder prints when it listens."""
+"""What a recorder prints when it listens."""
+READ_BYTES = 65_536  # chosen: as much as a pipe holds on Linux
 
 log = logging.getLogger(__name__)
 
@@ -107,23 +109,20 @@ class MissionRecorder:
         Raises:
             RecorderFailed: The recorder did not begin; the detail has the reason.
         """
-        path = first_free(self._path)
-        command = ["-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
         self._reading = None
-        self._process = process = await asyncio.create_subprocess_exec(
-            *(sys.executable, *command, *self._options),
-            stdin=PIPE,
-            stdout=PIPE,
-            stderr=PIPE,
-            start_new_session=True,  # Ctrl-C at the terminal ends the launcher, which ends the recorder last
-        )
+        try:
+            self._process = process = await self._started()
+        except OSError as error:
+            raise RecorderFailed(f"the recorder did not begin: {error}") from error
+        assert process.stderr is not None  # noqa: S101  a pipe
+        lines = _Lines(process.stderr)
         try:
             async with asyncio.timeout(BEGUN_WITHIN_S):
-                said = await self._tell_facts(process)
+                said = await self._tell_facts(process, lines)
         except TimeoutError:
             said = f"it did not begin within {BEGUN_WITHIN_S:g} s"
-        self._reading = asyncio.create_task(_last_line(process), name="what the recorder says")
-        if not said.startswith(BEGUN):
+        self._reading = asyncio.create_task(_last_line(process, lines), name="what the recorder says")
+        if BEGUN not in said:
             await self.end()
             raise RecorderFailed(f"the recorder did not begin: {said or 'it ended without a word'}")
         assert process.stdout is not None  # noqa: S101  a pipe
@@ -163,20 +162,31 @@ class MissionRecorder:
             await self._ended()
         self._process = None
 
-    async def _tell_facts(self, process: Process) -> str:
+    async def _started(self) -> Process:
+        path = first_free(self._path)
+        command = ["-m", "backbone.command_line.cli", "record", "--to", str(path), "--mission", self._mission]
+        return await asyncio.create_subprocess_exec(
+            *(sys.executable, *command, *self._options),
+            stdin=PIPE,
+            stdout=PIPE,
+            stderr=PIPE,
+            start_new_session=True,  # Ctrl-C at the terminal ends the launcher, which ends the recorder last
+        )
+
+    async def _tell_facts(self, process: Process, lines: _Lines) -> str:
         """Write the facts of the mission to the recorder; return its line that it records, or else the last line.
 
-        Other lines may come first, because a module of the mission may print when it is imported. Without facts the
+        Anything may come before it, because a module of the mission may print when it is imported. Without facts the
         recorder's input stays open. When this process ends, that input closes, and the recorder ends.
         """
-        assert process.stdin is not None and process.stderr is not None  # noqa: S101, PT018  both are pipes
+        assert process.stdin is not None  # noqa: S101  a pipe
         if self._facts:
             with suppress(ConnectionError):
                 process.stdin.write(self._facts)
                 await process.stdin.drain()
             process.stdin.close()
         said = ""
-        while not said.startswith(BEGUN) and (line := await process.stderr.readline()):
+        while BEGUN not in said and (line := await lines.next()):
             said = _text(line) or said
         return said
 
@@ -206,11 +216,24 @@ class MissionRecorder:
         self.on_changed(f"lost its recorder: {cause}{f'; {doing}' if doing else ''}")
 
 
-async def _last_line(process: Process) -> str:
+class _Lines:
+    """The lines that a process prints; of a long one, such as a progress bar, only the end."""
+
+    def __init__(self, printed: asyncio.StreamReader) -> None:
+        self._printed, self._came = printed, b""
+
+    async def next(self) -> bytes:
+        """Return the next line with its end; empty: there is no more."""
+        while b"\n" not in self._came and (some := await self._printed.read(READ_BYTES)):
+            self._came = self._came[-LONGEST_LINE:] + some
+        line, end, self._came = self._came.partition(b"\n")
+        return line[-LONGEST_LINE:] + end
+
+
+async def _last_line(process: Process, lines: _Lines) -> str:
     """Wait for the end of the process; return the last line that it printed."""
-    assert process.stderr is not None  # noqa: S101  a pipe
     last = ""
-    async for line in process.stderr:
+    while line := await lines.next():
         last = _text(line)
     await process.wait()
     return last

@@ -15,6 +15,7 @@ from contextlib import suppress
 EACH_S = 1.0  # chosen: a hung recorder is reported within seconds, and a line each second costs nothing
 LATE_S = 1.5  # chosen: half a second more than the interval, for a busy machine
 MOST_LATE = 2  # chosen: a watcher that was paused itself sees one late line, and the next in time
+READ_BYTES = 4096  # chosen: far more than waits; a module of the mission may print a progress bar, too
 
 
 class RecorderSigns:
@@ -38,11 +39,11 @@ async def watch(signs: asyncio.StreamReader, silent: Callable[[bool], None]) -> 
 
     When: once the recorder has said that it listens; before, who began it limits the time.
     """
-    late, line = 0, b"\n"
-    while line:
+    late, some = 0, b"\n"
+    while some:
         try:
             async with asyncio.timeout(LATE_S):
-                line = await signs.readline()
+                some = await signs.read(READ_BYTES)
         except TimeoutError:
             late += 1
             if late == MOST_LATE:

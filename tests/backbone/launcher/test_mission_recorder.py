@@ -29,6 +29,8 @@ touch hangs
 while :; do sleep 0.1; done
 """
 WARNS = "echo 'old.py:2: UserWarning: this module is old' >&2"
+COUNTS = "head -c 300000 /dev/zero | tr '\\0' '\\r' >&2"
+FALLS_FOR_GOOD = "test -e fell && exit 1; touch fell; echo records to night.mcap >&2"
 FALLS_ONCE = "test -e fell || { touch fell; echo records to night.mcap >&2; echo the disc is gone >&2; exit 1; }"
 
 
@@ -82,8 +84,11 @@ async def test_one_that_fell_and_whose_next_begin_is_broken_off(
         assert left(tmp_path) == []
 
 
-async def test_one_that_prints_a_warning_first_has_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    recorder = played(tmp_path, f"{WARNS}; echo records to night.mcap >&2", monkeypatch)
+@pytest.mark.parametrize("words", [WARNS, COUNTS], ids=["a warning", "a progress bar"])
+async def test_one_that_prints_something_first_has_begun(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder = played(tmp_path, f"{words}; echo records to night.mcap >&2", monkeypatch)
     try:
         await recorder.begin()
         assert recorder.absence() is None
@@ -98,3 +103,16 @@ async def test_of_one_that_cannot_begin_the_last_line_is_the_reason(
     recorder = played(tmp_path, f"{WARNS}; echo night.mcap cannot be written >&2; exit 5", monkeypatch)
     with pytest.raises(RecorderFailed, match=r"did not begin: night\.mcap cannot be written"):
         await recorder.begin()
+
+
+@pytest.mark.parametrize("words", [f"{COUNTS}; exit 1", "rm recorder; exit 1"], ids=["long last words", "no program"])
+async def test_one_that_falls_and_cannot_begin_again_is_absent(
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder = played(tmp_path, f"{FALLS_FOR_GOOD}; {words}", monkeypatch)
+    await recorder.begin()
+    await asyncio.wait_for(recorder.keep(), WITHIN_S)
+    absence = recorder.absence()
+    assert absence is not None
+    assert "did not begin" in absence.cause
+    assert left(tmp_path) == []

@@ -8,7 +8,7 @@ from backbone.bus.clock import run_virtual
 from backbone.launcher.recorder_signs import EACH_S, LATE_S, MOST_LATE, watch
 
 
-def watched(pauses_s: list[float]) -> list[tuple[bool, float]]:
+def watched(pauses_s: list[float], sign: bytes = b"\n") -> list[tuple[bool, float]]:
     """Return what a watcher says, and when, of signs with these pauses before them."""
     found: list[tuple[bool, float]] = []
 
@@ -17,7 +17,7 @@ def watched(pauses_s: list[float]) -> list[tuple[bool, float]]:
         watching = asyncio.create_task(watch(signs, lambda silent: found.append((silent, loop.time()))))
         for pause_s in pauses_s:
             await asyncio.sleep(pause_s)
-            signs.feed_data(b"\n")
+            signs.feed_data(sign)
         signs.feed_eof()
         await watching
 
@@ -27,6 +27,10 @@ def watched(pauses_s: list[float]) -> list[tuple[bool, float]]:
 
 def test_one_that_gives_signs_in_time_is_never_silent() -> None:
     assert watched([EACH_S] * 50) == []
+
+
+def test_a_progress_bar_without_an_end_of_line_is_a_sign_like_any_other() -> None:
+    assert watched([EACH_S] * 5, b"\r" * 200_000) == []
 
 
 def test_one_that_hangs_before_its_first_sign_is_told_too() -> None:
