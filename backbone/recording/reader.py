@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import struct
 import zlib
@@ -233,15 +234,29 @@ def open_file(path: Path) -> IO[bytes]:
 def missing_numbers(messages: Iterable[Recorded]) -> dict[str, int]:
     """Return sender → number of messages missing between its first and its last, only for senders that miss any.
 
-    Each sender numbers its messages. A number is missing if its message was lost, if its key was not recorded, or if it
-    is a question without an answer.
+    Each sender numbers its messages, and begins anew when it was restarted; what is missing between two lives is not
+    known. A number is missing if its message was lost, if its key was not recorded, or if it is a question without an
+    answer.
+
+    Args:
+        messages: In the order of sending.
     """
-    numbers: dict[str, set[int]] = {}
+    lives: dict[str, list[set[int]]] = {}
+    newest: dict[str, tuple[float, float]] = {}
     for message in messages:
         if message.source:
-            numbers.setdefault(message.source, set()).add(message.sequence)
-    missing = {source: max(found) - min(found) + 1 - len(found) for source, found in sorted(numbers.items())}
+            number, at_s = newest.get(message.source, (math.inf, -math.inf))
+            if message.sequence <= number and message.at_s > at_s:
+                lives.setdefault(message.source, []).append(set())
+                number = message.sequence
+            lives[message.source][-1].add(message.sequence)
+            newest[message.source] = max(number, message.sequence), message.at_s
+    missing = {source: sum(map(_gaps, numbers)) for source, numbers in sorted(lives.items())}
     return {source: count for source, count in missing.items() if count}
+
+
+def _gaps(numbers: set[int]) -> int:
+    return max(numbers) - min(numbers) + 1 - len(numbers)
 
 
 def check_index(file: IO[bytes]) -> None:

@@ -1,0 +1,36 @@
+"""Missing messages of a sender are counted in each of its lives, because each life numbers its messages anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from backbone.recording.reader import Recorded, missing_numbers
+
+SENDERS = ("resource_pool/scout1", "backbone/rc_manager")
+LONGEST = 12
+lives = st.lists(st.sets(st.integers(2, LONGEST)).map(lambda later: [1, *sorted(later)]), max_size=3)
+
+
+def recorded(source: str, lives: list[list[int]]) -> Iterator[Recorded]:
+    """Yield messages with these numbers; after the first of a life, two of an instant stand in the wrong order."""
+    for begin, numbers in enumerate(lives):
+        for place in range(-1, len(numbers), 2):
+            at_s = float(begin * 2 * LONGEST + place)
+            for number in reversed(numbers[max(0, place) : place + 2]):
+                yield Recorded(f"scout/night/{source}/log", source, "StoryEvent/1", at_s, at_s, at_s, number, "", {})
+
+
+@given(lives, lives)
+def test_what_is_missing_in_a_life_counts_though_another_life_had_that_number(
+    first: list[list[int]], second: list[list[int]]
+) -> None:
+    said = [*recorded(SENDERS[0], first), *recorded(SENDERS[1], second)]
+    expected = {source: sum(map(gaps, own)) for source, own in zip(SENDERS, (first, second), strict=True)}
+    assert missing_numbers(said) == {source: count for source, count in expected.items() if count}
+
+
+def gaps(numbers: list[int]) -> int:
+    return len({*range(1, numbers[-1])} - {*numbers})
