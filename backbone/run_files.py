@@ -6,17 +6,20 @@ stale: readers skip it, and the next mission of that name overwrites it.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
 
-from backbone.atomic_file import replace_file
+from backbone.atomic_file import is_at, opened_locked, replace_file
 from backbone.authentication import secret_of
 from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
+from backbone.operating_system.file_locks import lock_alone_nowait
 from backbone.operating_system.process_starts import started_s
 
 FILE_NAME = "run.json"
@@ -75,6 +78,13 @@ class RunFolderUnusable(Refusal):
     remedy = "Free the disk, or set XDG_RUNTIME_DIR to a folder of your own that can be written into."
 
 
+class FolderInUse(Refusal):
+    """A mission of this name is coming up or ending on this machine."""
+
+    code = "run.in_use"
+    remedy = "Wait until it is up or has ended, see 'scout-backbone status'; or give this one another name."
+
+
 class TraceUnwritable(Refusal):
     """The system refuses to write the trace."""
 
@@ -110,6 +120,26 @@ def kept_directory() -> Path:
     except OSError as error:
         raise _unusable(directory, error) from error
     return directory
+
+
+@contextlib.contextmanager
+def own_folder(mission: str) -> Iterator[Path]:
+    """Prepare the folder of a mission's files for this process alone, and remove it at the end.
+
+    The folder stays locked meanwhile, because a mission that is coming up or ending has no run file.
+
+    Raises:
+        FolderInUse: Another process has the folder.
+        UnsafeDirectory: Another user could write files there.
+        RunFolderUnusable: The system refused; the folder is removed.
+    """
+    descriptor = _locked_folder(mission)
+    try:
+        yield prepare(mission)
+    finally:
+        if is_at(descriptor, run_directory(mission)):  # else its zygote has hidden it, and this is its successor's
+            remove(mission)
+        os.close(descriptor)
 
 
 def prepare(mission: str) -> Path:
@@ -208,6 +238,21 @@ def find_all() -> list[RunFile]:
     """Return the missions that are up on this machine, sorted by name."""
     found = (_read(folder / FILE_NAME) for folder in sorted(_directory().iterdir()) if is_legal(folder.name))
     return [run_file for run_file in found if run_file is not None and _is_fresh(run_file)]
+
+
+def _locked_folder(mission: str) -> int:
+    """Create the mission's folder if it is missing, lock it, and return its descriptor."""
+    while True:
+        directory = run_directory(mission)
+        try:
+            directory.mkdir(mode=0o700, exist_ok=True)
+            return opened_locked(directory, os.O_NOFOLLOW, 0, lock_alone_nowait)
+        except FileNotFoundError:  # its owner has just removed it
+            continue
+        except BlockingIOError as error:
+            raise FolderInUse(f"mission {mission} is coming up or ending", mission=mission) from error
+        except OSError as error:
+            raise _unusable(directory, error) from error
 
 
 def _remove_what_dead_zygotes_left(directory: Path) -> None:

@@ -137,11 +137,8 @@ async def play(path: Path, wanted: Playing) -> ExitCode:
         found = recording.contents()
         name = legal(wanted.mission or f"{REPLAY}-{found.about.get('mission', '')}".strip("-")[:MAX_NAME_LENGTH])
         refuse_if_up(name)
-        directory = run_files.prepare(name)
-        try:
+        with run_files.own_folder(name) as directory:
             await _play_in(directory, name, path, recording, found, wanted)
-        finally:
-            run_files.remove(name)
     return ExitCode.DONE
 
 

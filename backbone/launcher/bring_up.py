@@ -43,6 +43,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
 
     Raises:
         MissionAlreadyUp: A mission of this name runs on this machine.
+        FolderInUse: A mission of this name is coming up or ending on this machine.
         RunFolderUnusable: The run folder is not writable.
         TraceUnwritable: The trace is not writable, or has content.
         RecorderFailed: The file of the recording exists, or cannot be written.
@@ -55,8 +56,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
         run_files.begin_trace(options.trace)
     if options.record is not None:
         require_new(options.record)
-    directory = run_files.prepare(description.name)
-    try:
+    with run_files.own_folder(description.name) as directory:
         endpoint = prepare_endpoint(description, directory)
         clock = MissionClock(began_s, options.speed)
         own = launcher_launch(description, endpoint, clock, directory)
@@ -66,8 +66,6 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
             return await _with_hub(zygote, own, clock, description, options, observer, began_s)
         finally:
             await zygote.close()
-    finally:
-        run_files.remove(description.name)
 
 
 async def _with_hub(

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from full_disk import disk_full_at
 from backbone import run_files
 from backbone.errors import Refusal
 from backbone.run_files import (
+    FolderInUse,
     MissionNotUp,
     RunFile,
     RunFolderUnusable,
@@ -161,3 +163,24 @@ def test_a_trace_of_an_earlier_mission_is_neither_continued_nor_lost(tmp_path: P
 
 def test_a_trace_may_go_to_a_device() -> None:
     run_files.begin_trace(Path("/dev/null"))
+
+
+def test_a_mission_that_comes_up_keeps_its_folder_to_itself(runtime_directory: Path) -> None:
+    with run_files.own_folder("iros2001") as directory:
+        with pytest.raises(FolderInUse, match="iros2001 is coming up"), run_files.own_folder("iros2001"):
+            pass
+        with run_files.own_folder("ram2002"):
+            assert (directory / "log").is_dir()
+    assert list((runtime_directory / "scout-backbone").iterdir()) == []
+    with run_files.own_folder("iros2001"):
+        pass
+
+
+def test_a_mission_that_ends_leaves_its_successor_alone() -> None:
+    """Its zygote hides its folder first, so that a mission of this name can come up again."""
+    with ExitStack() as ending:
+        folder = ending.enter_context(run_files.own_folder("iros2001"))
+        folder.rename(folder.with_name(f".iros2001.ended-{os.getpid()}"))
+        with run_files.own_folder("iros2001"):
+            ending.close()
+            assert (folder / "log").is_dir()

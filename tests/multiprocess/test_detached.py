@@ -17,6 +17,7 @@ from running_mission import MARK, MISSION_XML, marked, wait_gone
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
 BIN = Path(sys.executable).parent
+SMALLEST = Path(__file__).parents[2] / "docs" / "examples" / "smallest.xml"
 GRABBER = """</hosts>
   <types>
     <type name="framegrabber" class="sample_components:Broken" subsystem="resource_pool" uses="video_frequency"/>
@@ -85,6 +86,24 @@ def test_it_ends_with_how_the_mission_came_up(exit_code: int, change: dict[str, 
 def test_it_does_so_twenty_times_in_a_row(exit_code: int, change: dict[str, str], tmp_path: Path) -> None:
     for _ in range(TIMES):
         assert_up_says(exit_code, tmp_path, change)
+
+
+@pytest.mark.thorough
+def test_of_two_that_start_at_once_one_comes_up_and_the_other_is_refused(tmp_path: Path) -> None:
+    mark = uuid.uuid4().hex
+    words = [str(BIN / "scout-backbone"), "up", str(SMALLEST), "--detach"]
+    both = [
+        subprocess.Popen(words, env=environment(tmp_path, mark), stderr=subprocess.PIPE, text=True) for _ in range(2)
+    ]
+    try:
+        said = {up.communicate(timeout=90)[1]: up.returncode for up in both}
+        assert sorted(said.values()) == [0, 4], said
+        down = command(tmp_path, mark, "down")
+        assert down.returncode == 0, down.stderr
+    finally:
+        for process in wait_gone(mark, 10.0):
+            with contextlib.suppress(psutil.Error):
+                process.kill()
 
 
 def test_a_launcher_that_is_killed_before_all_is_ready_is_a_failure(tmp_path: Path) -> None:
