@@ -23,12 +23,13 @@ from backbone.creator.messages import READY_WITHIN_S, ListProcesses, ProcessEnde
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.launcher.core_launches import CORE_POLICY, UpOptions, core_launches
+from backbone.launcher.declared_orders import hardware_orders, unit_orders
 from backbone.launcher.ending_messages import AwaitLastBranch, EndMission, LastBranchOver, MissionEnding
 from backbone.launcher.hand_recorders import HandRecorderWatch
 from backbone.launcher.health_watch import HealthWatch
 from backbone.launcher.last_branch import LastBranch, ends_before
 from backbone.launcher.last_run import run_last
-from backbone.launcher.messages import AskTree, NotUpYet, TreeChange
+from backbone.launcher.messages import AskDeclared, AskTree, Declared, NotUpYet, TreeChange
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.launcher.names_keeper import NamesKeeper
 from backbone.launcher.other_hosts import OtherHosts
@@ -55,7 +56,7 @@ class Launcher(Component[NoParameters]):
     """Starts the core services and the mission, restarts core services, runs the last branch, stops all."""
 
     accepts: ClassVar[Accepts | None] = (
-        ListProcesses | AskLog | AskPeople | AskTree | TreeChange | EndMission | AwaitLastBranch
+        ListProcesses | AskLog | AskPeople | AskDeclared | AskTree | TreeChange | EndMission | AwaitLastBranch
     )
 
     def __init__(
@@ -169,7 +170,7 @@ class Launcher(Component[NoParameters]):
         self.end(signal.SIGINT.name)
 
     async def answer(self, asked: Envelope[Message]) -> Message:
-        """Answer ``ListProcesses`` for the core services, and the questions about log, people, tree and end."""
+        """Answer ``ListProcesses`` for the core services, and questions about log, people, orders, tree and end."""
         match asked.body:
             case ListProcesses():
                 return Processes(self.launch.host, [], self._keeper.processes())
@@ -177,6 +178,8 @@ class Launcher(Component[NoParameters]):
                 return self._log.log.answer(wanted)
             case AskPeople():
                 return PeopleKnown(self._log.log.people.consoles)
+            case AskDeclared(name=name):
+                return Declared(self._declared(name))
             case AskTree():
                 return self._tree.tree()
             case change if isinstance(change, TreeChange):
@@ -190,6 +193,10 @@ class Launcher(Component[NoParameters]):
                 await self._last_is_over.wait()
                 return LastBranchOver(self._last.told)
         return await super().answer(asked)
+
+    def _declared(self, name: str) -> Start | None:
+        parts = [*hardware_orders(self._description), *unit_orders(self._description)]
+        return self._tree.order(name) or next((order for order in parts if order.name == name), None)
 
     def changed(self) -> None:
         """Publish the launcher's state and the mission's health soon."""
@@ -261,17 +268,13 @@ class Launcher(Component[NoParameters]):
     async def _start_mission(self) -> None:
         await self._wait_for_other_hosts()
         description = self._description
-        hardware = [Start(c.type, c.name, c.parameters, c.host, process=c.process) for c in description.components]
-        hardware += [Start(r.type, r.name, r.rc_parameters(), r.host, process=r.process) for r in description.resources]
         async with self._step(
             "simulated world and resource controllers" if description.components else "resource controllers"
         ):
-            await self._wishes.start_all(hardware)
+            await self._wishes.start_all(hardware_orders(description))
         if description.units:
             async with self._step("execution units"):
-                await self._wishes.start_all(
-                    [Start(u.type, u.name, u.parameters, u.host, process=u.process) for u in description.units]
-                )
+                await self._wishes.start_all(unit_orders(description))
         async with self._step("behaviors"):
             await self._wishes.start_all(behavior_orders(description))
 

@@ -111,7 +111,11 @@ class TreeKeeper:
 
     def newest(self, order: Start) -> Start:
         """Return the order as the tree is now, of a behavior of the tree; any other order as it is."""
-        return self._orders_now().get(order.name, order)
+        return self.order(order.name) or order
+
+    def order(self, name: str) -> Start | None:
+        """Return the order that starts this behavior of the present tree; None: the tree has no such behavior."""
+        return self._orders_now().get(name)
 
     async def change(self, change: TreeChange, user: str) -> TreeChanged:
         """Change the tree and return its new version.

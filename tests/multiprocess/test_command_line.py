@@ -145,6 +145,16 @@ def test_an_rc_started_by_hand_comes_up_as_the_mission_file_says(mission: Runnin
 
 
 @pytest.mark.thorough
+def test_a_behavior_started_by_hand_has_its_place_in_the_tree(mission: RunningMission) -> None:
+    for words in (("stop", "surveillance"), ("start", "surveillance", "--name", "surveillance")):
+        done = mission.command("scout-backbone", *words, "--mission", mission.name)
+        assert done.returncode == 0, done.stderr
+    wait_for(lambda: {"watch-scout1", "watch-scout2"} <= names(mission), "its children run again", mission)
+    other = mission.command("scout-backbone", "start", "wait", "--name", "surveillance", "--mission", mission.name)
+    assert (other.returncode, "start.other_type" in other.stderr) == (5, True), other.stderr
+
+
+@pytest.mark.thorough
 def test_a_machine_that_is_offered_takes_components_and_leaves_nothing_when_it_is_withdrawn(
     mission: RunningMission,
 ) -> None:
