@@ -9,20 +9,23 @@ from pathlib import Path
 import msgspec
 
 from backbone import run_files
-from backbone.addresses import COMPONENT_DATABASE
+from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.authentication import SECRET_NAME, keep_secret
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, NameTaken
 from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
 from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPolicy, creator_name
 from backbone.creator.preload import preloaded_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.launcher.mission_recorder import MissionRecorder
+from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 
 READY_WITHIN_S = 20.0  # chosen: as for the creators that a launcher starts
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
+PREDECESSOR_ENDS_S = 5.0  # chosen: a killed offer's creator ends within 3 s; seconds of the machine
+ASK_AGAIN_S = 0.2  # chosen: no person sees the difference
 POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0)
 
 
@@ -80,10 +83,11 @@ class KeptCreator:
         """Start the creator and return when it is ready.
 
         Raises:
-            LinkError: The mission's component database did not answer.
+            LinkError: The mission's nameserver or component database did not answer.
             StartFailed: The creator did not become ready; the end of its log is in the detail.
             NameTaken: The mission already has a creator of this host.
         """
+        await _wait_free(bus, clock, creator_name(self._launch.host))
         answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
         types = [counted.component_type for counted in answered.types]
         directory = prepared_folder(self._offered)
@@ -123,6 +127,23 @@ class KeptCreator:
             requester=self._launch.address,
             run_directory=str(directory),
         )
+
+
+async def _wait_free(bus: Bus, clock: Clock, name: str) -> None:
+    """Return when no component has the name, because a creator with its token there would count as ready at once.
+
+    Raises:
+        NameTaken: A component still has it after ``PREDECESSOR_ENDS_S``.
+    """
+    until_s = clock.now_s() + PREDECESSOR_ENDS_S * clock.rate
+    while True:
+        try:
+            there = (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component
+        except UnknownName:
+            return
+        if clock.now_s() >= until_s:
+            raise NameTaken(f"{name} is on {there.host}, pid {there.pid}", name=name, host=there.host, pid=there.pid)
+        await clock.sleep_s(ASK_AGAIN_S * clock.rate)
 
 
 def _creator_class(types: Iterable[ComponentType]) -> str:
