@@ -105,7 +105,8 @@ class ConsoleObserver:
         self.decide(ExitCode.DONE)
         self._is_up = True
         if self._live:
-            await self._show_live(bus, clock)
+            with contextlib.suppress(OSError):  # the terminal was closed, and the mission ends in good order
+                await self._show_live(bus, clock)
         else:
             await self._tell_holders(bus, clock)
 

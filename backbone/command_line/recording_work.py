@@ -38,6 +38,7 @@ from backbone.launcher.recorder_signs import RecorderSigns
 from backbone.mission_log.lines import event_json, story_lines
 from backbone.mission_log.log import FOR_EVER_S, AskLog, MissionLog
 from backbone.mission_log.operators import OperatorActed, login_name
+from backbone.operating_system.ending_signals import orders_to_end
 from backbone.operating_system.own_process import go_behind_others
 from backbone.recording.clock_offsets import ClockObserver
 from backbone.recording.files import RecordingFiles
@@ -137,7 +138,7 @@ async def _run(recorder: Recorder, path: Path, for_s: float | None, *, ends_with
     loop = asyncio.get_running_loop()
     if ends_with_input:
         loop.add_reader(sys.stdin, recorder.end)  # the input only ends, when the offer is gone; it has no content
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, *orders_to_end()):
         loop.add_signal_handler(number, recorder.end)
     timer = loop.call_later(for_s, recorder.end) if for_s is not None else None
     try:

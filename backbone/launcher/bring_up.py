@@ -33,6 +33,7 @@ from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
 from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up
 from backbone.mission.model import MissionDescription
+from backbone.operating_system.ending_signals import orders_to_end
 from backbone.operating_system.heaps import share_heaps
 
 START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of it
@@ -116,7 +117,9 @@ async def _with_hub(
         recorder=recorder,
     )
     loop = asyncio.get_running_loop()
-    loop.add_signal_handler(signal.SIGTERM, launcher.end, signal.SIGTERM.name)
+    orders = orders_to_end()
+    for number in orders:
+        loop.add_signal_handler(number, launcher.end, number.name)
     loop.add_signal_handler(signal.SIGINT, launcher.interrupted)
     try:
         if recorder is not None:
@@ -126,7 +129,7 @@ async def _with_hub(
         launcher.outcome.failure = launcher.outcome.failure or error
     finally:
         await bus.close()  # if the launcher was not reached
-        for number in (signal.SIGTERM, signal.SIGINT):
+        for number in (signal.SIGINT, *orders):
             loop.remove_signal_handler(number)
         if recorder is not None:
             await recorder.end()

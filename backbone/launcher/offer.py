@@ -35,6 +35,7 @@ from backbone.launcher.kept_creator import KeptCreator, Offered, recorder_of_hos
 from backbone.launcher.mission_connection import clock_elsewhere, mission_clock
 from backbone.launcher.mission_recorder import MissionRecorder
 from backbone.naming import Subsystem, legal
+from backbone.operating_system.ending_signals import orders_to_end
 from backbone.waiting import set_within
 from backbone.wire import Accepts, Envelope, Message
 
@@ -173,7 +174,7 @@ class Offering:
             Refusal: The first creator did not start.
         """
         self._lives = asyncio.create_task(self._live_again_and_again(), name="offer")
-        for number in (signal.SIGTERM, signal.SIGINT):
+        for number in (signal.SIGINT, *orders_to_end()):
             asyncio.get_running_loop().add_signal_handler(number, self.end)
         try:
             await self._lives

@@ -19,6 +19,7 @@ from backbone.command_line.where import Where
 from backbone.component.launch import Launch
 from backbone.launcher.mission_connection import clock_elsewhere
 from backbone.naming import Subsystem
+from backbone.operating_system.ending_signals import orders_to_end
 from ui_console.session.observer import AnyObserver
 
 MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's
@@ -98,8 +99,7 @@ def end_server_on_signals(end: Callable[[str], None]) -> Callable[[], bool]:
     Args:
         end: Called with the signal's name.
     """
-    hangups = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)
-    return _end_on(end, signal.SIGINT, signal.SIGTERM, *hangups)
+    return _end_on(end, signal.SIGINT, *orders_to_end())
 
 
 def _end_on(end: Callable[[str], None], *numbers: signal.Signals) -> Callable[[], bool]:
