@@ -10,6 +10,7 @@ import asyncio
 import importlib
 import logging
 from collections.abc import Awaitable, Callable, Coroutine
+from typing import Protocol
 
 from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Reply
@@ -60,6 +61,13 @@ ENDS_WITHIN_S = 20.0  # chosen: longer than the placer takes to end a component 
 AGAIN_AFTER_S = 0.2  # chosen: a restarted behavior is back within one or two of these; machine seconds
 
 
+class BeginRoot(Protocol):
+    """Type of ``WishKeeper.begin_root``."""
+
+    def __call__(self, order: Start, /, *, insists: bool) -> Awaitable[None]:
+        """Keep the root of this order running from now on."""
+
+
 class TreeKeeper:
     """Answers questions about the tree and carries out its changes.
 
@@ -68,7 +76,7 @@ class TreeKeeper:
         clock: The mission's clock.
         description: The mission as it came up.
         text: Content of its mission file.
-        begin_root: Keeps a root running from now on; returns when it runs, or raises the refusal of its first start.
+        begin_root: Keeps a root running from now on; see ``WishKeeper.begin_root``.
         leave_root: Stops keeping a root running.
         begin: Runs work as a task of the launcher.
         note: Writes an event to the story; arguments: subject, event.
@@ -81,7 +89,7 @@ class TreeKeeper:
         description: MissionDescription,
         text: bytes,
         *,
-        begin_root: Callable[[Start], Awaitable[None]],
+        begin_root: BeginRoot,
         leave_root: Callable[[str], Awaitable[None]],
         begin: Callable[[Coroutine[object, None, None], str], object],
         note: Callable[[str, str], object],
@@ -175,23 +183,9 @@ class TreeKeeper:
         remarks += await asyncio.gather(*map(self._end, gone))
         remarks += await asyncio.gather(*(self._number(*item) for item in follows.priorities.items()))
         for order in follows.begun:
-            if insists:
-                self._begin(self._begin_root_at_last(order), f"begin {order.name}")
-            else:
-                await self._begin_root(order)
+            await self._begin_root(order, insists=insists)
         remarks += [await self._tell(told) for told in follows.told if not told.gone]
         return [remark for remark in remarks if remark]
-
-    async def _begin_root_at_last(self, order: Start) -> None:
-        """Keep the root running from now on, however often its start is refused."""
-        while self._orders_now().get(order.name) == order:
-            try:
-                await self._begin_root(order)
-            except Refusal as refusal:
-                self._note(order.name, f"is not started: {refusal}")
-            else:
-                return
-            await self._clock.sleep_s(AGAIN_AFTER_S * self._clock.rate)
 
     async def _end(self, name: str) -> str:
         """End a removed branch, even if its parent cannot; return a remark for the operator."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import Callable
 
@@ -55,18 +56,29 @@ class WishKeeper:
         """
         await asyncio.gather(*map(self._begin_keeping, orders))
 
-    def _begin_keeping(self, order: Start) -> asyncio.Future[None]:
-        """Keep the component running from now on; the future resolves when it runs, or to the refusal of its start."""
+    def _begin_keeping(self, order: Start, patience_s: float = 0.0) -> asyncio.Future[None]:
+        """Keep the component running from now on; the future resolves when it runs, or to the refusal of its start.
+
+        Args:
+            patience_s: Time in which a refused start is repeated, seconds of the machine.
+        """
         placed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._keeping[order.name] = self._launcher.start_task(self._keep(order, placed), f"keep {order.name}")
+        keeping = self._keep(order, placed, patience_s)
+        self._keeping[order.name] = self._launcher.start_task(keeping, f"keep {order.name}")
         return placed
 
-    async def begin_root(self, order: Start) -> None:
-        """Start a root that was added to the tree.
+    async def begin_root(self, order: Start, *, insists: bool) -> None:
+        """Start a root of the changed tree and keep it running.
+
+        Args:
+            insists: True: it is wanted, and absent, however often its start is refused; nothing waits for it.
 
         Raises:
             Refusal: The root did not start, and is not wanted.
         """
+        if insists:
+            self._begin_keeping(order, math.inf)
+            return
         try:
             await self._begin_keeping(order)
         except Refusal:
@@ -80,7 +92,7 @@ class WishKeeper:
         self.awaited.discard(name)
         self._launcher.changed()
 
-    async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
+    async def _keep(self, order: Start, placed: asyncio.Future[None], patience_s: float) -> None:
         """Fulfill one wish of the mission file; an order to stop suspends it until the component is started again."""
 
         def now_placed(_placement: Placement, _was_there: bool) -> None:
@@ -93,7 +105,9 @@ class WishKeeper:
         component = address(subsystem, order.name)
         while True:
             try:
-                stopped = await self.keep_once(order, component, now_placed, was_started=placed.done())
+                stopped = await self.keep_once(
+                    order, component, now_placed, was_started=placed.done(), patience_s=patience_s
+                )
             except Refusal as refusal:
                 placed.set_exception(refusal)
                 return
@@ -114,6 +128,7 @@ class WishKeeper:
         on_placed: Callable[[Placement, bool], None] = lambda _placement, _was_there: None,
         *,
         was_started: bool = False,
+        patience_s: float = 0.0,
     ) -> str:
         """Keep a component placed; return the reason of the order that stopped it.
 
@@ -123,6 +138,7 @@ class WishKeeper:
             at: Address of the component.
             on_placed: See ``keep_placed``.
             was_started: True: the component ran before.
+            patience_s: See ``keep_placed``.
 
         Raises:
             Refusal: The component did not start.
@@ -134,7 +150,9 @@ class WishKeeper:
         try:
             while True:
                 try:
-                    return await keep_placed(bus, clock, wish, lambda: self._newest(order), at, on_placed, changed)
+                    return await keep_placed(
+                        bus, clock, wish, lambda: self._newest(order), at, on_placed, changed, patience_s
+                    )
                 except (NoHost, StartFailed):
                     if not self._others.names or (not self._others.missing and time.monotonic() >= until_s):
                         raise
