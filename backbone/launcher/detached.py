@@ -85,6 +85,20 @@ async def take_down(mission: str | None, *, at_once: bool = False) -> int:
         at_once: Without the last branch.
     """
     found = run_files.find(mission)
+    try:
+        return await _end_launcher(found, at_once=at_once)
+    except (psutil.NoSuchProcess, ProcessLookupError):  # by itself, or by another ``down``
+        say(f"mission {found.mission} is down; its launcher has ended meanwhile")
+        return ExitCode.DONE
+
+
+async def _end_launcher(found: run_files.RunFile, *, at_once: bool) -> int:
+    """Order the launcher to end, then signal it until it ends.
+
+    Raises:
+        NoSuchProcess: It ended before it got a signal.
+        ProcessLookupError: It had ended before it could be watched.
+    """
     launcher = psutil.Process(found.launcher_pid)
     waiting, loop, ended = os.pidfd_open(launcher.pid), asyncio.get_running_loop(), asyncio.Event()
     loop.add_reader(waiting, ended.set)
