@@ -272,5 +272,5 @@ def json_or_text(text: str) -> object:
     """Return the value of a JSON text; return any other text unchanged."""
     try:
         return json.loads(text)
-    except (json.JSONDecodeError, RecursionError):
+    except (ValueError, RecursionError):  # ValueError is also raised for a number of thousands of digits
         return text

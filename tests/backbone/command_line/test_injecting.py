@@ -38,5 +38,6 @@ def test_a_message_with_other_values_is_refused_with_how_to_write_it(said: dict[
     assert refused.value.remedy == WRITE_ONE
 
 
-def test_a_value_that_is_too_deep_to_be_json_is_a_text() -> None:
-    assert json_or_text(DEEP) == DEEP
+@pytest.mark.parametrize("text", [DEEP, "9" * 5000], ids=["deep", "many digits"])
+def test_a_value_that_is_too_much_to_be_json_is_a_text(text: str) -> None:
+    assert json_or_text(text) == text
