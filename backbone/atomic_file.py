@@ -27,13 +27,17 @@ def replace_file(target: Path, content: bytes, *, is_lasting: bool = True) -> No
         is_lasting: True: the new content survives a power cut. False: for files that are useless after one.
 
     Raises:
-        OSError: The system refused, or another process is writing the file; its content is unchanged.
+        OSError: The system refused, the target is a device, pipe or folder, or another process is writing the file; its
+            content is unchanged.
     """
     beside = _beside(target)
     descriptor = _claim(beside, os.O_CREAT)
     try:
         if target.exists():
-            os.fchmod(descriptor, stat.S_IMODE(target.stat().st_mode))
+            mode = target.stat().st_mode
+            if not stat.S_ISREG(mode):
+                raise OSError(errno.EINVAL, "it is no regular file")
+            os.fchmod(descriptor, stat.S_IMODE(mode))
         os.ftruncate(descriptor, 0)
         write_all(descriptor, content)
         if is_lasting:

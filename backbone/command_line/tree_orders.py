@@ -90,12 +90,21 @@ async def save_tree(where: Where, file: Path) -> ExitCode:
     """
     async with connected(where) as (bus, _):
         tree = await _tree(bus)
-    try:
-        replace_file(file, tree.text.encode())
-    except OSError as error:
-        raise FileUnusable(f"{file} cannot be written: {error.strerror or error}") from error
+    write_mission(file, tree.text.encode())
     say(f"{file}: version {tree.version} of the tree")
     return ExitCode.DONE
+
+
+def write_mission(file: Path, text: bytes) -> None:
+    """Replace the file; a symbolic link is followed.
+
+    Raises:
+        FileUnusable: The file cannot be written; its old content is unchanged.
+    """
+    try:
+        replace_file(file.resolve(), text)
+    except OSError as error:
+        raise FileUnusable(f"{file} cannot be written: {error.strerror or error}") from error
 
 
 # ---------------------------------------------------------------------- within

@@ -89,3 +89,11 @@ def test_the_file_and_then_its_folder_are_on_the_disk_when_it_returns(
     )
     replace_file(tmp_path / "mission.xml", b"new")
     assert synced == [str(tmp_path / ".mission.xml.saving"), str(tmp_path)]
+
+
+def test_a_pipe_or_device_is_not_replaced_by_a_file(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(OSError, match="no regular file"):
+        replace_file(pipe, b"new")
+    assert (pipe.is_fifo(), names(tmp_path)) == (True, ["pipe"])
