@@ -11,6 +11,7 @@ from backbone.mission.class_facts import ClassFacts
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
 from backbone.naming import Subsystem, is_legal
+from backbone.ranges import wildness
 
 CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "dependency_database", "rc_manager")
 """In their order of start. Source: RAM 2002, "Backbone"."""
@@ -131,6 +132,8 @@ def section(root: Element, tag: str) -> list[Element]:
 def parameter_value(text: str) -> bool | int | float | str:
     """Return the value of a parameter: a number, true or false if the text is JSON for it, otherwise the text.
 
+    A number that no message can carry remains a text, so that no class gets it as a number.
+
     Example:
         >>> parameter_value("15"), parameter_value("0.5"), parameter_value("true"), parameter_value("/dev/video0")
         (15, 0.5, True, '/dev/video0')
@@ -139,7 +142,7 @@ def parameter_value(text: str) -> bool | int | float | str:
         value = msgspec.json.decode(text.encode())
     except msgspec.DecodeError:
         return text
-    return value if isinstance(value, bool | int | float) else text
+    return value if isinstance(value, bool | int | float) and not wildness(value) else text
 
 
 def parameters(element: Element) -> dict[str, bool | int | float | str]:

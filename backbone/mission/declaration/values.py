@@ -10,6 +10,7 @@ Rules of this file:
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Annotated, Literal, TypeVar
 
@@ -24,6 +25,7 @@ from backbone.wire import MAX_LARGE_MESSAGE_BYTES
 T = TypeVar("T")
 
 LEAST_WHOLE, MOST_WHOLE = -(2**31), 2**31 - 1  # those of xs:int
+MOST_DECIMAL = 1e12  # chosen: a thousand times the largest legal one; squares of such numbers are finite
 
 _NAME = r"[a-z][a-z0-9_\-]{0,62}"
 _CLASS_PATH = r"[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*"
@@ -34,8 +36,9 @@ _FLAGS = {"true": True, "1": True, "false": False, "0": False}
 
 
 def decimal(text: str) -> float | None:
-    """Return the number; None if the text is not a decimal number."""
-    return float(text) if _DECIMAL.fullmatch(text := text.strip(_BLANKS)) else None
+    """Return the number; None if the text is not a decimal number, or larger than any legal one can be."""
+    number = float(text) if _DECIMAL.fullmatch(text := text.strip(_BLANKS)) else math.inf
+    return number if abs(number) <= MOST_DECIMAL else None
 
 
 def flag(text: str) -> bool | None:

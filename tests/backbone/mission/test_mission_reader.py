@@ -26,9 +26,11 @@ from record_messages import MESSAGES, messages
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
 from backbone.mission.model import HUB_PORT, MissionDescription
-from backbone.mission.reader import MissionInvalid, read_mission
+from backbone.mission.reader import MissionInvalid, read_mission, read_mission_bytes
 from backbone.mission.tables import parameter_value
 from backbone.naming import MAX_NAME_LENGTH
+
+EXAMPLES = MISSION_XML.parent / "docs" / "examples"
 
 
 # ---------------------------------------------------------------------- broken files
@@ -132,6 +134,26 @@ def test_a_piece_of_a_good_file_replaced_by_anything_is_read_or_refused(
     assert isinstance(read, MissionDescription)
 
 
+@pytest.mark.parametrize("digits", [13, 20, 200, 400])
+@pytest.mark.parametrize(
+    ("name", "before"),
+    [
+        ("deployment.xml", 'point x-m="'),
+        ("deployment.xml", 'heading-deg="'),
+        ("deployment.xml", 'height-m="'),
+        ("battery.xml", 'name="below" value="'),
+        ("battery.xml", 'period-s="'),
+    ],
+)
+def test_a_number_that_is_far_too_large_is_a_fault_at_its_place(name: str, before: str, digits: int) -> None:
+    good = (EXAMPLES / name).read_text()
+    begin, between, end = good.partition(before)
+    text = f"{begin}{between}{'9' * digits}{end[end.index(chr(34)) :]}"
+    with pytest.raises(MissionInvalid) as refused:
+        read_mission_bytes(text.encode(), str(EXAMPLES / name), {})
+    assert begin.count("\n") + 1 in {fault.line for fault in refused.value.faults}
+
+
 # ---------------------------------------------------------------------- places
 def test_columns_count_characters_not_bytes(tmp_path: Path) -> None:
     [fault] = faults_in(tmp_path, changed(('<host name="base"', '<!-- äöü€ --><host nam="base"'), ("<!-- A", "<!-- Ä")))
@@ -200,6 +222,9 @@ def test_a_simulated_resource_is_told_its_world_a_real_one_is_not(tmp_path: Path
         ("false", False),
         ("True", "True"),
         ("NaN", "NaN"),
+        ("9223372036854775807", 2**63 - 1),
+        ("9223372036854775808", "9223372036854775808"),
+        ("1e300", "1e300"),
         ("null", "null"),
         ("[1, 2]", "[1, 2]"),
         ("/dev/video0", "/dev/video0"),
