@@ -46,7 +46,7 @@ async def drive_by_script(where: Where, wished: dict[str, object], user: str, sc
         joining.launch, bus, joining.clock, show=driver.show, work=driver.drive, watches=False, user=user
     )
     if script == STANDARD_INPUT:
-        feed_from(sys.stdin.fileno(), driver.feed)
+        feed_from(sys.stdin.fileno(), driver.feed, driver.cut)
     interrupted = end_on_signals(console)
     await console.run()
     return ExitCode.INTERRUPTED if interrupted() else driver.exit_code(console)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
+import selectors
 import threading
 from collections.abc import Callable
 
@@ -110,6 +112,14 @@ class ScriptDriver:
                 self._player.end()
             self._news.set()
 
+    def cut(self, error: OSError) -> None:
+        """End the script, because its further lines cannot be read: no line could halt the robot any more."""
+        if self._wrong is None:
+            detail = f"the script cannot be read to its end: {error.strerror or error}"
+            self._wrong = WrongScript(detail, remedy="Keep its pipe or terminal readable, or give it as a file.")
+            self._player.end()
+            self._news.set()
+
     async def drive(self, console: Teleoperation) -> None:
         """Wait for the grant, play the script to its end, give the robot back."""
         self._console = console
@@ -195,27 +205,47 @@ class ScriptDriver:
             self._write(events.event_json(events.failed(now_s, self._wrong)))
 
 
-def feed_from(descriptor: int, feed: Callable[[str | None], None]) -> None:
+def feed_from(descriptor: int, feed: Callable[[str | None], None], cut: Callable[[OSError], None]) -> None:
     """Call ``feed`` in this event loop with each line read from a file descriptor, then with None.
 
     The reading thread ends with the process, so an open pipe delays nothing.
+
+    Args:
+        descriptor: Of a pipe, a terminal or a file; it may be non-blocking.
+        feed: Called with each line, then with None.
+        cut: Called instead of the last call of ``feed`` if the system refuses to read on.
     """
     loop = asyncio.get_running_loop()
 
-    def hand_over(line: str | None) -> None:
-        try:
-            loop.call_soon_threadsafe(feed, line)
-        except RuntimeError:  # the loop is closed: the script is over
-            return
+    def hand_over(act: Callable[..., None], *said: object) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop is closed: the script is over
+            loop.call_soon_threadsafe(act, *said)
 
     def read() -> None:
         rest = b""
-        while chunk := os.read(descriptor, READ_BYTES):
+        while chunk := _read_when_ready(descriptor):
             *lines, rest = (rest + chunk).split(b"\n")
             for line in lines:
-                hand_over(line.decode(errors="replace"))
+                hand_over(feed, line.decode(errors="replace"))
         if rest:
-            hand_over(rest.decode(errors="replace"))
-        hand_over(None)
+            hand_over(feed, rest.decode(errors="replace"))
+        hand_over(feed, None)
 
-    threading.Thread(target=read, name="script", daemon=True).start()
+    def read_or_cut() -> None:
+        try:
+            read()
+        except OSError as error:
+            hand_over(cut, error)
+
+    threading.Thread(target=read_or_cut, name="script", daemon=True).start()
+
+
+def _read_when_ready(descriptor: int) -> bytes:
+    """Wait for bytes, and return them; empty at the end."""
+    while True:
+        try:
+            return os.read(descriptor, READ_BYTES)
+        except BlockingIOError:  # another program that has this pipe or terminal open made it non-blocking
+            with selectors.DefaultSelector() as selector:
+                selector.register(descriptor, selectors.EVENT_READ)
+                selector.select()

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import os
 from typing import Any
+
+import pytest
 
 from resource_pool.arc_client import Suspended
 from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, Heard, LinkTrouble
 from ui_console.model.script import read_script
-from ui_console.session.scripted import ScriptDriver
+from ui_console.session.scripted import ScriptDriver, feed_from
 
 DRIVE = '{"at_s": 0, "left_rad_s": 4, "right_rad_s": 4}\n{"at_s": 2, "left_rad_s": 2, "right_rad_s": 2}'
 UNANSWERED = LinkTrouble(2.0, "nobody answered Drive at resource_pool/console-1-drive", "drive")
@@ -47,3 +51,35 @@ def test_after_a_loss_that_nobody_decided_a_script_moves_nothing_before_a_halt()
         driver.show(Heard(3.0, Suspended("arc", reason, "console-9", -1.0)))
         driver.show(GRANTED)
         assert driver.must_halt is is_held_back, reason
+
+
+@pytest.mark.asyncio
+async def test_a_pipe_that_does_not_block_is_read_to_its_end() -> None:
+    """As ``scout-console attach --json`` gets one from a program that made its side of a terminal non-blocking."""
+    reading, writing = os.pipe()
+    os.set_blocking(reading, False)
+    lines: asyncio.Queue[str | None] = asyncio.Queue()
+    cuts: list[OSError] = []
+    async with asyncio.timeout(5.0):
+        feed_from(reading, lines.put_nowait, cuts.append)
+        for line in ("one", "two"):
+            await asyncio.sleep(0.02)  # the reader has met the empty pipe
+            os.write(writing, f"{line}\n".encode())
+            assert await lines.get() == line
+        os.close(writing)
+        assert await lines.get() is None
+    os.close(reading)
+    assert not cuts
+
+
+@pytest.mark.asyncio
+async def test_a_script_that_the_system_does_not_read_is_cut() -> None:
+    _, writing = pipe = os.pipe()
+    cuts: asyncio.Queue[OSError] = asyncio.Queue()
+    lines: list[str | None] = []
+    async with asyncio.timeout(5.0):
+        feed_from(writing, lines.append, cuts.put_nowait)
+        assert (await cuts.get()).strerror
+    for descriptor in pipe:
+        os.close(descriptor)
+    assert not lines

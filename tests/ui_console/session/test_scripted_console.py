@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from itertools import pairwise
 from typing import Any
@@ -139,5 +140,21 @@ def test_a_wrong_line_in_a_streamed_script_stops_it_there_and_gives_the_robot_ba
         await driven.run()
         assert [line["event"] for line in lines] == ["granted", "applied", "refused", "released"]
         assert (lines[2]["code"], driver.exit_code(driven)) == ("script.line", 2)
+
+    placer_world(scene)
+
+
+def test_a_streamed_script_that_cannot_be_read_further_gives_the_robot_back(placer_world: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        lines: list[dict[str, Any]] = []
+        driver = ScriptDriver(lambda line: lines.append(json.loads(line)))
+        driven = console(placer, driver.show, work=driver.drive, watches=False)
+        driver.feed('{"at_s":0,"left_rad_s":1,"right_rad_s":1}')
+        driver.cut(OSError(errno.EIO, "Input/output error"))
+        await driven.run()
+        assert [line["event"] for line in lines] == ["granted", "applied", "refused", "released"]
+        assert "Input/output error" in lines[2]["detail"]
+        assert driver.exit_code(driven) == 2
 
     placer_world(scene)
