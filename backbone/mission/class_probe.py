@@ -7,6 +7,7 @@ import inspect
 import os
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import msgspec
 
@@ -27,6 +28,13 @@ def facts_of(class_path: str) -> ClassFacts:
         return ClassFacts(failure=f"its module cannot be imported: {type(error).__name__}: {error}")
     if not (isinstance(found, type) and issubclass(found, Component)):
         return ClassFacts(failure="it is no component: it does not derive from backbone.component.component:Component")
+    try:
+        return _described(found)
+    except Exception as error:  # a type of a parameter without a schema, or a hook of the class with a bug
+        return ClassFacts(failure=f"its parameters or abilities cannot be listed: {type(error).__name__}: {error}")
+
+
+def _described(found: type[Component[Any]]) -> ClassFacts:
     own = tuple(one for one in _documented(found.parameters_type) if one.name not in found.given_elsewhere)
     options = found.driver_options()
     return ClassFacts(
@@ -57,6 +65,8 @@ def refusal(question: Question) -> str:
         msgspec.convert({key: value for key, value in question.values.items() if key in own}, struct)
     except msgspec.ValidationError as error:
         return str(error)
+    except Exception as error:  # a rule of the class with a bug, with which its component could not start either
+        return f"{type(error).__name__}: {error}"
     return ""
 
 

@@ -79,13 +79,15 @@ def test_a_class_of_ones_own_is_asked_for_its_parameters(modules: Path) -> None:
         ("class Own:\n  1 / 0", "its module cannot be imported: ZeroDivisionError"),
         ("print('Own')\nimport os\nos._exit(3)", "the process that imports its module ends without an answer"),
         ("import sys\nsys.exit('Own')", "the process that imports its module ends without an answer"),
+        (GOOD.replace("float = 1.0", "type | set[complex] = int"), "abilities cannot be listed: TypeError"),
+        (GOOD.replace("Own(Component):", "Own(Component):\n    driver_options = 5"), "cannot be listed: TypeError"),
     ],
-    ids=["import", "error", "exit", "sys.exit"],
+    ids=["import", "error", "exit", "sys.exit", "no schema", "hook"],
 )
 def test_a_class_that_cannot_be_imported_is_a_fault_at_its_type(
     modules: Path, code: str, reason: str, request: pytest.FixtureRequest
 ) -> None:
-    name = f"own_{request.node.callspec.id}".replace(".", "_")
+    name = f"own_{request.node.callspec.id}".replace(".", "_").replace(" ", "_")
     (modules / f"{name}.py").write_text(code)
     text = with_own_type(f"{name}:Own", any="thing").replace('name="view_s"', 'name="veiw_s"')
     at_type, at_parameter = faults_in(modules, text)
@@ -99,6 +101,19 @@ def test_a_class_that_ends_its_process_when_it_judges_holds_nothing_up(modules: 
     rule = "    def __post_init__(self):\n        import os\n        os._exit(1)\n\nclass Own"
     (modules / "own_judge.py").write_text(GOOD.replace("\nclass Own", rule))
     assert not faults_in(modules, with_own_type("own_judge:Own", depth_m="2"))
+
+
+def test_a_rule_of_a_class_with_a_bug_is_a_fault_and_hides_no_other(modules: Path) -> None:
+    rule = "    def __post_init__(self):\n        raise {error}(f'{{self.depth_m}} is too deep')\n\nclass Own"
+    for error in ("KeyError", "ValueError"):
+        (modules / f"own_{error.lower()}.py").write_text(GOOD.replace("\nclass Own", rule.format(error=error)))
+    text = with_own_type("own_keyerror:Own", depth_m="2.5")
+    other = OWN_TYPE.format(path="own_valueerror:Own").replace('"own"', '"other"')
+    mine = '    <behavior type="other" name="yours" priority="1"><parameter name="depth_m" value="3.5"/></behavior>'
+    text = text.replace("  </types>", other, 1).replace("  </behaviors>", f"{mine}\n  </behaviors>")
+    bug, refusal = faults_in(modules, text)
+    assert bug.message == "own mine refuses its parameters: KeyError: '2.5 is too deep'"
+    assert refusal.message == "other yours refuses its parameters: 3.5 is too deep"
 
 
 def test_rules_of_a_class_are_asked_once_for_the_same_parameters(modules: Path) -> None:
