@@ -136,7 +136,8 @@ def print_version(is_asked: bool) -> None:
         raise typer.Exit
 
 
-ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/]+:[0-9]{1,5}([?#]\S*)?|unixsock-stream/\S+")
+ENDPOINT = re.compile(r"((tcp|tls|quic|udp|ws)/[^\s/?#]+:[0-9]{1,5}|unixsock-stream/[^\s?#]+)(\?[^\s?#]+)?(#[^\s?]+)?")
+"""The form that Zenoh reads, with metadata and configuration at its end."""
 
 
 def hub_endpoint(value: str | None) -> str | None:

@@ -42,7 +42,13 @@ def test_help_tells_every_command_whole(command_line: Any) -> None:
 
 
 @pytest.mark.parametrize("command_line", [app, console_app], ids=["scout-backbone", "scout-console"])
-@pytest.mark.parametrize("wrong", ["garbage", "tcp/", "tcp/host", "tcp/host:port", "192.0.2.7:7447", "ftp/host:1", ""])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        *("garbage", "tcp/", "tcp/host", "tcp/host:port", "192.0.2.7:7447", "ftp/host:1", ""),
+        *("tcp/host:1?", "tcp/host:1#", "tcp/host:1#a=b?c=d", "tcp/#:1", "unixsock-stream//run/m#a?b"),
+    ],
+)
 def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(command_line: Any, wrong: str) -> None:
     command = "status" if command_line is app else "monitor"
     done = CliRunner().invoke(command_line, [command, "--mission", "m", "--connect", wrong])
@@ -51,7 +57,9 @@ def test_an_endpoint_that_is_none_is_wrong_usage_and_says_how_to_write_one(comma
     assert "Traceback" not in done.output
 
 
-@pytest.mark.parametrize("right", ["tcp/192.0.2.7:7447", "tcp/[::1]:7447", "tls/lab:1", "unixsock-stream//run/m/hub"])
+@pytest.mark.parametrize(
+    "right", ["tcp/192.0.2.7:7447", "tcp/[::1]:7447", "tls/lab:1?prio=1-3#a=/b;c=d", "unixsock-stream//run/m/hub"]
+)
 def test_an_endpoint_of_a_hub_is_taken(right: str) -> None:
     assert hub_endpoint(right) == right
 
