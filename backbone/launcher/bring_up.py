@@ -31,7 +31,7 @@ from backbone.launcher.launcher import LISTING_TIME_S, Launcher
 from backbone.launcher.mission_recorder import recorder_of_mission, require_new
 from backbone.launcher.other_hosts import endpoint_for_others
 from backbone.launcher.outcome import BringUpObserver, Outcome
-from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up
+from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up, refuse_paths_of_no_message
 from backbone.mission.model import MissionDescription
 from backbone.operating_system.ending_signals import orders_to_end
 from backbone.operating_system.heaps import share_heaps
@@ -45,6 +45,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     Raises:
         MissionAlreadyUp: A mission of this name runs on this machine.
         FolderInUse: A mission of this name is coming up or ending on this machine.
+        PathNotUtf8: The path of a file or folder of the mission is no UTF-8.
         RunFolderUnusable: The run folder is not writable.
         TraceUnwritable: The trace is not writable, or has content.
         RecorderFailed: The file of the recording exists, or cannot be written.
@@ -52,12 +53,14 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     """
     began_s = time.monotonic()
     share_heaps()
+    files = [path.absolute() for path in (options.trace, options.record) if path is not None]
+    refuse_paths_of_no_message(description.name, description.source, *files)
     refuse_if_up(description.name)
-    if options.trace is not None:
-        run_files.begin_trace(options.trace)
-    if options.record is not None:
-        require_new(options.record)
     with run_files.own_folder(description.name) as directory:
+        if options.trace is not None:
+            run_files.begin_trace(options.trace)
+        if options.record is not None:
+            require_new(options.record)
         endpoint = prepare_endpoint(description, directory)
         clock = MissionClock(began_s, options.speed)
         own = launcher_launch(description, endpoint, clock, directory)

@@ -25,6 +25,28 @@ class PortTaken(Refusal):
     remedy = "State another port or address at the mission's first host, or stop what listens there."
 
 
+class PathNotUtf8(Refusal):
+    """A path has a byte that is no UTF-8, so no message can contain it."""
+
+    code = "run.path"
+    remedy = "Rename that file or folder, or use one whose whole path is UTF-8."
+
+
+def refuse_paths_of_no_message(mission: str, *paths: str | Path) -> None:
+    """Return if messages can contain these paths and that of the mission's folder, else raise.
+
+    Raises:
+        PathNotUtf8: A path has a byte that is no UTF-8.
+        UnsafeDirectory: Another user could write files into the mission's folder.
+        RunFolderUnusable: The system refused the mission's folder.
+    """
+    for path in (run_files.run_directory(mission), *paths):
+        try:
+            str(path).encode()
+        except UnicodeEncodeError as error:
+            raise PathNotUtf8(f"the path {str(path)!r} has a byte that is no UTF-8") from error
+
+
 def refuse_if_up(mission: str) -> None:
     """Return if no mission of this name runs on this machine, else raise.
 

@@ -11,13 +11,14 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
+from backbone import run_files
 from backbone.authentication import SocketPathTooLong
 from backbone.bus.interface import Bus, Clock
 from backbone.command_line.cli import app
 from backbone.errors import Refusal
 from backbone.launcher.bring_up import run_mission
 from backbone.launcher.core_launches import UpOptions
-from backbone.launcher.preconditions import PortTaken
+from backbone.launcher.preconditions import PathNotUtf8, PortTaken
 from backbone.mission.model import Host, MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.run_files import TraceUnwritable
@@ -63,6 +64,37 @@ def refused(kind: type[Refusal], description: MissionDescription, options: UpOpt
 def test_a_trace_that_cannot_be_written(shipped: MissionDescription, tmp_path: Path, short_path: Path) -> None:
     for bad in (tmp_path / "no folder" / "trace.jsonl", tmp_path):
         assert str(bad) in refused(TraceUnwritable, shipped, UpOptions(trace=bad), short_path)
+
+
+def test_a_path_that_no_message_can_contain(
+    shipped: MissionDescription, tmp_path: Path, short_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    strange = tmp_path / os.fsdecode(b"r\xfcbe")
+    elsewhere = msgspec.structs.replace(shipped, source=str(strange / "mission.xml"))
+    for description, options in (
+        (elsewhere, UpOptions()),
+        (shipped, UpOptions(trace=strange)),
+        (shipped, UpOptions(record=strange)),
+    ):
+        told = refused(PathNotUtf8, description, options, short_path)
+        assert r"r\udcfcbe" in told
+        told.encode()
+    assert not strange.exists()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(strange))
+    refused(PathNotUtf8, shipped, UpOptions(), strange)
+
+
+def test_a_mission_that_another_command_is_bringing_up_is_left_alone(
+    shipped: MissionDescription, tmp_path: Path
+) -> None:
+    with run_files.own_folder(shipped.name):
+        socket_of_the_other = run_files.run_directory(shipped.name) / "hub.sock"
+        socket_of_the_other.touch()
+        trace = tmp_path / "trace.jsonl"
+        with pytest.raises(run_files.FolderInUse):
+            asyncio.run(run_mission(shipped, UpOptions(trace=trace), Nobody()))
+        assert socket_of_the_other.exists()
+        assert not trace.exists()
 
 
 def test_the_command_ends_with_4_and_names_the_trace_once(tmp_path: Path) -> None:
