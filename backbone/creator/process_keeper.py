@@ -54,6 +54,7 @@ from backbone.creator.supervision import Phase, Supervision
 from backbone.creator.zygote import Forks, NoProcess
 from backbone.errors import BackboneError
 from backbone.naming import IllegalName, component_of
+from backbone.waiting import end_tasks
 
 log = logging.getLogger(__name__)
 
@@ -203,10 +204,7 @@ class ProcessKeeper:
             ends.append(asyncio.create_task(self._end_if_here(name), name=f"end {name}"))
             await asyncio.wait(ends[-1:], timeout=OVERLAP_S)
         ended = [end for end in await asyncio.gather(*ends) if end is not None]
-        tasks = list(self._tasks)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await end_tasks(*self._tasks)
         return ended
 
     async def _end_if_here(self, name: str) -> ProcessEnded | None:
@@ -308,11 +306,13 @@ class ProcessKeeper:
         name = launch.name
         try:
             pid = await self._zygote.fork(launch)
-        except NoProcess as error:
+        except Exception as error:
             self._carry_out(self._supervision.fork_failed(name, str(error), self._now_s()))
             if forked is not None and not forked.done():
                 forked.set_exception(self._kept.failure(name) or self._kept.failed(name, str(error)))
-            return
+            if isinstance(error, NoProcess):
+                return
+            raise  # a bug; but whoever waits for the component, or ends it, does not wait for ever
         if forked is not None and not forked.done():
             forked.set_result(pid)
         self._carry_out(self._supervision.forked(name, pid, self._now_s()))

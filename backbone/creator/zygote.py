@@ -129,13 +129,17 @@ class Zygote:
         """Start the component and return its pid.
 
         Raises:
-            NoProcess: The system refused a process, or the zygote was killed repeatedly.
+            NoProcess: The system refused a process, the launch cannot be sent, or the zygote was killed repeatedly.
         """
+        try:
+            order = frame(Fork(launch))
+        except (UnicodeEncodeError, OverflowError) as error:  # a text that is not UTF-8, a number that is too large
+            raise NoProcess(f"the launch of {launch.name} cannot be sent to the zygote: {error}") from error
         for _ in range(FORK_TRIES):
             body = await self._living_body()
             answered: asyncio.Future[int] = asyncio.get_running_loop().create_future()
             body.pending.append(answered)
-            body.send(Fork(launch))
+            body.send(order)
             try:
                 return await answered
             except _Lost:
@@ -144,7 +148,7 @@ class Zygote:
 
     def kill(self, pid: int, number: signal.Signals) -> None:
         """Send the signal to the component's process tree, unless the component has ended."""
-        self._body.send(Kill(pid, number))
+        self._body.send(frame(Kill(pid, number)))
 
     def keep_running(self) -> str:
         """Continue the zygote if it was stopped; return the fault, empty: none.
@@ -247,11 +251,11 @@ class _ZygoteChannel:
         self._unsent.clear()
         return reader
 
-    def send(self, order: Fork | Kill) -> None:
+    def send(self, order: bytes) -> None:
         if self._writer is None:
-            self._unsent += frame(order)
+            self._unsent += order
         elif not self._writer.is_closing():
-            self._writer.write(frame(order))
+            self._writer.write(order)
 
     def hang_up(self) -> None:
         """Order the zygote to end; its last answers can still be read."""

@@ -98,6 +98,7 @@ class Launcher(Component[NoParameters]):
         keeper.on_fell = self._core_service_fell
         keeper.on_silent = self._core_service_silent
         keeper.on_changed = self.changed
+        keeper.on_bug = self.fail
 
     async def connect(self) -> None:
         """Start the core services in order; start each when the one before is ready."""

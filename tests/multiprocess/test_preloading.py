@@ -6,11 +6,12 @@ import asyncio
 import json
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from backbone.component.launch import Launch
 from backbone.component.process import EXIT_REFUSED
-from backbone.creator.zygote import Zygote
+from backbone.creator.zygote import NoProcess, Zygote
 from backbone.naming import Subsystem
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(60)]
@@ -51,3 +52,18 @@ async def test_what_fails_or_starts_threads_is_left_out(tmp_path: Path, monkeypa
     }
     assert "arc_with_a_bug is not preloaded" in told
     assert "arc_with_a_thread starts threads" in told
+
+
+async def test_a_launch_that_cannot_be_sent_is_refused_and_moves_no_other_answer(tmp_path: Path) -> None:
+    zygote = await Zygote.spawn_fresh(run_directory=str(tmp_path / "run"))
+    ends: asyncio.Queue[int] = asyncio.Queue()
+    zygote.on_exit = lambda pid, _code: ends.put_nowait(pid)
+    launch = Launch("m", Subsystem.BACKBONE, "one", "one", "no:Component", "here", "tcp/127.0.0.1:1", 0.0, 1.0)
+    try:
+        for unsendable in ("caf\udce9", 2**64):
+            with pytest.raises(NoProcess, match="cannot be sent"):
+                await zygote.fork(msgspec.structs.replace(launch, parameters={"trace": unsendable}))
+        async with asyncio.timeout(20):
+            assert await zygote.fork(launch) == await ends.get()
+    finally:
+        await zygote.close()
