@@ -6,6 +6,7 @@
 * A test on virtual time is limited in virtual time, so that a busy machine fails none: its mission may last
   ``VIRTUAL_LIMIT_S``, or as long as the marker ``virtual_limit(seconds)`` allows.
 * A failure is printed when it happens: the names are there also if the run is killed.
+* What a test prints or logs need not be UTF-8: its report escapes what would end the process of ``pytest -n``.
 * A test that starts processes says so with the marker ``processes``. Beside one with the marker ``alone``, which makes
   the whole machine busy or measures a time on it, no other test with processes runs: with ``pytest -n`` each waits for
   its turn. Such tests come first then, while other workers have tests without processes.
@@ -106,6 +107,15 @@ class Limits:
             pytest.fail(f"starts a process without the marker 'processes': {self._started[0]}")
 
 
+class EncodableReports:
+    """Reports that a process of ``pytest -n`` can send."""
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_report_to_serializable(self) -> Generator[None, object, object]:
+        """Escape what is not UTF-8."""
+        return encodable((yield))
+
+
 class AloneFirst:
     """The order of tests for workers: those that run alone, those with processes, the others."""
 
@@ -131,6 +141,23 @@ class FailuresAtOnce:
             reporter.flush()
 
 
+def encodable(value: object) -> object:
+    """Return the value with each text made encodable.
+
+    Example:
+        >>> encodable({"sections": [("log", chr(0xDC80))]})
+        {'sections': [('log', '\\\\udc80')]}
+    """
+    match value:
+        case str():
+            return value.encode(errors="backslashreplace").decode()
+        case dict():
+            return {encodable(key): encodable(inner) for key, inner in value.items()}
+        case list() | tuple():
+            return type(value)(map(encodable, value))
+    return value
+
+
 def _turn(item: pytest.Item) -> int:
     turns = ("alone", "processes")
     return next((turn for turn, name in enumerate(turns) if item.get_closest_marker(name) is not None), len(turns))
@@ -154,5 +181,6 @@ def watch(config: pytest.Config, grace_s: float = GRACE_S, locks: tuple[Path, Pa
     config.pluginmanager.register(Limits(grace_s, Machine(*locks)), "limits")
     if hasattr(config, "workerinput"):
         config.pluginmanager.register(AloneFirst(), "alone-first")
+        config.pluginmanager.register(EncodableReports(), "encodable-reports")
     else:
         config.pluginmanager.register(FailuresAtOnce(config), "failures-at-once")

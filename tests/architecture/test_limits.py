@@ -1,4 +1,4 @@
-"""The limits of tests hold: tried on a suite of five tests that break them."""
+"""The limits of tests hold: tried on suites of tests that break them."""
 
 from __future__ import annotations
 
@@ -48,6 +48,14 @@ def test_hangs():
 
 def test_comes_after_one_that_hangs():
     pass
+"""
+SAYS_ANYTHING = """
+def test_logs():
+    import logging
+    logging.error("a file called caf" + chr(0xDCE9))
+
+def test_fails():
+    raise ValueError("caf" + chr(0xDCE9))
 """
 ALONE = ("test_sleeps", "test_starts", "test_plays_for_long")
 
@@ -192,3 +200,8 @@ def test_no_test_with_processes_runs_beside_one_that_is_alone(tmp_path: Path) ->
         assert len(busy) < 2 or not any(each.startswith("alone") for each in busy), busy
         most = max(most, len(busy))
     assert most > 1, "nothing ran together"
+
+
+def test_what_is_not_utf_8_in_a_report_ends_no_process(tmp_path: Path) -> None:
+    said = run(tmp_path, "-n", "1", suite=SAYS_ANYTHING)
+    assert "1 failed, 1 passed" in said, said

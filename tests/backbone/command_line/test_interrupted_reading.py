@@ -63,14 +63,14 @@ def read(night: Path, monkeypatch: pytest.MonkeyPatch) -> list[object]:
     ids=["check", "story", "compare", "recover", "join", "replay"],
 )
 def test_it_ends_at_once_and_leaves_nothing(
-    command: Command, night: Path, read: list[object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: Command, night: Path, read: list[object], tmp_path: Path, short_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(short_path))
     with pytest.raises(KeyboardInterrupt):
         event_loop.exit_code_of(lambda: command(night, tmp_path / "new.mcap"))
     assert len(read) == READ
     assert not (tmp_path / "new.mcap").exists()
-    assert not list(tmp_path.rglob("replay-*"))
+    assert not list(short_path.rglob("replay-*"))
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
