@@ -70,6 +70,14 @@ class Driver(Behavior[D]):
         """
         raise NotImplementedError
 
+    def interrupted(self) -> None:
+        """Forget the last motion.
+
+        When: before each ``drive_on``: at the begin of a grant, and after an operator's stop, a cut link or a refusal.
+        What: take into account that the robot stood still until now, and that a person may have moved it. Not: send
+        commands.
+        """
+
     @property
     def held(self) -> ArcClient:
         """The client of its ARC.
@@ -126,6 +134,7 @@ class Driver(Behavior[D]):
     async def act(self) -> None:
         """Drive; after a permanent refusal fail, after other refusals retry."""
         while True:
+            self.interrupted()
             try:
                 return await self.drive_on(self.robot)
             except (SwappedOut, EmergencyStopped):

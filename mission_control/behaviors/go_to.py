@@ -99,10 +99,14 @@ class Goer(Driver[W]):
             at = {"x_m": position.x_m, "y_m": position.y_m, "spread_m": self.spread_m}
             self.finish(BehaviorStatus.SUCCESS, at)
 
+    def interrupted(self) -> None:
+        """Continue from the robot's present position; see ``Driver.interrupted``."""
+        if self.way is not None:
+            self.way.interrupt()
+
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the place; after the suspension continue from the robot's position at that time."""
         if self.way is not None:
-            self.way.interrupt()
             self.report(f"suspended on the way to {_spoken(self.way.place)}: {suspended_because(reason, by)}")
 
     def parameters_changed(self) -> None:

@@ -81,11 +81,14 @@ class Hide(Driver[HideParameters]):
         is_hidden = self.search.stage is SearchStage.HIDDEN
         self.finish(BehaviorStatus.SUCCESS if is_hidden else BehaviorStatus.FAILURE, {"looks": self.search.looks})
 
-    async def suspended(self, reason: str, by: str) -> None:
-        """Keep the views; the next pictures show whether the robot still stands at its place."""
+    def interrupted(self) -> None:
+        """Keep the views; the next pictures show whether the robot still stands at its place; see ``Driver``."""
         self.search.interrupt()
         self._motion = STILL
         self._fresh.clear()
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Report the looks around; see ``Behavior.suspended``."""
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:

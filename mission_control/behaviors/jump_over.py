@@ -87,9 +87,12 @@ class JumpOver(Driver[JumpOverParameters]):
         """Return the time until the robot has landed; see ``Behavior.not_now``."""
         return self.course.airborne_s(self.clock.now_s())
 
+    def interrupted(self) -> None:
+        """Decide next only from the robot's position; see ``Driver.interrupted``."""
+        self.course.interrupt()
+
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the state; after the suspension the next decision depends only on the robot's position."""
-        self.course.interrupt()
         self.report(f"suspended: {suspended_because(reason, by)}; {self.course.jumps} jumps until now")
 
     def parameters_changed(self) -> None:

@@ -67,9 +67,12 @@ class Patrol(Driver[PatrolParameters]):
         await self.held.halt()
         self.finish(BehaviorStatus.SUCCESS, self._found())
 
+    def interrupted(self) -> None:
+        """Continue from the robot's present position; see ``Driver.interrupted``."""
+        self.route.interrupt()
+
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the state; after the suspension continue from the robot's position at that time."""
-        self.route.interrupt()
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:

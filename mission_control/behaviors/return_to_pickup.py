@@ -73,10 +73,10 @@ class ReturnToPickup(Servo[PickupParameters]):
         await self.held.halt()
         self.give_up(TargetNotFound(f"{robot} looked for the mark {self.route.in_vain} times"))
 
-    async def suspended(self, reason: str, by: str) -> None:
-        """Keep the state of the search; see ``Behavior.suspended``."""
+    def interrupted(self) -> None:
+        """Keep the state of the search, and ask where the robot is; see ``Driver.interrupted``."""
         self.route.interrupt()
-        await super().suspended(reason, by)
+        super().interrupted()
 
     def parameters_changed(self) -> None:
         """Begin again with the new parameters."""

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Mapping
 from typing import Annotated, TypeVar
 
 import numpy as np
@@ -92,8 +91,8 @@ class Servo(Driver[S]):
         self._counted_rad = 0.0
         self._phase = TrackingPhase.ACQUIRING
 
-    async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002  any robot with a camera
-        """Acquire the target again; see ``BehaviorHooks.resumed``."""
+    def interrupted(self) -> None:
+        """Acquire the target again; see ``Driver.interrupted``."""
         self.look_anew()
 
     def see(self, frame: Frame) -> None:
