@@ -61,6 +61,8 @@ class Driver(Behavior[D]):
     """Codes of permanent refusals: a retry would fail again."""
     spread_m = 0.0
     """Standard deviation of the place in the localizer's last answer."""
+    is_driving = False
+    """True while ``drive_on`` runs; at all other times the robot obeys no decision of the behavior."""
 
     async def drive_on(self, robot: str) -> None:
         """Continue the work.
@@ -135,6 +137,7 @@ class Driver(Behavior[D]):
         """Drive; after a permanent refusal fail, after other refusals retry."""
         while True:
             self.interrupted()
+            self.is_driving = True
             try:
                 return await self.drive_on(self.robot)
             except (SwappedOut, EmergencyStopped):
@@ -147,6 +150,8 @@ class Driver(Behavior[D]):
                     self.give_up(refusal)
                     return None
                 self.report(f"stands: {refusal}")
+            finally:
+                self.is_driving = False
             await self.clock.sleep_s(AGAIN_AFTER_S)
 
     async def suspending(self, deadline_s: float) -> None:  # noqa: ARG002  a halt takes only milliseconds

@@ -56,7 +56,9 @@ class Hide(Driver[HideParameters]):
         self._unusable: UnusablePicture | None = None
 
     def see(self, frame: Frame) -> None:
-        """Decide from this picture; ``drive_on`` carries it out."""
+        """Decide from this picture; ``drive_on`` carries it out. A robot that obeys nothing gets no decision."""
+        if not self.is_driving:
+            return
         self._fresh.set()
         if frame.width_px < VIEW_COLUMNS or frame.height_px < VIEW_ROWS:
             self._unusable = UnusablePicture(f"{frame.rc} delivers {frame.width_px} by {frame.height_px} pixels")

@@ -96,7 +96,9 @@ class Servo(Driver[S]):
         self.look_anew()
 
     def see(self, frame: Frame) -> None:
-        """Decide from this picture; ``drive_on`` carries it out."""
+        """Decide from this picture; ``drive_on`` carries it out. A robot that obeys nothing gets no decision."""
+        if not self.is_driving:
+            return
         self._fresh.set()
         if (frame.width_px, frame.height_px) != PICTURE_PX:
             self._unusable = UnusablePicture(f"{frame.rc} delivers {frame.width_px} by {frame.height_px} pixels")
