@@ -15,6 +15,8 @@ Order = Literal["active-first", "extra-first", "interleaved"]
 
 CONSOLE_SLICE_S = 2.0  # chosen: half the time for which a Pioneer is in view, so that no slice hides it
 MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
+SHORTEST_SLICE_S = 0.1  # chosen: one or two pictures; in less a watcher sees nothing
+SLOWEST_M_S = 0.01  # chosen: a quarter of an hour through the room; a trial lasts as long
 
 
 class ImpossibleCondition(Refusal):
@@ -35,7 +37,7 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             times and request an extension at a glimpse; ARCs of equal priority get equal time; consoles request at most
             ``CONSOLE_SLICE_S``, and no time while they do not drive.
         target: ``pioneer`` or ``person``.
-        speed_m_s: Speed of the target; 0: the papers' speed.
+        speed_m_s: Speed of the target, at least ``SLOWEST_M_S``; 0: the papers' speed.
         slice_s: Run time of watchers and consoles in the mission file, seconds.
         order: Order of the claims of watchers and consoles, and thus of their turns.
         driven: Share of the time in which each console drives.
@@ -49,11 +51,15 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     policy: Policy = "paper"
     target: Literal["pioneer", "person"] = "pioneer"
     speed_m_s: Annotated[float, msgspec.Meta(ge=0, le=10)] = 0.0
-    slice_s: Annotated[float, msgspec.Meta(gt=0, le=600)] = SLICE_S
+    slice_s: Annotated[float, msgspec.Meta(ge=SHORTEST_SLICE_S, le=600)] = SLICE_S
     order: Order = "active-first"
     driven: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1.0
     noise: Annotated[float, msgspec.Meta(ge=0, le=10)] = 1.0
     frames_wanted: Annotated[int, msgspec.Meta(ge=1, le=100)] = 7
+
+    def __post_init__(self) -> None:
+        if 0 < self.speed_m_s < SLOWEST_M_S:
+            raise ValueError(f"speed_m_s is {self.speed_m_s:g}: a target needs at least {SLOWEST_M_S:g} m/s")
 
     @property
     def passage(self) -> Passage:

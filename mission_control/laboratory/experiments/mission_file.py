@@ -100,14 +100,14 @@ def _world(condition: Condition) -> Iterator[str]:
     passage = condition.passage
     yield f'  <world name="{WORLD}" type="simulated_world" host="base" seed="1">'
     yield f'    <room width-m="{ROOM_M[0]:g}" depth-m="{ROOM_M[1]:g}"/>'
-    yield f'    <air noise="{condition.noise:g}"/>'
+    yield f'    <air noise="{_decimal(condition.noise)}"/>'
     places = (*WATCHERS[: condition.active], *EXTRAS[: condition.extra])
     for robot, (x_m, y_m) in zip(condition.robots, places, strict=True):
         yield f'    <robot name="{robot}" x-m="{x_m:g}" y-m="{y_m:g}" heading-deg="90"/>'
     target: dict[str, object] = {
         "name": "target",
         "shape": passage.shape,
-        "speed-m-s": f"{passage.speed_m_s:g}",
+        "speed-m-s": _decimal(passage.speed_m_s),
         "begin-s": f"{FOR_EVER_S:g}",
         "there-and-back": str(passage.there_and_back).lower(),
     }
@@ -123,7 +123,7 @@ def _world(condition: Condition) -> Iterator[str]:
 def _watcher(condition: Condition, robot: str, view_s: float) -> Iterator[str]:
     yield f'    <behavior type="watch_for_motion" name="{watcher_of(robot)}" priority="1">'
     yield (
-        f'      <arc kind="capture" minimum-runtime-s="{condition.slice_s:g}" period-s="{PERIOD_S}" '
+        f'      <arc kind="capture" minimum-runtime-s="{_decimal(condition.slice_s)}" period-s="{PERIOD_S}" '
         f'packet-time-s="{PACKET_TIME_S}">'
     )
     yield f'        <wish type="scout" name="{robot}"/>'
@@ -134,6 +134,11 @@ def _watcher(condition: Condition, robot: str, view_s: float) -> Iterator[str]:
         yield f'      <parameter name="settling_s" value="{SETTLING_S}"/>'
         yield f'      <parameter name="frame_rate_hz" value="{FRAME_RATE_HZ}"/>'
     yield "    </behavior>"
+
+
+def _decimal(number: float) -> str:
+    """Return the number as mission files write it: without an exponent."""
+    return f"{number:.9f}".rstrip("0").rstrip(".")
 
 
 def _tag(name: str, attributes: dict[str, object], *, closed: bool = True) -> str:

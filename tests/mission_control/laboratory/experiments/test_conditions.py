@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from examples import share
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from mission_control.laboratory.experiments.conditions import EVERYTHING, Condition, ImpossibleCondition, checked
 from mission_control.laboratory.experiments.geometry import EXTRAS, WATCHERS
@@ -19,6 +22,8 @@ from mission_control.laboratory.experiments.trial import draw
         ({"extra": len(EXTRAS) + 1}, "extra"),
         ({"policy": "best"}, "best"),
         ({"speed_m_s": -1.0}, "speed_m_s"),
+        ({"speed_m_s": 1e-300}, "speed_m_s"),
+        ({"slice_s": 1e-300}, "slice_s"),
         ({"driven": 1.5}, "driven"),
         ({"moon": True}, "moon"),
     ],
@@ -40,6 +45,18 @@ def test_each_condition_is_a_mission_without_faults() -> None:
         mission = mission_of(condition)
         assert len(mission.behaviors) == condition.active
         assert sum(one.type == "scout" for one in mission.resources) == condition.active + condition.extra
+
+
+@settings(max_examples=share(20))
+@example(5.0, 0.5, 0.00001)
+@given(st.floats(0.1, 600.0), st.floats(0.01, 10.0), st.floats(0.0, 10.0))
+def test_every_possible_number_is_one_in_the_mission_file(slice_s: float, speed_m_s: float, noise: float) -> None:
+    mission = mission_of(checked(slice_s=slice_s, speed_m_s=speed_m_s, noise=noise))
+    world = mission.components[0].parameters["world"]
+    assert mission.behaviors[0].arc is not None
+    assert mission.behaviors[0].arc.minimum_runtime_s == pytest.approx(slice_s, abs=1e-9)
+    assert world["targets"][0]["speed_m_s"] == pytest.approx(speed_m_s, abs=1e-9)
+    assert world["air"]["noise"] == pytest.approx(noise, abs=1e-9)
 
 
 def test_all_conditions_of_one_table_share_their_geometry() -> None:
