@@ -187,30 +187,38 @@ def _run(
 
     try:
         if plot is not None:
-            plotting.require_plotting()
+            plotting.require_format(plot)
+            plot.parent.mkdir(parents=True, exist_ok=True)
         if traces is not None:
             traces.mkdir(parents=True, exist_ok=True)
         with progress_bar(Console(stderr=True), "trials") as progress:
             outcome = run_surveillance(
                 conditions, trials=trials, seed=seed, jobs=jobs, progress=progress, traces=traces
             )
-        if plot is not None:
-            plotting.plot(outcome, plot, title)
     except Refusal as refusal:
         _refuse(refusal)
     except OSError as error:
-        print(f"cannot be written: {error}", file=sys.stderr)
-        raise typer.Exit(int(ExitCode.MISSION_FAILED)) from None
+        _end_unwritten(error)
     if as_json:
         print(json.dumps(outcome.to_json()))
     else:
         Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(table(outcome, title))
     print(summary(outcome), file=sys.stderr)
+    if plot is not None:  # last: without the picture the result of all trials is still there
+        try:
+            plotting.plot(outcome, plot, title)
+        except OSError as error:
+            _end_unwritten(error)
     if not outcome.is_sound:
         for row in outcome.rows:
             for said in row.disagreements[:3]:
                 print(f"{row.condition.title()}: {said}", file=sys.stderr)
         raise typer.Exit(int(ExitCode.MISSION_FAILED))
+
+
+def _end_unwritten(error: OSError) -> NoReturn:
+    print(f"cannot be written: {error}", file=sys.stderr)
+    raise typer.Exit(int(ExitCode.MISSION_FAILED)) from None
 
 
 def _refuse(refusal: Refusal) -> NoReturn:

@@ -28,6 +28,13 @@ class NoPlotting(Refusal):
     remedy = "Install the extra: pip install 'scout-backbone[plot]'."
 
 
+class UnknownFormat(Refusal):
+    """The plotting library cannot write a file with this ending."""
+
+    code = "experiment.plot_format"
+    remedy = "Let the file's name end with .png or .svg."
+
+
 class Point(NamedTuple):
     """A counted rate, in percent.
 
@@ -56,6 +63,19 @@ def require_plotting() -> None:
         import_module("matplotlib")
     except ImportError as error:
         raise NoPlotting(f"matplotlib cannot be imported: {error}") from error
+
+
+def require_format(file: Path) -> None:
+    """Check that the plotting library can write a file of this name.
+
+    Raises:
+        NoPlotting: No plotting library is installed.
+        UnknownFormat: The name has no known ending.
+    """
+    require_plotting()
+    known = import_module("matplotlib.figure").Figure().canvas.get_supported_filetypes()
+    if file.suffix.removeprefix(".").lower() not in known:
+        raise UnknownFormat(f"no plot can be written to {file.name!r}")
 
 
 def plot(outcome: SurveillanceOutcome, file: Path, title: str) -> None:

@@ -87,3 +87,30 @@ def test_a_picture_is_drawn_or_its_library_is_named(tmp_path: Path) -> None:
     else:
         assert told.exit_code == 0, told.output
         assert file.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_picture_that_nothing_can_write_is_refused_before_the_first_trial(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    for name in ("rates.foo", "rates"):
+        told = surveillance("--trials", "1000000", "--plot", str(tmp_path / name))
+        assert told.exit_code == 2
+        assert ".png or .svg" in told.output
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_picture_that_cannot_be_written_takes_no_result_along(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    taken = tmp_path / "new folder" / "rates.png"
+    taken.mkdir(parents=True)
+    told = surveillance("--extra", "0", "--noise", "0", "--trials", "1", "--json", "--plot", str(taken))
+    assert told.exit_code == 6
+    assert "cannot be written" in told.output
+    assert json.loads(told.stdout)["conditions"][0]["trials"] == 1
+
+
+def test_a_picture_gets_the_folder_that_it_names(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    file = tmp_path / "new folder" / "rates.png"
+    told = surveillance("--extra", "0", "--noise", "0", "--trials", "1", "--plot", str(file))
+    assert told.exit_code == 0, told.output
+    assert file.exists()
