@@ -108,6 +108,7 @@ class PatrolRoute:
             here = self._places[(self.reached - 1) % len(self._places)]
             if here.distance_m(position) > BACK_AT * self._within_m:
                 return self._go(here, position, now_s)
+            self._watchdog.rest()
             self._resting_s -= passed_s
             if self._resting_s > 0:
                 return STILL

@@ -135,6 +135,16 @@ def test_an_undisturbed_patrol_reaches_every_way_point_in_order_and_is_over() ->
     assert patrol.decide(position, now_s) == STILL
 
 
+@given(st.floats(0.2, 1.5), st.floats(0.0, 0.5))
+def test_a_robot_that_came_back_to_its_rest_is_not_stuck_on_its_way_on(carried_m: float, left_s: float) -> None:
+    patrol = route(SQUARE, rest_s=10.0)
+    position, now_s = drive(patrol, Position(1.0, 1.0, 0.0), 0.0, 10.0 - left_s)
+    assert patrol.reached == 1
+    drive(patrol, Position(position.x_m + carried_m, position.y_m, position.heading_rad), now_s, 60.0)
+    assert patrol.reached > 1
+    assert patrol.freed == 0
+
+
 @settings(max_examples=share(80))
 @given(st.lists(places, min_size=1, max_size=5), st.integers(1, 2), positions, take_overs)
 def test_after_any_take_overs_the_record_is_that_of_an_undisturbed_patrol(
