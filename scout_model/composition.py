@@ -237,15 +237,17 @@ def _add_dark_place(spec: mujoco.MjSpec, dark: DarkPlace, description: WorldDesc
 
 
 def _add_furniture(spec: mujoco.MjSpec, furniture: Furniture, dark_places: list[DarkPlace]) -> None:
+    """Add a box or a table. All of its parts have a ``/`` in their names, so that it may be named as a wall is."""
     world, x_m, y_m, height_m = spec.worldbody, furniture.x_m, furniture.y_m, furniture.height_m
     if furniture.shape == "box":
         is_dark = any(_is_in(furniture, dark) for dark in dark_places)
         size_m = [furniture.width_m, furniture.depth_m, height_m]
-        _box(world, furniture.name, [x_m, y_m, height_m / 2], size_m, 0.56 * (DARKNESS if is_dark else 1.0), _THINGS)
+        level = 0.56 * (DARKNESS if is_dark else 1.0)
+        _box(world, f"{furniture.name}/box", [x_m, y_m, height_m / 2], size_m, level, _THINGS)
         return
     under_m = height_m - TABLE_TOP_M
     top_m = [furniture.width_m, furniture.depth_m, TABLE_TOP_M]
-    _box(world, furniture.name, [x_m, y_m, height_m - TABLE_TOP_M / 2], top_m, 0.56, _THINGS)
+    _box(world, f"{furniture.name}/top", [x_m, y_m, height_m - TABLE_TOP_M / 2], top_m, 0.56, _THINGS)
     # The table's underside: just below the top and a little smaller, so that it is invisible from the side.
     inset_m = TABLE_LEG_M / 2
     underside_m = [furniture.width_m - inset_m, furniture.depth_m - inset_m, _MARK_THICKNESS_M]
@@ -280,7 +282,7 @@ def _add_ramp(spec: mujoco.MjSpec, ramp: Ramp) -> None:
     ]
     spec.add_mesh(name=ramp.name, uservert=[number for corner_m in corners_m for number in corner_m])
     spec.worldbody.add_geom(
-        name=ramp.name,
+        name=f"{ramp.name}/slope",
         type=mujoco.mjtGeom.mjGEOM_MESH,
         meshname=ramp.name,
         pos=[ramp.x_m, ramp.y_m, 0.0],

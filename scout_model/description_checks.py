@@ -14,6 +14,7 @@ from scout_model.robot import robot_class
 from scout_model.targets import SHAPES, path_length_m
 
 _FURNITURE_SHAPES = ("box", "table")
+_OUTERMOST = "world"  # MuJoCo's name of the body that has all others
 
 
 def check(description: WorldDescription) -> None:
@@ -37,6 +38,8 @@ def check(description: WorldDescription) -> None:
     for name, uses in names.items():
         if uses > 1 or not name or "/" in name:
             raise InvalidWorld(f"name {name!r} is empty, has a '/', or is used {uses} times")
+    if _OUTERMOST in {landmark.name for landmark in description.landmarks} | {one.name for one in description.targets}:
+        raise InvalidWorld(f"no landmark or target can be named {_OUTERMOST!r}, as the whole is")
     ids = Counter(place.network_id for place in description.robots)
     for network_id, uses in ids.items():
         if uses > 1 or not FIRST_NETWORK_ID <= network_id <= LAST_NETWORK_ID:

@@ -42,6 +42,7 @@ def check_world(tables: Tables, report: Report) -> None:
     check_class_parameters(world, (WORLD,), tables, report)
     bodies = [child for child in world.children if child.tag in BODIES]
     check_unique(bodies, "name", "body", report)
+    _check_names(bodies, report)
     _check_robots(world, tables, report)
     _check_classes(world, tables, report)
     room = world.first("room")
@@ -77,6 +78,14 @@ def _check_type(world: Element, tables: Tables, report: Report) -> None:
             f"type {name} is that of resource {tables.resources_of(name)[0].text('name')} too",
             "Name the type that plays the world",
         )
+
+
+def _check_names(bodies: list[Element], report: Report) -> None:
+    for body in bodies:
+        if body.tag in ("landmark", "target") and body.text("name") == WORLD:
+            report.fault(
+                body.place_of("name"), f"no {body.tag} can be named {WORLD}, as the whole is", "Give it another name"
+            )
 
 
 def _check_robots(world: Element, tables: Tables, report: Report) -> None:

@@ -1,6 +1,7 @@
 """What stands in a room, looks as it should, and is refused where it makes no sense."""
 
 import math
+from collections.abc import Callable
 
 import cv2
 import mujoco
@@ -227,11 +228,30 @@ def test_a_broken_room_is_refused_with_what_is_wrong(mjcf: str, told: str) -> No
         {"landmarks": [Landmark("l", math.inf, 1.0)]},
         {"landmarks": [Landmark("l", 1.0, 1.0), Landmark("l", 2.0, 1.0)]},
         {"landmarks": [Landmark("scout1", 1.0, 1.0)]},
+        {"landmarks": [Landmark("world", 1.0, 1.0)]},
+        {"targets": [Target("world", "person", [(1.0, 1.0), (2.0, 1.0)], 1.0)]},
     ],
 )
 def test_things_that_make_no_sense_are_refused(parts: dict[str, object]) -> None:
     with pytest.raises(InvalidWorld):
         World(described(**parts))
+
+
+@pytest.mark.parametrize("name", ["floor", "sun", "line_1", "wall_north", "skirting_west", "poster_north_0", "room"])
+@pytest.mark.parametrize(
+    "thing",
+    [
+        lambda name: {"furniture": [Furniture(name, 2.0, 2.0, 0.4, 0.4, 0.4)]},
+        lambda name: {"furniture": [Furniture(name, 2.0, 2.0, 0.4, 0.4, 0.4, "table")]},
+        lambda name: {"ramps": [Ramp(name, 2.0, 2.0, 0.4, 0.4, 0.1)]},
+        lambda name: {"landmarks": [Landmark(name, 2.0, 2.0)]},
+        lambda name: {"dark_places": [DarkPlace(name, 2.0, 2.0, 0.4, 0.4, 0.4)]},
+        lambda name: {"robots": [scout(4.0, 2.0, name=name)]},
+        lambda name: {"targets": [Target(name, "person", [(1.0, 1.0), (2.0, 1.0)], 1.0)]},
+    ],
+)
+def test_a_thing_may_be_named_as_a_part_of_the_room(name: str, thing: Callable[[str], dict[str, object]]) -> None:
+    assert World(described(**thing(name))).frame == 0
 
 
 # ---------------------------------------------------------------------- targets
