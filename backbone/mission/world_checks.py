@@ -122,6 +122,9 @@ def _check_inside(place: Element, body: Element, width_m: float, depth_m: float,
         middle_m = place.number(attribute)
         half_m = (place.number(extent) or 0.0) / 2 if place.tag in ("furniture", "dark") else 0.0
         if middle_m is None or half_m <= middle_m <= room_m - half_m:
+            if place.tag == "robot" and middle_m in (0.0, room_m):
+                in_wall = f"robot {body.text('name')} stands in a wall: {along} at {middle_m:g} m"
+                report.fault(place.place_of(attribute), in_wall, "Move it into the room")
             continue
         reach = f"from {middle_m - half_m:g} to {middle_m + half_m:g}" if half_m else f"at {middle_m:g}"
         report.fault(
