@@ -114,6 +114,7 @@ class SimulatedRadio:
         """Stop receiving replies."""
         if self._replies is not None:
             self._replies.close()
+            self._replies = None
 
     def _ask(self, network_id: int) -> bool:
         turn = self._turns.take(network_id, self._site.clock.now_s())
