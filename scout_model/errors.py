@@ -42,6 +42,13 @@ class InvalidRoom(InvalidWorld):
     remedy = "Correct the room's MJCF file; 'python -m mujoco.viewer --mjcf=FILE' shows the room in MuJoCo."
 
 
+class UnstableBody(InvalidWorld):
+    """MuJoCo cannot compute the motion of a robot's body."""
+
+    code = "world.unstable"
+    remedy = "Lower the gains of its actuators, limit their forces, or give its light joints an armature."
+
+
 class MalformedPacket(ScoutModelError, ValueError):
     """These bytes or values do not form a packet of the command radio."""
 

@@ -94,3 +94,14 @@ def robot_class(kind: str) -> type[Robot]:
     if not isinstance(found, type) or lacking:
         raise InvalidWorld(f"{kind} is no kind of robot: it lacks {', '.join(lacking) or 'a class'}")
     return found
+
+
+def fit_battery(program: Robot, battery_j: float, kind: str) -> None:
+    """Replace the battery of a program that was not used yet by one of this capacity.
+
+    Raises:
+        InvalidWorld: This kind of robot has no battery.
+    """
+    if not isinstance(program, PoweredRobot):
+        raise InvalidWorld(f"{kind} has no battery, so none of {battery_j:g} J")
+    program.battery = Battery(battery_j)

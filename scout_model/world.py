@@ -18,15 +18,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scout_model.battery import Battery
 from scout_model.carrier import CarriedPose, trips
 from scout_model.composition import compose
 from scout_model.description import RobotPlace, WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.readings import Senses, parts_by_robot
-from scout_model.robot import AnsweringRobot, PoweredRobot, Robot, robot_class
+from scout_model.robot import AnsweringRobot, Robot, fit_battery, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
+from scout_model.stability import Stability
 from scout_model.targets import Route, TargetState, part_poses, parts
 
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
@@ -120,6 +120,7 @@ class World:
         self._place_targets()
         self._hold_carried()
         mujoco.mj_forward(self._model, self._data)
+        self._stability = Stability(self._model, self._data, {place.name: place.kind for place in description.robots})
         self._senses = Senses(self._model, self._data, {name: robot.program for name, robot in self._robots.items()})
 
     @property
@@ -167,7 +168,11 @@ class World:
         self._data.qvel[first : first + 6] += blow
 
     def step_frame(self) -> None:
-        """Advance by one frame, a thirtieth of a second."""
+        """Advance by one frame, a thirtieth of a second.
+
+        Raises:
+            UnstableBody: MuJoCo cannot compute the motion of a body; the world is of no further use.
+        """
         now_s = self.time_s
         driven = [self._drive(robot, now_s) for robot in self._robots.values()]
         if not any(driven) and not self._carried and self._is_all_asleep():
@@ -179,6 +184,7 @@ class World:
         else:
             self._step_bodies()
             self._stands = False
+        self._stability.check()
         self.frame += 1
         self._senses.update(self.time_s)
 
@@ -317,7 +323,7 @@ class World:
         last_velocity = int(model.jnt_dofadr[last]) + _VELOCITIES[int(model.jnt_type[last])]
         program = robot_class(kind)()
         if place.battery_j is not None:
-            _fit_battery(program, place.battery_j, kind)
+            fit_battery(program, place.battery_j, kind)
         return _Body(
             kind=kind,
             program=program,
@@ -387,12 +393,6 @@ class World:
                 del self._carried[name]
             else:
                 self._data.qpos[body.free : body.free + 7] = _free_position(held)
-
-
-def _fit_battery(program: Robot, battery_j: float, kind: str) -> None:
-    if not isinstance(program, PoweredRobot):
-        raise InvalidWorld(f"{kind} has no battery, so none of {battery_j:g} J")
-    program.battery = Battery(battery_j)
 
 
 def _free_position(held: CarriedPose) -> list[float]:

@@ -93,3 +93,21 @@ class Broken(Rover):
 
 class Bodiless:
     """Is no robot."""
+
+
+class Confused(Rover):
+    """Sets an actuator to what no motor can do, as a division of infinities does."""
+
+    gives = float("nan")
+
+    def controls(self, now_s: float) -> dict[str, float]:
+        return {**super().controls(now_s), "left": self.gives}
+
+
+class Trembling(Rover):
+    """One motor is far too strong for its light wheel."""
+
+    @classmethod
+    def body_mjcf(cls) -> str:
+        calm = '<velocity name="right" joint="right" kv="0.2" forcerange="-0.3 0.3"/>'
+        return super().body_mjcf().replace(calm, '<motor name="right" joint="right" gear="1e5"/>')

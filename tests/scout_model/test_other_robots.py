@@ -1,5 +1,6 @@
 """Another kind of robot is one MJCF, one class, and its class path in the mission file."""
 
+import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ from backbone.mission.reader import read_mission
 from scout_model import radio_link
 from scout_model.camera import Camera
 from scout_model.description import SCOUT, RobotPlace, WorldDescription
-from scout_model.errors import InvalidWorld, UnknownBody
+from scout_model.errors import InvalidWorld, UnknownBody, UnstableBody
 from scout_model.robot import Robot, robot_class
 from scout_model.scout import Scout, Spring
 from scout_model.world import World
@@ -110,3 +111,25 @@ def test_what_is_no_robot_is_refused_with_its_name(kind: str, told: str) -> None
 def test_a_class_that_drives_what_its_body_has_not_is_told_so() -> None:
     with pytest.raises(InvalidWorld, match="'rudder'"):
         world("rover:Driverless").step_frame()
+
+
+def drives_for_a_second(room: World) -> None:
+    for _ in range(30):
+        for network_id in (1, 2, 3):
+            room.hear(network_id, radio_link.encode_drive(8.0, 8.0))
+        room.step_frame()
+
+
+@pytest.mark.parametrize("given", [math.nan, math.inf, -math.inf, 1e308])
+def test_an_impossible_control_ends_the_world_with_its_name(given: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo would go on with all controls at zero: those of the other robots too."""
+    room = world("rover:Confused")
+    monkeypatch.setattr(sys.modules["rover"].Confused, "gives", given)
+    with pytest.raises(UnstableBody, match=r"rover1 \(rover:Confused\) sets its actuator 'left' to"):
+        drives_for_a_second(room)
+
+
+def test_a_body_that_cannot_be_computed_ends_the_world_with_its_name() -> None:
+    """MuJoCo would go on with every robot back at its beginning, and with all controls at zero."""
+    with pytest.raises(UnstableBody, match=r"rover[13] \(rover:Trembling\) .* joint '(free|left|right)'"):
+        drives_for_a_second(world("rover:Trembling"))
